@@ -42,21 +42,21 @@ void die_with(pid_t parent) {
   if (getppid() != parent) throw Error("the program that started this worker has ended");
 }
 
-wire::Hello hello_for(const Options& options, const ChildStart& start) {
-  const std::string host = wire::host_name();
+proto::Hello hello_for(const Options& options, const ChildStart& start) {
   const auto process_id = static_cast<std::uint64_t>(getpid());
-  wire::Hello hello{
-      .worker_name = options.name.empty() ? wire::name_from(fmt::format("{}-{}", host, process_id))
-                                          : options.name,
-      .host = host,
-      .process_id = process_id,
-      .num_slots = static_cast<std::uint32_t>(options.num_threads * model().batch_size()),
-      .model_version = std::string(model().version()),
-      .build = PROOFMASS_VERSION,
-      .reference_digest = model().reference_digest(best_instruction_set()),
-      .former = start.former};
-  if (!wire::is_name(hello.worker_name)) {
-    throw InvalidArgument(fmt::format("name = {} ({})", hello.worker_name, is_name_rule));
+  proto::Hello hello;
+  hello.set_host(wire::host_name());
+  hello.set_worker_name(options.name.empty()
+                            ? wire::name_from(fmt::format("{}-{}", hello.host(), process_id))
+                            : options.name);
+  hello.set_process_id(process_id);
+  hello.set_num_slots(static_cast<std::uint32_t>(options.num_threads * model().batch_size()));
+  hello.set_model_version(std::string(model().version()));
+  hello.set_build(PROOFMASS_VERSION);
+  hello.set_reference_digest(model().reference_digest(best_instruction_set()));
+  if (start.former) *hello.mutable_former() = *start.former;
+  if (!wire::is_name(hello.worker_name())) {
+    throw InvalidArgument(fmt::format("name = {} ({})", hello.worker_name(), is_name_rule));
   }
   return hello;
 }

@@ -3,16 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
 
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/report/digest.hpp"
+#include "coordinator/store/result_columns.hpp"
+#include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
+#include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"
@@ -46,42 +46,6 @@ bool have_same_draw(const RunResult& first, const RunResult& second) {
   return first.has_truth() == second.has_truth() &&
          (!first.has_truth() || std::ranges::equal(first.truth, second.truth, have_same_bits));
 }
-
-/// Finds out whether runs can be paired, and counts those without an estimate.
-class Survey {
- public:
-  Survey(const ComparedCampaign& first, const ComparedCampaign& second,
-         CampaignComparison& comparison)
-      : comparison_(comparison) {
-    comparison.missing_in_first = {.num_given_up = first.num_given_up};
-    comparison.missing_in_second = {.num_given_up = second.num_given_up};
-    if (first.campaign->seed != second.campaign->seed) comparison.why_unpaired = "the seeds differ";
-  }
-
-  /// @return Whether runs may be paired, as far as is known.
-  bool add(const RunResult* a, const RunResult* b) {
-    std::string& why = comparison_.why_unpaired;
-    if (a != nullptr) comparison_.missing_in_first.add(*a);
-    if (b != nullptr) comparison_.missing_in_second.add(*b);
-    if (a != nullptr && b != nullptr) {
-      has_common_run_ = true;
-      if (why.empty() && !have_same_draw(*a, *b)) {
-        why = fmt::format("the draws of run {} differ", a->run.value);
-      }
-    }
-    return why.empty();
-  }
-
-  void end() {
-    if (comparison_.is_paired() && !has_common_run_) {
-      comparison_.why_unpaired = "no run is finished in both";
-    }
-  }
-
- private:
-  CampaignComparison& comparison_;
-  bool has_common_run_ = false;
-};
 
 /// Calls visit(first, second) for runs that are compared: a pair, or, if runs are not paired, one
 /// of either campaign.
@@ -163,15 +127,23 @@ struct BothErrors {
 /// be known at once: it takes runs for paired until they prove not to be.
 void read_first_pass(const ComparedCampaign& first, const ComparedCampaign& second,
                      CampaignComparison& comparison, BothErrors& errors) {
-  Survey survey(first, second, comparison);
+  std::string& why = comparison.why_unpaired;
+  if (first.campaign->seed != second.campaign->seed) why = "the seeds differ";
   const bool was_paired = comparison.is_paired();
+  bool has_common_run = false;
   walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
-    if (survey.add(a, b) != was_paired) return;
+    if (a != nullptr && b != nullptr) {
+      has_common_run = true;
+      if (why.empty() && !have_same_draw(*a, *b)) {
+        why = fmt::format("the draws of run {} differ", a->run.value);
+      }
+    }
+    if (comparison.is_paired() != was_paired) return;
     visit_compared(a, b, was_paired, [&](const RunResult* of_first, const RunResult* of_second) {
       errors.add(of_first, of_second);
     });
   });
-  survey.end();
+  if (why.empty() && !has_common_run) why = "no run is finished in both";
   if (comparison.is_paired() == was_paired) return;
   errors = {};
   walk_compared(first, second, false,
@@ -264,13 +236,6 @@ void keep_accuracies(const BothErrors& errors, CampaignComparison& comparison) {
   }
 }
 
-void adjust_p_values(std::vector<ParameterComparison>& parameters) {
-  std::vector<ChangePValues> p_values;
-  for (const ParameterComparison& parameter : parameters) p_values.push_back(parameter.p_values);
-  const std::vector<ChangePValues> adjusted = adjusted_changes(p_values);
-  for (std::size_t i = 0; i < num_quantities(); ++i) parameters[i].adjusted_p_values = adjusted[i];
-}
-
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
                                                   const ComparedCampaign& second) {
   std::vector<DefinitionDifference> differences =
@@ -282,36 +247,6 @@ std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
   return differences;
 }
 
-/// Results that are held against the stored digest once all of them were read.
-class CheckedReader {
- public:
-  CheckedReader(const Store& store, const IsStopped& is_stopped)
-      : store_(store), is_stopped_(is_stopped), reader_(store.results()) {}
-
-  [[nodiscard]] std::optional<RunResult> next() {
-    if (is_stopped_()) throw Interrupted();
-    if (has_ended_) return std::nullopt;
-    const std::optional<RunResult> result = reader_.next();
-    if (result) {
-      require_in_range(*result, model().results());
-      digest_.add(*result);
-      ++num_results_;
-    } else {
-      has_ended_ = true;
-      (void)check_digest(store_, num_results_, digest_.finish());
-    }
-    return result;
-  }
-
- private:
-  const Store& store_;
-  IsStopped is_stopped_;
-  ResultReader reader_;
-  Digest digest_;
-  std::uint64_t num_results_ = 0;
-  bool has_ended_ = false;
-};
-
 std::string why_too_few(const CampaignComparison& comparison) {
   const std::size_t num_needed = comparison.is_paired() ? 1 : 2;
   if (std::min(comparison.num_first, comparison.num_second) >= num_needed) return "";
@@ -319,29 +254,45 @@ std::string why_too_few(const CampaignComparison& comparison) {
                      comparison.num_second, num_needed);
 }
 
-}  // namespace
+/// A campaign of a file, of which one state is read.
+struct OpenCampaign {
+  ComparedMember member;
+  ComparedCampaign compared;
+};
 
-ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped) {
+/// @param store  Outlives what is returned.
+OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file,
+                           const IsStopped& is_stopped) {
   if (is_stopped()) throw Interrupted();
-  ComparedCampaign compared{.campaign = stored_campaign(store),
-                            .model_version = store.model_version(),
-                            .build = store.build(),
-                            .num_given_up = num_runs_in(store.given_up_runs()),
-                            .open_results = {}};
-  compared.open_results = [&store, is_stopped, is_first = true]() mutable -> ResultStream {
+  const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  CheckedResults checked = read_checked_results(store, *campaign);
+  const CampaignStatistics& statistics = checked.results.statistics;
+  const MissingEstimates missing{.num_not_converged = statistics.num_not_converged,
+                                 .num_not_finite = statistics.num_not_finite,
+                                 .num_no_draw = statistics.num_no_draw,
+                                 .num_lost = statistics.num_lost,
+                                 .num_given_up = num_runs_in(checked.given_up)};
+  const auto open_results = [&store, is_stopped]() -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
-    if (std::exchange(is_first, false)) {
-      const auto reader = std::make_shared<CheckedReader>(store, is_stopped);
-      return [reader] { return reader->next(); };
-    }
-    const auto reader = std::make_shared<ResultReader>(store.results());
-    return [reader, is_stopped]() -> std::optional<RunResult> {
+    return [reader = std::make_shared<ResultReader>(store.results()), is_stopped] {
       if (is_stopped()) throw Interrupted();
       return reader->next();
     };
   };
-  return compared;
+  return {.member = {.file = file,
+                     .num_runs = store.num_runs(),
+                     .statistics = std::move(checked.results.statistics),
+                     .digest = checked.results.digests.results,
+                     .missing = missing,
+                     .objectives = campaign->objectives(),
+                     .comparison = std::nullopt},
+          .compared = {.campaign = campaign,
+                       .model_version = store.model_version(),
+                       .build = store.build(),
+                       .open_results = open_results}};
 }
+
+}  // namespace
 
 CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
@@ -362,8 +313,42 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
   const auto compare = comparison.is_paired() ? compare_pairs : compare_unpaired_runs;
   compare(first, second, errors, comparison);
   keep_accuracies(errors, comparison);
-  adjust_p_values(comparison.parameters);
   return comparison;
+}
+
+std::vector<ComparedMember> compare_several(std::span<const std::filesystem::path> files,
+                                            const IsStopped& is_stopped) {
+  PROOFMASS_EXPECT(files.size() >= 2);
+  std::vector<ComparedMember> members;
+  const Store first_store = Store::open_read_only(files.front());
+  first_store.read_one_state([&] {
+    const OpenCampaign first = open_campaign(first_store, files.front(), is_stopped);
+    members.push_back(first.member);
+    for (const std::filesystem::path& file : files.subspan(1)) {
+      const Store store = Store::open_read_only(file);
+      store.read_one_state([&] {
+        OpenCampaign other = open_campaign(store, file, is_stopped);
+        other.member.comparison = compare_campaigns(first.compared, other.compared);
+        members.push_back(std::move(other.member));
+      });
+    }
+  });
+  adjust_together(members);
+  return members;
+}
+
+void adjust_together(std::span<ComparedMember> members) {
+  std::vector<ParameterComparison*> compared;
+  std::vector<ChangePValues> p_values;
+  for (ComparedMember& member : members) {
+    if (!member.comparison || !member.comparison->why_not_compared.empty()) continue;
+    for (ParameterComparison& parameter : member.comparison->parameters) {
+      compared.push_back(&parameter);
+      p_values.push_back(parameter.p_values);
+    }
+  }
+  const std::vector<ChangePValues> adjusted = adjusted_changes(p_values);
+  for (std::size_t i = 0; i < compared.size(); ++i) compared[i]->adjusted_p_values = adjusted[i];
 }
 
 }  // namespace proofmass::coordinator

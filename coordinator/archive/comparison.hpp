@@ -1,19 +1,24 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/store/store.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/campaign/statistics.hpp"
 #include "core/statistics/error_change.hpp"
 #include "core/statistics/interval.hpp"
 
@@ -27,20 +32,10 @@ struct ComparedCampaign {
   std::shared_ptr<const Campaign> campaign;
   std::string model_version;
   std::string build;
-  std::uint64_t num_given_up = 0;  ///< Runs without a result.
   /// Begins with the first result, the same ones each time: they are read several times and not
   /// kept.
   std::function<ResultStream()> open_results;
 };
-
-/// Names the campaign of the file. The first stream of results that is opened holds them against
-/// the stored digest at its end, so that no further pass is needed for that; compare_campaigns()
-/// reads it to its end before anything else. The Store outlives what is returned, and one state of
-/// the file is read meanwhile (Store::read_one_state()).
-/// @throws StoreError or DefinitionError if the file cannot be read; Interrupted. So do the
-///         streams, and StoreError if the file holds other results than were stored, see
-///         check_digest().
-[[nodiscard]] ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped);
 
 /// estimate − truth of one parameter over the runs of one side that are compared, SI.
 struct ComparedAccuracy {
@@ -59,8 +54,9 @@ struct ParameterComparison {
   double tail_limit = 0.0;                ///< tail_limit() of both campaigns, SI.
   /// See smallest_scale_factor(); empty below num_welch_min runs unless runs are paired.
   std::optional<double> smallest_scale_factor;
-  ChangePValues p_values;           ///< That chance alone makes such a change.
-  ChangePValues adjusted_p_values;  ///< That chance alone makes one in any test of all parameters.
+  ChangePValues p_values;  ///< That chance alone makes such a change.
+  /// That chance alone makes one in any test of all parameters; see adjust_together().
+  ChangePValues adjusted_p_values;
 };
 
 /// What two campaigns differ in, and what that does to the accuracy.
@@ -71,10 +67,6 @@ struct CampaignComparison {
   std::string why_unpaired;
   std::size_t num_first = 0;   ///< Runs of the first campaign that are compared.
   std::size_t num_second = 0;  ///< Runs of the second campaign; num_first if paired.
-  /// Finished and given-up runs of each whole campaign that have no estimate: they may be its
-  /// worst.
-  MissingEstimates missing_in_first;
-  MissingEstimates missing_in_second;
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
   std::vector<ParameterComparison> parameters;  ///< Of each quantity.
@@ -91,5 +83,60 @@ struct CampaignComparison {
 /// parameter, and 128 MB of several parameters' at a time to save passes.
 [[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                                    const ComparedCampaign& second);
+
+/// Most campaigns that `compare` takes: each is compared with the first, and has a row for each
+/// parameter.
+inline constexpr std::size_t num_compared_max = 64;
+
+/// One of several campaigns: all its runs with an estimate, and how it differs from the first.
+struct ComparedMember {
+  std::filesystem::path file;
+  std::uint64_t num_runs = 0;  ///< Wanted.
+  CampaignStatistics statistics;
+  std::string digest;        ///< Of the results.
+  MissingEstimates missing;  ///< Finished and given-up runs without an estimate: perhaps its worst.
+  std::vector<double> objectives;  ///< Of each quantity, SI; infinite if there is none.
+  /// With the first campaign as its first side; empty for the first campaign itself. The adjusted
+  /// p-values are those of adjust_together().
+  std::optional<CampaignComparison> comparison;
+};
+
+/// Reads campaigns and compares each with the first, as compare_campaigns().
+/// @param files  At least two.
+/// @throws StoreError or DefinitionError if a file cannot be read or holds other results than were
+///         stored, see check_digest(); Interrupted.
+[[nodiscard]] std::vector<ComparedMember> compare_several(
+    std::span<const std::filesystem::path> files, const IsStopped& is_stopped);
+
+/// Corrects the p-values of all parameters and all campaigns together, see adjusted_changes(): the
+/// more campaigns are compared, the larger a change must be to be significant. What was not
+/// compared is left out.
+void adjust_together(std::span<ComparedMember> members);
+
+/// What several campaigns are called in their tables.
+struct MemberNames {
+  std::string title;               ///< `campaign`, or the key that was varied.
+  std::vector<std::string> names;  ///< Of each: `A`, or the value of the key.
+  std::vector<std::string> notes;  ///< What the list of campaigns says of each beside its file.
+};
+
+/// `A` to `Z`, `AA`, `AB` and so on.
+[[nodiscard]] MemberNames lettered(std::size_t count);
+
+/// The campaigns, the keys of their definitions that differ, and tables of bias, scatter and
+/// |error| with a row for each parameter and campaign. Lines have at most 80 characters but for
+/// names of files and values of definitions that are longer.
+[[nodiscard]] std::string comparison_text(std::span<const ComparedMember> members,
+                                          const MemberNames& names, Paint paint = Paint::no);
+
+/// A text of a key, for JSON.
+using KeyText = std::pair<std::string, std::string>;
+
+/// A comparison as JSON, complete and in SI units: of two campaigns one object, of several a list
+/// of campaigns, each with its comparison with the first.
+/// @param varied  Keys with their values for each campaign, which is in the list then, even of two;
+///                empty if none was varied.
+[[nodiscard]] std::string comparison_json(std::span<const ComparedMember> members,
+                                          std::span<const std::vector<KeyText>> varied = {});
 
 }  // namespace proofmass::coordinator

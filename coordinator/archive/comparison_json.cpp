@@ -2,9 +2,8 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <string_view>
 
-#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/archive/comparison.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
@@ -46,19 +45,19 @@ Json json_of(const Quantity& quantity, const ParameterComparison& parameter) {
   return json;
 }
 
-/// A comparison of two campaigns, complete and in SI units.
-Json comparison_object(const CampaignComparison& comparison, std::string_view first,
-                       std::string_view second) {
-  Json json{{"first", first},
-            {"second", second},
+/// The comparison of a campaign with the first, complete and in SI units.
+Json comparison_object(const ComparedMember& first, const ComparedMember& second) {
+  const CampaignComparison& comparison = *second.comparison;
+  Json json{{"first", first.file.string()},
+            {"second", second.file.string()},
             {"differences", Json::array()},
             {"is_paired", comparison.is_paired()},
             {"why_unpaired", text_or_null(comparison.why_unpaired)},
             {"why_not_compared", text_or_null(comparison.why_not_compared)},
             {"num_first", comparison.num_first},
             {"num_second", comparison.num_second},
-            {"num_first_without_estimate", comparison.missing_in_first.total()},
-            {"num_second_without_estimate", comparison.missing_in_second.total()},
+            {"num_first_without_estimate", first.missing.total()},
+            {"num_second_without_estimate", second.missing.total()},
             {"confidence", default_confidence},
             {"parameters", Json::array()}};
   for (const auto& [field, of_first, of_second] : comparison.differences) {
@@ -94,7 +93,7 @@ Json accuracy_json(const ComparedMember& member, std::size_t i) {
   return json;
 }
 
-Json member_json(const ComparedMember& member, const std::string& first) {
+Json member_json(const ComparedMember& member, const ComparedMember& first) {
   Json json{{"file", member.file.string()},
             {"num_runs", member.num_runs},
             {"num_finished", member.statistics.num_runs},
@@ -106,9 +105,7 @@ Json member_json(const ComparedMember& member, const std::string& first) {
   for (std::size_t i = 0; i < member.objectives.size(); ++i) {
     json["parameters"].push_back(accuracy_json(member, i));
   }
-  if (member.comparison) {
-    json["comparison"] = comparison_object(*member.comparison, first, member.file.string());
-  }
+  if (member.comparison) json["comparison"] = comparison_object(first, member);
   return json;
 }
 
@@ -117,14 +114,13 @@ Json member_json(const ComparedMember& member, const std::string& first) {
 std::string comparison_json(std::span<const ComparedMember> members,
                             std::span<const std::vector<KeyText>> varied) {
   constexpr int indent = 2;
-  const std::string first = members.front().file.string();
   if (members.size() == 2 && varied.empty()) {
-    const Json json = comparison_object(*members[1].comparison, first, members[1].file.string());
+    const Json json = comparison_object(members[0], members[1]);
     return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
   }
   Json json{{"confidence", default_confidence}, {"campaigns", Json::array()}};
   for (std::size_t i = 0; i < members.size(); ++i) {
-    Json member = member_json(members[i], first);
+    Json member = member_json(members[i], members.front());
     if (!varied.empty()) {
       Json values = Json::object();
       for (const auto& [key, value] : varied[i]) values[key] = value;

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/archive/comparison.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/model.hpp"
 #include "core/statistics/comparison.hpp"

@@ -1,15 +1,19 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator {
+
+/// Whether an export has the drawn values of each run. They are computed anew, as the table `draw`
+/// of `proofmass query` is, which takes the memory of the campaign's table values.
+enum class DrawColumns : std::uint8_t { left_out, included };
 
 // All results of a campaign database, in run order, in formats that others read. Numbers are SI and
 // keep all bits; columns are named as in the table `run_result`. README.md describes the formats.

@@ -6,90 +6,47 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
+#include <functional>
+#include <iterator>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <thread>
 #include <utility>
 
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/verification.hpp"
+#include "coordinator/store/result_columns.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-/// Threads that simulate batches of a campaign until there are none left.
-class Simulation {
- public:
-  Simulation(const Campaign& campaign, std::span<const RunResult> stored,
-             const IsStopped& is_stopped)
-      : campaign_(campaign), stored_(stored), is_stopped_(is_stopped), plan_(campaign.prepare()) {}
-
-  std::vector<ResultDifference> run(std::size_t num_threads) {
-    const std::size_t num_batches = (stored_.size() + batch_size_ - 1) / batch_size_;
-    std::vector<std::jthread> others;
-    for (std::size_t i = 1; i < std::min(num_threads, num_batches); ++i) {
-      others.emplace_back([this] { simulate_batches(); });
-    }
-    simulate_batches();
-    for (std::jthread& other : others) other.join();
-    if (failure_) std::rethrow_exception(failure_);
-    std::ranges::stable_sort(differences_, {}, &ResultDifference::run);
-    return std::move(differences_);
-  }
-
- private:
-  void simulate_batches() {
+/// Calls work(i, has_failed) for each i below `count`, in several threads. Throws what one of them
+/// threw first: the others' failures may follow from it.
+void in_threads(std::size_t count, std::size_t num_threads,
+                const std::function<void(std::size_t, const std::atomic<bool>&)>& work) {
+  std::atomic<std::size_t> next = 0;
+  std::atomic<bool> has_failed = false;
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work_on = [&] {
     try {
-      while (!has_failed_) {
-        const std::size_t first = next_.fetch_add(batch_size_);
-        if (first >= stored_.size()) return;
-        const std::size_t count = std::min(batch_size_, stored_.size() - first);
-        simulate(stored_.subspan(first, count));
-      }
+      for (std::size_t i = next++; i < count && !has_failed; i = next++) work(i, has_failed);
     } catch (...) {
-      fail(std::current_exception());
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::current_exception();
+      has_failed = true;
     }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (std::size_t i = 1; i < std::min(num_threads, count); ++i) others.emplace_back(work_on);
+    work_on();
   }
-
-  void simulate(std::span<const RunResult> batch) {
-    std::vector<RunRequest> requests;
-    for (const RunResult& result : batch) {
-      requests.push_back({result.run, campaign_.table_values(result.run)});
-    }
-    const auto on_progress = [&](int /*num_steps*/) {
-      if (has_failed_ || is_stopped_()) throw Interrupted();
-    };
-    const std::vector<RunResult> computed =
-        plan_->simulate_batch(requests, best_instruction_set(), on_progress);
-    for (std::size_t i = 0; i < batch.size(); ++i) keep(differences_of(batch[i], computed[i]));
-  }
-
-  /// Of several threads' failures the first counts: the others may follow from it.
-  void fail(std::exception_ptr failure) {
-    const std::lock_guard lock(mutex_);
-    if (!failure_) failure_ = std::move(failure);
-    has_failed_ = true;
-  }
-
-  void keep(const std::vector<ResultDifference>& differences) {
-    const std::lock_guard lock(mutex_);
-    differences_.insert(differences_.end(), differences.begin(), differences.end());
-  }
-
-  const Campaign& campaign_;
-  std::span<const RunResult> stored_;
-  const IsStopped& is_stopped_;
-  std::unique_ptr<const Plan> plan_;
-  std::size_t batch_size_ = model().batch_size();
-  std::atomic<std::size_t> next_ = 0;
-  std::atomic<bool> has_failed_ = false;
-  std::mutex mutex_;  ///< Guards what follows.
-  std::exception_ptr failure_;
-  std::vector<ResultDifference> differences_;
-};
+  if (failure) std::rethrow_exception(failure);
+}
 
 constexpr std::size_t num_at_a_time = 8192;
 
@@ -109,44 +66,6 @@ std::string difference_of(const Campaign& campaign, const RunResult& stored) {
   }
   return "";
 }
-
-/// Differences of some runs, each on its place.
-class Part {
- public:
-  Part(const Campaign& campaign, std::span<const RunResult> results)
-      : campaign_(campaign), results_(results), differences_(results.size()) {}
-
-  void compute(std::size_t first, std::size_t step) {
-    try {
-      for (std::size_t i = first; i < results_.size(); i += step) {
-        differences_[i] = difference_of(campaign_, results_[i]);
-      }
-    } catch (...) {
-      failures_[first] = std::current_exception();
-    }
-  }
-
-  std::vector<std::string> compute_all(std::size_t num_threads) {
-    failures_.resize(num_threads);
-    {
-      std::vector<std::jthread> others;
-      for (std::size_t i = 1; i < num_threads; ++i) {
-        others.emplace_back([this, i, num_threads] { compute(i, num_threads); });
-      }
-      compute(0, num_threads);
-    }
-    for (const std::exception_ptr& failure : failures_) {
-      if (failure) std::rethrow_exception(failure);
-    }
-    return std::move(differences_);
-  }
-
- private:
-  const Campaign& campaign_;
-  std::span<const RunResult> results_;
-  std::vector<std::string> differences_;
-  std::vector<std::exception_ptr> failures_;
-};
 
 }  // namespace
 
@@ -202,7 +121,28 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
 std::vector<ResultDifference> simulate_again(const Campaign& campaign,
                                              std::span<const RunResult> stored,
                                              std::size_t num_threads, const IsStopped& is_stopped) {
-  return Simulation(campaign, stored, is_stopped).run(num_threads);
+  const std::unique_ptr<const Plan> plan = campaign.prepare();
+  const std::size_t batch_size = model().batch_size();
+  std::vector<std::vector<ResultDifference>> found((stored.size() + batch_size - 1) / batch_size);
+  in_threads(found.size(), num_threads, [&](std::size_t i, const std::atomic<bool>& has_failed) {
+    const std::size_t first = i * batch_size;
+    const auto batch = stored.subspan(first, std::min(batch_size, stored.size() - first));
+    std::vector<RunRequest> requests;
+    for (const RunResult& result : batch) {
+      requests.push_back({result.run, campaign.table_values(result.run)});
+    }
+    const auto on_progress = [&](int /*num_steps*/) {
+      if (has_failed || is_stopped()) throw Interrupted();
+    };
+    const std::vector<RunResult> computed =
+        plan->simulate_batch(requests, best_instruction_set(), on_progress);
+    for (std::size_t k = 0; k < batch.size(); ++k) {
+      std::ranges::move(differences_of(batch[k], computed[k]), std::back_inserter(found[i]));
+    }
+  });
+  std::vector<ResultDifference> differences;
+  for (auto& of_batch : found) std::ranges::move(of_batch, std::back_inserter(differences));
+  return differences;
 }
 
 Redraw redraw_runs(const Store& store, const Campaign& campaign, std::size_t num_threads,
@@ -212,7 +152,11 @@ Redraw redraw_runs(const Store& store, const Campaign& campaign, std::size_t num
   const auto compare = [&] {
     if (is_stopped()) throw Interrupted();
     redraw.num_drawn += results.size();
-    for (const std::string& difference : Part(campaign, results).compute_all(num_threads)) {
+    std::vector<std::string> differences(results.size());
+    in_threads(results.size(), num_threads, [&](std::size_t i, const std::atomic<bool>&) {
+      differences[i] = difference_of(campaign, results[i]);
+    });
+    for (const std::string& difference : differences) {
       if (difference.empty()) continue;
       ++redraw.num_different;
       if (redraw.differences.size() < details_named_max) redraw.differences.push_back(difference);

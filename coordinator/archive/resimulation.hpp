@@ -48,7 +48,7 @@ struct ResultDifference {
 ///
 /// @param stored       Of the campaign; a run of theirs has all table values that it needs.
 /// @param num_threads  That simulate; at least 1. The result does not depend on it.
-/// @return All differences, by run.
+/// @return All differences, in the order of the results.
 /// @throws Interrupted.
 [[nodiscard]] std::vector<ResultDifference> simulate_again(const Campaign& campaign,
                                                            std::span<const RunResult> stored,

@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/store/result_columns.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 
@@ -44,7 +44,7 @@ class Rules {
   }
 
   void violate(RunIndex run, const std::string& what) {
-    if (scan_.num_violations++ >= violations_named_max) return;
+    if (scan_.num_violations++ >= details_named_max) return;
     scan_.violations.push_back(fmt::format("run {}: {}", run.value, what));
   }
 

@@ -18,11 +18,9 @@ struct ResultScan {
   std::vector<RunRange> runs;  ///< Finished ones, ascending.
   ResultDigests digests;       ///< Of their results.
   std::uint64_t num_violations = 0;
-  std::vector<std::string> violations;  ///< The first ones: `run 3: num_draws = 0 (rule)`.
+  std::vector<std::string>
+      violations;  ///< details_named_max at most: `run 3: num_draws = 0 (rule)`.
 };
-
-/// Violations that a ResultScan names.
-inline constexpr std::uint64_t violations_named_max = 10;
 
 /// Reads all results and holds them against the rules of their status, and against the list of
 /// those who delivered them. Both are of one state of the file if Store::read_one_state() says so.

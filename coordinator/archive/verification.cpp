@@ -62,7 +62,7 @@ class Verification {
       check = Check::fails(error.what());
     }
     check.name = name;
-    holds_ = holds_ && check.verdict != Verdict::fails;
+    holds_ = holds_ && check.verdict != CheckOutcome::fails;
     report_(check);
   }
 
@@ -109,14 +109,9 @@ class Verification {
     const std::string counts =
         fmt::format("{} of {} runs", num_runs_in(scan_->runs), store_->num_runs());
     if (scan_->num_violations == 0) return Check::holds(counts + ": each number obeys its rule");
-    Check check = Check::fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
-                                           scan_->num_violations == 1 ? "rule is" : "rules are"));
-    check.details = scan_->violations;
-    if (scan_->num_violations > scan_->violations.size()) {
-      check.details.push_back(
-          fmt::format("and {} more", scan_->num_violations - scan_->violations.size()));
-    }
-    return check;
+    return Check::fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
+                                    scan_->num_violations == 1 ? "rule is" : "rules are"),
+                        scan_->violations, scan_->num_violations - scan_->violations.size());
   }
 
   // A coordinator stores the digest when it ends; until then there are newer results.
@@ -173,15 +168,10 @@ class Verification {
       return Check::holds(
           fmt::format("of {} runs made again: every truth is the same", redraw.num_drawn));
     }
-    Check check = Check::fails(
+    return Check::fails(
         fmt::format("of {} runs made again, of which {} {}", redraw.num_drawn, redraw.num_different,
                     redraw.num_different == 1 ? "differs" : "differ"),
-        redraw.differences);
-    if (redraw.num_different > redraw.differences.size()) {
-      check.details.push_back(
-          fmt::format("and {} more", redraw.num_different - redraw.differences.size()));
-    }
-    return check;
+        redraw.differences, redraw.num_different - redraw.differences.size());
   }
 
   Check check_simulation() {
@@ -278,29 +268,30 @@ bool verify(const std::filesystem::path& file, const VerifyOptions& options,
 }
 
 Check Check::holds(std::string finding) {
-  return {.name = {}, .verdict = Verdict::holds, .finding = std::move(finding), .details = {}};
+  return {.name = {}, .verdict = CheckOutcome::holds, .finding = std::move(finding), .details = {}};
 }
 
-Check Check::fails(std::string finding) { return fails(std::move(finding), {}); }
-
-Check Check::fails(std::string finding, std::vector<std::string> details) {
+Check Check::fails(std::string finding, std::vector<std::string> details,
+                   std::uint64_t num_further) {
   if (details.size() > details_named_max) {
-    const std::size_t num_more = details.size() - details_named_max;
+    num_further += details.size() - details_named_max;
     details.resize(details_named_max);
-    details.push_back(fmt::format("and {} more", num_more));
   }
+  if (num_further > 0) details.push_back(fmt::format("and {} more", num_further));
   return {.name = {},
-          .verdict = Verdict::fails,
+          .verdict = CheckOutcome::fails,
           .finding = std::move(finding),
           .details = std::move(details)};
 }
 
 Check Check::not_checked(std::string finding) {
-  return {
-      .name = {}, .verdict = Verdict::not_checked, .finding = std::move(finding), .details = {}};
+  return {.name = {},
+          .verdict = CheckOutcome::not_checked,
+          .finding = std::move(finding),
+          .details = {}};
 }
 
-std::string_view word_for(Verdict verdict) {
+std::string_view word_for(CheckOutcome verdict) {
   constexpr std::array<std::string_view, 3> words{"ok", "FAILS", "not checked"};
   return words[static_cast<std::size_t>(verdict)];
 }

@@ -14,7 +14,7 @@
 
 namespace proofmass::coordinator {
 
-enum class Verdict : std::uint8_t {
+enum class CheckOutcome : std::uint8_t {
   holds,
   fails,
   not_checked,  ///< Another check failed that it needs, or the file does not tell.
@@ -26,15 +26,15 @@ inline constexpr std::size_t details_named_max = 10;
 /// One thing that a campaign database was checked for.
 struct Check {
   std::string_view name;  ///< `integrity`, `digest` ...
-  Verdict verdict = Verdict::holds;
+  CheckOutcome verdict = CheckOutcome::holds;
   std::string finding;               ///< What was found, in a line.
   std::vector<std::string> details;  ///< Further lines.
 
   // Checks without a name yet.
   [[nodiscard]] static Check holds(std::string finding);
-  [[nodiscard]] static Check fails(std::string finding);
-  /// Names the first ten of the details and counts the others.
-  [[nodiscard]] static Check fails(std::string finding, std::vector<std::string> details);
+  /// Names the first ten of the details and counts the others, and those that are not among them.
+  [[nodiscard]] static Check fails(std::string finding, std::vector<std::string> details = {},
+                                   std::uint64_t num_further = 0);
   [[nodiscard]] static Check not_checked(std::string finding);
 };
 
@@ -60,7 +60,7 @@ struct VerifyOptions {
                           const IsStopped& is_stopped);
 
 /// `ok`, `FAILS` or `not checked`.
-[[nodiscard]] std::string_view word_for(Verdict verdict);
+[[nodiscard]] std::string_view word_for(CheckOutcome verdict);
 
 /// A check as text: a line, then one for each detail; at most 80 characters each unless a detail
 /// has no place to break.

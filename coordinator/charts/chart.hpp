@@ -13,11 +13,11 @@ namespace proofmass::coordinator {
 // size of a picture does not depend on the number of runs. Texts may hold anything: they are
 // escaped where they are drawn.
 
-/// Colours by their role. A page or a theme says what they look like, see theme.hpp. Nothing is
+/// Colours by their role. A page or a theme says what they look like, see svg.hpp. Nothing is
 /// told by colour alone: layers also differ by dash, shape or label.
 enum class Ink : std::uint8_t { first, second, third, fourth, text };
 enum class Dash : std::uint8_t { solid, dashed, dotted };
-enum class Shape : std::uint8_t { circle, triangle, square, diamond };
+enum class Shape : std::uint8_t { triangle, diamond };
 
 enum class Scale : std::uint8_t { linear, logarithmic };
 
@@ -55,9 +55,8 @@ struct Line {
 struct Markers {
   std::string name = {};
   std::vector<Point> points = {};
-  std::vector<std::string> labels = {};  ///< Beside the first points; may be fewer.
   Ink ink = Ink::first;
-  Shape shape = Shape::circle;
+  Shape shape = Shape::triangle;
 };
 
 struct BandPoint {
@@ -73,15 +72,10 @@ struct Band {
   Ink ink = Ink::first;
 };
 
-/// A line across the whole chart, with its label at its end.
+/// A vertical line across the whole chart, with its label above it.
 struct LimitLine {
-  enum class Direction : std::uint8_t {
-    vertical,    ///< At a value of x.
-    horizontal,  ///< At a value of y.
-  };
   std::string label = {};
   double value = 0.0;
-  Direction direction = Direction::vertical;
   Ink ink = Ink::second;
   Dash dash = Dash::dashed;
 };

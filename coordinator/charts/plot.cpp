@@ -51,9 +51,7 @@ struct Extents {
       y.add(point.upper);
     }
   }
-  void add(const LimitLine& limit) {
-    (limit.direction == LimitLine::Direction::vertical ? x : y).add(limit.value);
-  }
+  void add(const LimitLine& limit) { x.add(limit.value); }
   void add(const Point& point) {
     x.add(point.x);
     y.add(point.y);
@@ -103,8 +101,8 @@ std::vector<const LimitLine*> vertical_limits(const Chart& chart, const AxisMap&
   std::vector<const LimitLine*> limits;
   for (const Layer& layer : chart.layers) {
     const auto* limit = std::get_if<LimitLine>(&layer);
-    if (limit == nullptr || limit->direction != LimitLine::Direction::vertical) continue;
-    if (x.contains(limit->value) && !limit->label.empty()) limits.push_back(limit);
+    if (limit == nullptr || limit->label.empty() || !x.contains(limit->value)) continue;
+    limits.push_back(limit);
   }
   return limits;
 }

@@ -49,7 +49,7 @@ struct LegendEntry {
   Sample sample = Sample::area;
   Ink ink = Ink::first;
   Dash dash = Dash::solid;
-  Shape shape = Shape::circle;
+  Shape shape = Shape::triangle;
   double opacity = 1.0;
 };
 

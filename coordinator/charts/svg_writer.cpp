@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "coordinator/charts/theme.hpp"
+#include "coordinator/charts/svg.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -52,13 +52,8 @@ std::string marker_path(Point centre, Shape shape) {
     return coordinate(centre.x + x) + " " + coordinate(centre.y + y);
   };
   switch (shape) {
-    case Shape::circle:
-      return fmt::format("M{}a{} {} 0 1 0 {} 0a{} {} 0 1 0 -{} 0Z", at(-r, 0.0), r, r, 2.0 * r, r,
-                         r, 2.0 * r);
     case Shape::triangle:
       return fmt::format("M{}L{}L{}Z", at(0.0, -r), at(r, r), at(-r, r));
-    case Shape::square:
-      return fmt::format("M{}L{}L{}L{}Z", at(-r, -r), at(r, -r), at(r, r), at(-r, r));
     case Shape::diamond:
       return fmt::format("M{}L{}L{}L{}Z", at(0.0, -r), at(r, 0.0), at(0.0, r), at(-r, 0.0));
   }

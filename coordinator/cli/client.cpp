@@ -7,10 +7,15 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
+#include "coordinator/net/answers.hpp"
+#include "coordinator/store/sha256.hpp"
 #include "core/campaign/name.hpp"
+#include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 
@@ -67,15 +72,27 @@ void warn_if_plain(const ClientOptions& options) {
 int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {
   ClientConnection connection(options.connection);
   warn_if_plain(options);
-  return work([&](const wire::ClientRequest& request) { return connection.ask(request); });
+  return work([&](const proto::RequestEnvelope& request) { return connection.ask(request); });
+}
+
+proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
+                              proto::ReplyEnvelope::ReplyCase kind) {
+  proto::ReplyEnvelope reply = ask(request);
+  if (reply.has_error()) throw Error(reply.error().text());
+  if (reply.reply_case() == kind) return reply;
+  throw Error("reply = of another kind (must be that of the request)");
 }
 
 // Campaigns are only ever added to the end of a coordinator's list.
 wire::StatusReply whole_status(const Ask& ask) {
-  auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
+  const auto page_from = [&](std::uint64_t first_campaign) {
+    proto::RequestEnvelope request;
+    request.mutable_status()->set_first_campaign(first_campaign);
+    return wire::read(reply_of(ask, request, proto::ReplyEnvelope::kStatus).status());
+  };
+  wire::StatusReply status = page_from(0);
   while (status.campaigns.size() < status.num_campaigns) {
-    auto page = reply_of<wire::StatusReply>(
-        ask, wire::StatusRequest{.first_campaign = status.campaigns.size()});
+    wire::StatusReply page = page_from(status.campaigns.size());
     if (page.campaigns.empty()) break;  // It has fewer now: it was started again.
     append(status.campaigns, page.campaigns);
   }
@@ -83,11 +100,15 @@ wire::StatusReply whole_status(const Ask& ask) {
 }
 
 wire::WorkersReply all_workers(const Ask& ask) {
-  auto workers = reply_of<wire::WorkersReply>(ask, wire::WorkersRequest{});
+  const auto page_after = [&](std::uint64_t worker_id) {
+    proto::RequestEnvelope request;
+    request.mutable_workers()->set_after_worker_id(worker_id);
+    return wire::read(reply_of(ask, request, proto::ReplyEnvelope::kWorkers).workers());
+  };
+  wire::WorkersReply workers = page_after(0);
   bool is_more = workers.workers.size() < workers.num_workers && !workers.workers.empty();
   while (is_more) {
-    auto page = reply_of<wire::WorkersReply>(
-        ask, wire::WorkersRequest{.after_worker_id = workers.workers.back().id.value});
+    wire::WorkersReply page = page_after(workers.workers.back().id.value);
     is_more = !page.workers.empty();
     append(workers.workers, page.workers);
   }
@@ -97,6 +118,61 @@ wire::WorkersReply all_workers(const Ask& ask) {
 std::string checked_campaign_name(const std::string& name) {
   if (wire::is_name(name)) return name;
   throw UsageError(fmt::format("campaign = \"{}\" ({})", name, is_name_rule));
+}
+
+// Questions about results.
+
+void add_optional_connection(CLI::App& command, ClientConnectionConfig& connection) {
+  command.add_option("--connect", connection.endpoint,
+                     "Ask the coordinator with this address for\nclients; DB is a campaign's name");
+  add_key_options(command, connection);
+}
+
+proto::RequestEnvelope question_about(const std::string& campaign, proto::Question question) {
+  proto::RequestEnvelope request;
+  request.mutable_answer()->set_campaign(checked_campaign_name(campaign));
+  request.mutable_answer()->set_question(question);
+  return request;
+}
+
+void read_answer(const Ask& ask, const proto::AnswerReply& answer,
+                 const std::function<void(std::string_view)>& take) {
+  proto::RequestEnvelope request;
+  proto::AnswerPartRequest& wanted = *request.mutable_answer_part();
+  wanted.set_answer_id(answer.answer_id());
+  wanted.set_offset(answer.offset());
+  while (wanted.offset() < answer.size()) {
+    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kAnswerPart);
+    const std::string& content = reply.answer_part().content();
+    if (content.empty()) return;
+    take(content);
+    wanted.set_offset(wanted.offset() + content.size());
+  }
+  if (wanted.offset() > answer.size())
+    throw Error("the answer became shorter while it was read; ask again");
+}
+
+int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
+                 AnswerText text) {
+  return with_connection({.connection = connection}, [&](const Ask& ask) {
+    const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
+    const proto::AnswerReply& answer = reply.answer();
+    if (answer.size() > Answers::size_max) {  // It would have to be held in memory.
+      throw Error(
+          fmt::format("answer = {} bytes (must be at most {})", answer.size(), Answers::size_max));
+    }
+    std::string bytes;
+    read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
+    Sha256 hash;
+    hash.add_bytes(bytes);
+    if (hash.finish() != answer.sha256())
+      throw Error("the answer is not the one that was announced; ask again");
+    if (text == AnswerText::lines) print_lines(bytes);
+    if (text == AnswerText::bytes) write_standard_output(bytes);
+    flush_standard_output();
+    if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
+    return static_cast<int>(answer.exit_code());
+  });
 }
 
 }  // namespace proofmass::coordinator

@@ -1,14 +1,13 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
-#include <utility>
-#include <variant>
+#include <string_view>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/net/client_connection.hpp"
-#include "core/error.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -30,17 +29,12 @@ void add_client_options(CLI::App& command, ClientOptions& options);
 void warn_if_plain(const ClientOptions& options);
 
 /// How a command asks; a ClientConnection, or a test.
-using Ask = std::function<wire::ClientReply(const wire::ClientRequest&)>;
+using Ask = std::function<proto::ReplyEnvelope(const proto::RequestEnvelope&)>;
 
-/// The reply of the kind that the request has.
+/// The reply, which is of this kind.
 /// @throws Error with the coordinator's words if it refuses the request.
-template <typename Reply>
-[[nodiscard]] Reply reply_of(const Ask& ask, const wire::ClientRequest& request) {
-  wire::ClientReply reply = ask(request);
-  if (const auto* const refusal = std::get_if<wire::ErrorReply>(&reply)) throw Error(refusal->text);
-  if (auto* const wanted = std::get_if<Reply>(&reply)) return std::move(*wanted);
-  throw Error("reply = of another kind (must be that of the request)");
-}
+[[nodiscard]] proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
+                                            proto::ReplyEnvelope::ReplyCase kind);
 
 /// Connects, and lets `work` ask.
 /// @return What `work` returns.
@@ -58,5 +52,41 @@ template <typename Reply>
 
 /// The name. @throws UsageError unless a campaign may have it.
 [[nodiscard]] std::string checked_campaign_name(const std::string& name);
+
+// Questions about results that a coordinator answers.
+
+/// Declares --connect, --keys and --insecure-plain for a command that reads a database by itself
+/// unless --connect names a coordinator. That option has no environment variable, since it changes
+/// what the command's first argument means.
+/// @param connection  Lives as long as the command.
+void add_optional_connection(CLI::App& command, ClientConnectionConfig& connection);
+
+/// True if the coordinator is to be asked.
+[[nodiscard]] inline bool is_remote(const ClientConnectionConfig& connection) {
+  return !connection.endpoint.empty();
+}
+
+/// An AnswerRequest, without options.
+/// @throws UsageError unless a campaign may have this name.
+[[nodiscard]] proto::RequestEnvelope question_about(const std::string& campaign,
+                                                    proto::Question question);
+
+/// Reads an answer from its offset on, part by part, and asks for nothing beyond its size.
+/// @param take  Called with each part.
+/// @throws Error if the coordinator does not keep it any more; what `take` throws.
+void read_answer(const Ask& ask, const proto::AnswerReply& answer,
+                 const std::function<void(std::string_view)>& take);
+
+/// How the answer to a question is printed.
+enum class AnswerText : std::uint8_t {
+  lines,  ///< As print_lines() does.
+  bytes,  ///< As it is.
+};
+
+/// Asks a coordinator and prints what its command writes, to standard output and standard error.
+/// @return The exit code of that command.
+/// @throws As reply_of() and with_connection() do; Error if the answer arrived damaged.
+[[nodiscard]] int print_answer(const ClientConnectionConfig& connection,
+                               const proto::RequestEnvelope& question, AnswerText text);
 
 }  // namespace proofmass::coordinator

@@ -23,10 +23,6 @@ using wire::CampaignPhase;
 using wire::CampaignStatus;
 using wire::WorkerStatus;
 
-std::uint64_t percent_done(const CampaignStatus& campaign) {
-  return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
-}
-
 std::string time_left(const CampaignStatus& campaign) {
   const bool is_known = campaign.remaining_s && !is_over(campaign);
   return is_known ? duration_text(*campaign.remaining_s) : "-";
@@ -142,14 +138,12 @@ std::string campaign_line(const CampaignStatus& campaign) {
   return text;
 }
 
-std::string done_json(std::string_view action, std::string_view campaign,
-                      const wire::DoneReply& done) {
-  return dumped({{"action", action}, {"campaign", campaign}, {"text", done.text}},
-                JsonLayout::indented);
-}
-
-std::string released_json(std::string_view host, const wire::DoneReply& done) {
-  return dumped({{"action", "release"}, {"host", host}, {"text", done.text}}, JsonLayout::indented);
+std::string done_text(const proto::DoneReply& done, const ActionTaken& action,
+                      OutputFormat format) {
+  if (format == OutputFormat::text) return done.text() + "\n";
+  return dumped(
+      {{"action", action.name}, {std::string(action.kind), action.target}, {"text", done.text()}},
+      JsonLayout::indented);
 }
 
 }  // namespace proofmass::coordinator

@@ -3,13 +3,14 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/report/status_json.hpp"
 #include "coordinator/table/terminal_table.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
-// What a coordinator replied, for people.
+// What a coordinator replied.
 
 /// True if it is finished or cancelled.
 [[nodiscard]] bool is_over(const wire::CampaignStatus& campaign);
@@ -23,12 +24,15 @@ namespace proofmass::coordinator {
 /// `mine active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
 [[nodiscard]] std::string campaign_line(const wire::CampaignStatus& campaign);
 
-// What a coordinator replied, for programs; coordinator/report/status_json.hpp has the rest.
+/// What a client asked for.
+struct ActionTaken {
+  std::string_view name;    ///< `pause`, `submit`.
+  std::string_view kind;    ///< Of its target: `campaign`, `host`.
+  std::string_view target;  ///< Name.
+};
 
-/// @param action    What was asked for: `pause`, `submit`.
-/// @param campaign  Its name.
-[[nodiscard]] std::string done_json(std::string_view action, std::string_view campaign,
-                                    const wire::DoneReply& done);
-[[nodiscard]] std::string released_json(std::string_view host, const wire::DoneReply& done);
+/// The coordinator's words, or an object with them: {"action": name, kind: target, "text": words}.
+[[nodiscard]] std::string done_text(const proto::DoneReply& done, const ActionTaken& action,
+                                    OutputFormat format);
 
 }  // namespace proofmass::coordinator

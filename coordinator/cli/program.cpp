@@ -13,7 +13,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "core/campaign/definition.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -6,16 +6,13 @@
 #include <cmath>
 #include <cstddef>
 
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-std::uint64_t percent(const wire::CampaignStatus& status) {
-  return status.num_done * 100 / std::max<std::uint64_t>(1, status.num_runs);
-}
 
 std::string rate_text(double rate_hz) {
   if (rate_hz <= 0.0) return "";
@@ -31,12 +28,13 @@ std::string left_text(const wire::CampaignStatus& status) {
 
 std::string figures(const wire::CampaignStatus& status) {
   if (!status.storage_failure.empty()) {
-    return fmt::format("{:3} %  nothing can be stored", percent(status));
+    return fmt::format("{:3} %  nothing can be stored", percent_done(status));
   }
   if (status.num_done == 0 && status.num_lent > 0) {
-    return fmt::format("{:3} %  computing the first {}", percent(status), status.num_lent);
+    return fmt::format("{:3} %  computing the first {}", percent_done(status), status.num_lent);
   }
-  return fmt::format("{:3} %{}{}", percent(status), rate_text(status.rate_hz), left_text(status));
+  return fmt::format("{:3} %{}{}", percent_done(status), rate_text(status.rate_hz),
+                     left_text(status));
 }
 
 }  // namespace
@@ -62,7 +60,7 @@ std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns
   const std::string right = fmt::format("] {}", figures(status));
   const std::size_t used = left.size() + right.size();
   const std::size_t width = columns_max > used ? columns_max - used : 1;
-  const std::size_t filled = width * percent(status) / 100;
+  const std::size_t filled = width * percent_done(status) / 100;
   const std::string line =
       left + std::string(filled, '#') + std::string(width - filled, '.') + right;
   return line.substr(0, columns_max);
@@ -86,7 +84,7 @@ ProgressDisplay::~ProgressDisplay() {
 void ProgressDisplay::update(const wire::CampaignStatus& status) {
   if (mode_ == DisplayMode::bar) return show_bar(status);
   if (mode_ == DisplayMode::quiet) return;
-  const std::uint64_t tenths = percent(status) / 10;
+  const std::uint64_t tenths = percent_done(status) / 10;
   const bool has_failed = !status.storage_failure.empty();
   const bool is_further = !tenths_shown_ || tenths > *tenths_shown_;
   if (!is_further && has_failed == is_failure_shown_) return;

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/archive/comparison.hpp"
 
 namespace proofmass::coordinator {
 

@@ -17,9 +17,9 @@ RunsByCampaign computed_runs(const State& state, const Worker& worker) {
   const RunsByCampaign leased = leased_runs(state, worker);
   RunsByCampaign computed;
   for (const Progress& progress : worker.computing) {
-    const auto found = leased.find(progress.batch.campaign);
+    const auto found = leased.find(progress.campaign);
     if (found == leased.end()) continue;
-    RunSet runs = found->second.overlap(RunSet(progress.batch.ranges));
+    RunSet runs = found->second.overlap(progress.runs);
     if (!runs.empty()) computed[found->first].add(runs);
   }
   if (!computed.empty()) return computed;
@@ -168,15 +168,12 @@ RunsByCampaign blame_crash(State& state, WorkerId id, Outbox& outbox) {
                is_certain ? Certainty::certain : Certainty::ambiguous, outbox);
 }
 
-RunsByCampaign blame_batch(State& state, WorkerId id, const wire::ComputedBatch& batch,
-                           Outbox& outbox) {
+RunsByCampaign blame_batch(State& state, WorkerId id, const Progress& batch, Outbox& outbox) {
   const RunsByCampaign leased = leased_runs(state, state.workers.at(id));
   const auto found = leased.find(batch.campaign);
   RunsByCampaign accused;
-  if (found != leased.end()) {
-    accused[batch.campaign] = found->second.overlap(RunSet(batch.ranges));
-  }
-  const bool is_certain = RunSet(batch.ranges).size() == 1;
+  if (found != leased.end()) accused[batch.campaign] = found->second.overlap(batch.runs);
+  const bool is_certain = batch.runs.size() == 1;
   return blame(state, id, accused, is_certain ? Certainty::certain : Certainty::ambiguous, outbox);
 }
 

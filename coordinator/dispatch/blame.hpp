@@ -15,8 +15,7 @@ namespace proofmass::coordinator::detail {
 RunsByCampaign blame_crash(State& state, WorkerId worker, Outbox& outbox);
 
 /// As blame_crash(), for a batch that hangs.
-RunsByCampaign blame_batch(State& state, WorkerId worker, const wire::ComputedBatch& batch,
-                           Outbox& outbox);
+RunsByCampaign blame_batch(State& state, WorkerId worker, const Progress& batch, Outbox& outbox);
 
 /// True if a run crashed so often, on two hosts at least while it ran alone, that it must be the
 /// cause.

@@ -30,7 +30,7 @@ std::uint32_t num_crashes_before_last(const State& state) {
 void restore_blame(State& state, CampaignId id, const StoredCampaign& stored, RunSet& open,
                    Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
-  for (const StoredCampaign::Blamed& blamed : stored.blamed) {
+  for (const BlamedRun& blamed : stored.blamed) {
     if (blamed.num_crashes == 0 || !open.remove(blamed.run)) continue;
     campaign.suspects[blamed.run].num_crashes =
         std::min(num_crashes_before_last(state), blamed.num_crashes);
@@ -41,13 +41,14 @@ void restore_blame(State& state, CampaignId id, const StoredCampaign& stored, Ru
 
 /// Who computed the finished runs is not known any more: any worker may compute them again.
 void restore_audits(CampaignState& campaign, const StoredCampaign& stored) {
-  if (stored.phase == Phase::finished || stored.audit_fraction <= 0.0) return;
+  if (stored.control.phase == Phase::finished || stored.control.audit_fraction <= 0.0) return;
   RunSet left(stored.finished);
   left.remove(RunSet(stored.compared));
   RunSet to_audit;
   for (const RunRange& range : left.ranges()) {
     for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-      if (is_audited(stored.definition->seed, run, stored.audit_fraction)) to_audit.add({run, 1});
+      if (is_audited(stored.definition->seed, run, stored.control.audit_fraction))
+        to_audit.add({run, 1});
     }
   }
   constexpr AuditKey unknown{.first_worker = {0}, .attempt = {2}};
@@ -84,9 +85,9 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
   CampaignState& campaign = state.campaigns[id];
   state.order.push_back(id);
   campaign.definition = stored.definition;
-  campaign.phase = stored.phase;
-  campaign.priority = stored.priority;
-  campaign.audit_fraction = stored.audit_fraction;
+  campaign.phase = stored.control.phase;
+  campaign.priority = stored.control.priority;
+  campaign.audit_fraction = stored.control.audit_fraction;
   campaign.committed = RunSet(stored.finished);
   campaign.given_up = RunSet(stored.given_up);
   RunSet open(RunRange{{0}, stored.definition->num_runs});
@@ -177,8 +178,7 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
   const CampaignState& campaign = state.campaigns.at(id);
   PROOFMASS_EXPECT(campaign.delivered.empty());
   recall_all(state, id, outbox);
-  const bool has_ended = campaign.phase == Phase::finished || campaign.phase == Phase::cancelled;
-  if (has_ended) state.ended[id] = campaign.definition->num_runs;
+  if (has_ended(campaign.phase)) state.ended[id] = campaign.definition->num_runs;
   state.campaigns.erase(id);
   std::erase(state.order, id);
   std::erase(state.served, id);
@@ -188,7 +188,7 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
     worker.run_time_s.erase(id);
     worker.unleased.erase(id);
     std::erase_if(worker.computing,
-                  [&](const Progress& progress) { return progress.batch.campaign == id; });
+                  [&](const Progress& progress) { return progress.campaign == id; });
   }
   send_to_all(state, id, outbox);
 }

@@ -11,6 +11,7 @@
 #include "coordinator/dispatch/blame.hpp"
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -158,7 +159,7 @@ void settle_foreign(State& state, WorkerId id, CampaignId campaign_id, HeldByAtt
   if (foreign.empty()) return;
   for (auto& [attempt, runs] : held) runs.remove(foreign);
   std::erase_if(held, [](const auto& item) { return item.second.empty(); });
-  outbox.send(id, wire::NotServed{.campaign = campaign_id, .ranges = foreign.ranges()});
+  send_not_served(id, campaign_id, foreign.ranges(), outbox);
   state.workers.at(id).unleased[campaign_id] = std::move(foreign);
 }
 
@@ -190,7 +191,7 @@ void repeat_retracts(const State& state, WorkerId id, Outbox& outbox) {
   }
   for (auto& [campaign, waiting] : runs) {
     for (const Progress& progress : worker.computing) {
-      if (progress.batch.campaign == campaign) waiting.remove(RunSet(progress.batch.ranges));
+      if (progress.campaign == campaign) waiting.remove(progress.runs);
     }
     if (!waiting.empty()) send_retract(id, campaign, waiting, outbox);
   }
@@ -228,16 +229,13 @@ void settle_set_aside(State& state, WorkerId id, CampaignId campaign_id, TimePoi
   }
 }
 
-bool is_same(const wire::ComputedBatch& a, const wire::ComputedBatch& b) {
-  return a.campaign == b.campaign && a.ranges == b.ranges;
-}
-
+/// The batch has advanced from `before`, now.
 void add_step_time(State& state, const HostId& host, const Progress& before,
-                   const wire::ComputedBatch& batch, TimePoint now) {
+                   const Progress& batch) {
   if (!state.campaigns.contains(batch.campaign)) return;
   double& step_time_s = state.hosts.at(host).step_time_s[batch.campaign];
-  const double time_s = seconds(now - before.advanced_at) /
-                        static_cast<double>(batch.num_steps_done - before.batch.num_steps_done);
+  const double time_s = seconds(batch.advanced_at - before.advanced_at) /
+                        static_cast<double>(batch.num_steps_done - before.num_steps_done);
   step_time_s = running_mean(step_time_s, time_s);
 }
 
@@ -257,21 +255,22 @@ Duration patience(const State& state, const Worker& worker, CampaignId id) {
 
 }  // namespace
 
-void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
+void reconcile(State& state, WorkerId id, const proto::Heartbeat& heartbeat, TimePoint now,
                Outbox& outbox) {
+  RunsByCampaign all_held;
+  const auto add = [&](const auto& listed, std::map<CampaignId, HeldByAttempt>& held) {
+    for (const proto::HeldRuns& item : listed) {
+      const RunSet runs(wire::ranges_of(item.ranges()));
+      held[{item.campaign()}][{item.attempt()}].add(runs);
+      all_held[{item.campaign()}].add(runs);
+    }
+  };
   std::map<CampaignId, HeldByAttempt> held;
-  std::map<CampaignId, RunSet> all_held;
-  for (const wire::HeldRuns& runs : heartbeat.held) {
-    held[runs.campaign][runs.attempt].add(RunSet(runs.ranges));
-    all_held[runs.campaign].add(RunSet(runs.ranges));
-  }
+  add(heartbeat.held(), held);
   Worker& worker = state.workers.at(id);
   worker.unleased.clear();
   worker.set_aside.clear();
-  for (const wire::HeldRuns& runs : heartbeat.set_aside) {
-    worker.set_aside[runs.campaign][runs.attempt].add(RunSet(runs.ranges));
-    all_held[runs.campaign].add(RunSet(runs.ranges));
-  }
+  add(heartbeat.set_aside(), worker.set_aside);
   for (auto& [campaign, runs] : held) {
     settle_held(state, id, campaign, std::move(runs), now, outbox);
   }
@@ -292,37 +291,37 @@ void adopt_set_aside(State& state, CampaignId campaign, TimePoint now) {
   }
 }
 
-void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbeat, TimePoint now) {
+void note_progress(State& state, Worker& worker, const proto::Heartbeat& heartbeat, TimePoint now) {
   // After a silence the process, or the machine, may have slept: nothing is held against it.
   const bool was_silent = now - worker.heartbeat_at >= state.config.suspect_after;
   worker.heartbeat_at = now;
-  worker.num_steps_done = heartbeat.num_steps_done;
+  worker.num_steps_done = heartbeat.num_steps_done();
   std::vector<Progress> computing;
-  computing.reserve(heartbeat.computing.size());
-  for (const wire::ComputedBatch& batch : heartbeat.computing) {
-    TimePoint advanced_at = now;
-    const auto before =
-        std::find_if(worker.computing.begin(), worker.computing.end(),
-                     [&](const Progress& progress) { return is_same(progress.batch, batch); });
+  for (const proto::ComputedBatch& message : heartbeat.computing()) {
+    Progress batch{.campaign = {message.campaign()},
+                   .runs = RunSet(wire::ranges_of(message.ranges())),
+                   .num_steps_done = message.num_steps_done(),
+                   .advanced_at = now};
+    const auto before = std::ranges::find_if(worker.computing, [&](const Progress& known) {
+      return known.campaign == batch.campaign && known.runs == batch.runs;
+    });
     if (before != worker.computing.end() && !was_silent) {
-      if (batch.num_steps_done > before->batch.num_steps_done) {
-        add_step_time(state, worker.host, *before, batch, now);
+      if (batch.num_steps_done > before->num_steps_done) {
+        add_step_time(state, worker.host, *before, batch);
       } else {
-        advanced_at = before->advanced_at;
+        batch.advanced_at = before->advanced_at;
       }
     }
-    computing.push_back({.batch = batch, .advanced_at = advanced_at});
+    computing.push_back(std::move(batch));
   }
   worker.computing = std::move(computing);
 }
 
-const wire::ComputedBatch* hung_batch(const State& state, const Worker& worker, TimePoint now) {
+const Progress* hung_batch(const State& state, const Worker& worker, TimePoint now) {
   // Only heartbeats tell how far batches are: without them nothing is known, whatever else arrives.
   if (now - worker.heartbeat_at >= state.config.suspect_after) return nullptr;
   for (const Progress& progress : worker.computing) {
-    if (now - progress.advanced_at >= patience(state, worker, progress.batch.campaign)) {
-      return &progress.batch;
-    }
+    if (now - progress.advanced_at >= patience(state, worker, progress.campaign)) return &progress;
   }
   return nullptr;
 }

@@ -9,6 +9,7 @@
 
 #include "coordinator/dispatch/blame.hpp"
 #include "core/error.hpp"
+#include "proto/wire/conversions.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -72,13 +73,13 @@ RunSet promote_copies(State& state, CampaignId id, RunSet runs, Outbox& outbox) 
   return runs;
 }
 
-void record_losses(const Lease& lease, const RunSet& runs, LossReason reason, bool is_blamed,
-                   Outbox& outbox) {
+void record_losses(const State& state, const Lease& lease, const RunSet& runs, LossReason reason,
+                   bool is_blamed, Outbox& outbox) {
   for (const RunRange& range : runs.ranges()) {
-    outbox.record({.campaign = lease.campaign,
-                   .runs = range,
+    outbox.record(lease.campaign, lease.worker,
+                  {.runs = range,
                    .attempt = lease.attempt,
-                   .worker = lease.worker,
+                   .worker = state.workers.at(lease.worker).session,
                    .reason = reason,
                    .is_blamed = is_blamed});
   }
@@ -218,8 +219,8 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
   const RunSet guilty = runs.overlap(blamed);
   RunSet others = runs;
   others.remove(guilty);
-  record_losses(lease, guilty, reason, true, outbox);
-  record_losses(lease, others, reason, false, outbox);
+  record_losses(state, lease, guilty, reason, true, outbox);
+  record_losses(state, lease, others, reason, false, outbox);
   log_loss(lease, runs, reason, guilty, outbox);
   for (const RunRange& range : runs.ranges()) take_off(state, id, range);
   state.hungry.insert(lease.worker);  // It has room for others now.
@@ -289,10 +290,11 @@ void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outb
   const std::vector<RunRange> ranges = runs.ranges();
   for (std::size_t first = 0; first < ranges.size(); first += wire::ranges_per_message_max) {
     const std::size_t count = std::min(wire::ranges_per_message_max, ranges.size() - first);
-    const auto begin = ranges.begin() + static_cast<std::ptrdiff_t>(first);
-    outbox.send(worker,
-                wire::Retract{.campaign = campaign,
-                              .ranges = {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+    proto::Envelope envelope;
+    envelope.mutable_retract()->set_campaign(campaign.value);
+    wire::add_ranges(std::span(ranges).subspan(first, count),
+                     *envelope.mutable_retract()->mutable_ranges());
+    outbox.send(worker, std::move(envelope));
   }
 }
 

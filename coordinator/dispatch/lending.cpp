@@ -12,6 +12,7 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -90,14 +91,13 @@ bool has_enough(const Worker& worker, std::uint64_t wanted) {
   return worker.num_lent >= std::min(wanted, two_rounds) && 2 * worker.num_lent > wanted;
 }
 
-std::vector<double> table_values(const Campaign& campaign, RunRange runs) {
-  std::vector<double> values;
-  if (campaign.table_columns.empty()) return values;
-  values.reserve(runs.count * campaign.table_columns.size());
+void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& lease) {
+  if (campaign.table_columns.empty()) return;
   for (std::uint64_t run = runs.first.value; run < runs.end(); ++run) {
-    for (const std::vector<double>& column : campaign.table_columns) values.push_back(column[run]);
+    for (const std::vector<double>& column : campaign.table_columns) {
+      lease.add_table_values(column[run]);
+    }
   }
-  return values;
 }
 
 RunSet take_first(RunSet& runs, std::uint64_t count_max) {
@@ -271,6 +271,13 @@ std::uint32_t batch_runs_max(const Lease& lease) {
   return static_cast<std::uint32_t>(ratio_rounded_up(lease.num_runs * batch_size, lease.num_slots));
 }
 
+void send_forget(WorkerId worker, CampaignId id, std::uint64_t num_runs, Outbox& outbox) {
+  proto::Envelope envelope;
+  envelope.mutable_forget()->set_campaign(id.value);
+  envelope.mutable_forget()->set_num_runs(num_runs);
+  outbox.send(worker, std::move(envelope));
+}
+
 bool has_runs_to_lend(const State& state) {
   return std::any_of(state.served.begin(), state.served.end(), [&](CampaignId id) {
     const CampaignState& campaign = state.campaigns.at(id);
@@ -334,12 +341,16 @@ void send_lease(const State& state, LeaseId id, Outbox& outbox) {
   const Lease& lease = state.leases.at(id);
   const Campaign& campaign = *state.campaigns.at(lease.campaign).definition;
   for (const RunRange& runs : lease.remaining.ranges()) {
-    outbox.send(lease.worker, wire::RunLease{.campaign = lease.campaign,
-                                             .runs = runs,
-                                             .attempt = lease.attempt,
-                                             .is_alone = lease.is_alone,
-                                             .batch_runs_max = batch_runs_max(lease),
-                                             .table_values = table_values(campaign, runs)});
+    proto::Envelope envelope;
+    proto::RunLease& message = *envelope.mutable_run_lease();
+    message.set_campaign(lease.campaign.value);
+    message.set_first_run(runs.first.value);
+    message.set_num_runs(static_cast<std::uint32_t>(runs.count));
+    message.set_attempt(lease.attempt.value);
+    message.set_is_alone(lease.is_alone);
+    message.set_batch_runs_max(batch_runs_max(lease));
+    add_table_values(campaign, runs, message);
+    outbox.send(lease.worker, std::move(envelope));
   }
 }
 
@@ -356,12 +367,20 @@ void sort_served(State& state) {
 void send_not_served(const State& state, WorkerId worker, CampaignId id, Outbox& outbox) {
   if (const auto found = state.campaigns.find(id); found != state.campaigns.end()) {
     const std::uint64_t num_runs = found->second.definition->num_runs;
-    return outbox.send(worker, wire::Forget{.campaign = id, .num_runs = num_runs});
+    return send_forget(worker, id, num_runs, outbox);
   }
   if (const auto found = state.ended.find(id); found != state.ended.end()) {
-    return outbox.send(worker, wire::Forget{.campaign = id, .num_runs = found->second});
+    return send_forget(worker, id, found->second, outbox);
   }
-  outbox.send(worker, wire::NotServed{.campaign = id, .ranges = {}});
+  send_not_served(worker, id, {}, outbox);
+}
+
+void send_not_served(WorkerId worker, CampaignId id, std::span<const RunRange> runs,
+                     Outbox& outbox) {
+  proto::Envelope envelope;
+  envelope.mutable_not_served()->set_campaign(id.value);
+  wire::add_ranges(runs, *envelope.mutable_not_served()->mutable_ranges());
+  outbox.send(worker, std::move(envelope));
 }
 
 void finish_if_done(State& state, CampaignId id, Outbox& outbox) {

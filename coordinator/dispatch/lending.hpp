@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
 
@@ -38,6 +40,10 @@ void sort_served(State& state);
 /// For a worker that names a campaign whose runs are not lent, or not any more: tells it to forget
 /// them if the campaign is finished or cancelled, and otherwise to keep their results.
 void send_not_served(const State& state, WorkerId worker, CampaignId campaign, Outbox& outbox);
+
+/// Tells the worker to keep the results of these runs; without a run, of the whole campaign.
+void send_not_served(WorkerId worker, CampaignId campaign, std::span<const RunRange> runs,
+                     Outbox& outbox);
 
 /// Ends the campaign if it is finished.
 void finish_if_done(State& state, CampaignId id, Outbox& outbox);

@@ -15,6 +15,7 @@
 #include "coordinator/dispatch/workers.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -25,12 +26,13 @@ void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_
                Outbox& outbox) {
   for (const auto& [worker, runs] : runs_by_worker) {
     if (!state.workers.contains(worker)) continue;
-    for (std::size_t first = 0; first < runs.size(); first += wire::runs_per_lease_max) {
-      const auto begin = runs.begin() + static_cast<std::ptrdiff_t>(first);
-      const auto count = std::min<std::size_t>(wire::runs_per_lease_max, runs.size() - first);
-      outbox.send(worker,
-                  wire::ResultAck{.campaign = id,
-                                  .runs = {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+    for (std::size_t next = 0; next < runs.size();) {
+      proto::Envelope envelope;
+      proto::ResultAck& ack = *envelope.mutable_result_ack();
+      ack.set_campaign(id.value);
+      const std::size_t end = std::min(runs.size(), next + wire::runs_per_lease_max);
+      while (next < end) ack.add_runs(runs[next++].value);
+      outbox.send(worker, std::move(envelope));
     }
   }
 }
@@ -97,11 +99,11 @@ bool is_foreign(const CampaignState& campaign, const wire::ComputedRun& computed
   return computed.result.run.value >= campaign.definition->num_runs;
 }
 
-/// Runs of the batch that the campaign does not have. That is no fault of the worker: the file may
+/// Those of the runs that the campaign does not have. That is no fault of the worker: the file may
 /// be an older copy, and the runs come back when it is extended again.
-RunSet foreign_runs(const CampaignState& campaign, const wire::ResultBatch& batch) {
+RunSet foreign_runs(const CampaignState& campaign, std::span<const wire::ComputedRun> results) {
   RunSet foreign;
-  for (const wire::ComputedRun& computed : batch.results) {
+  for (const wire::ComputedRun& computed : results) {
     if (is_foreign(campaign, computed)) foreign.add({computed.result.run, 1});
   }
   return foreign;
@@ -140,12 +142,12 @@ bool is_made_up(const State& state, const CampaignState& campaign, const RunResu
                              std::bit_cast<std::uint64_t, double>);
 }
 
-/// The rule that a result of the batch breaks, as `run 7: num_draws = 0 (...)`; empty if none does.
+/// The rule that one of the results breaks, as `run 7: num_draws = 0 (...)`; empty if none does.
 std::string broken_rule(const State& state, const CampaignState& campaign,
-                        const wire::ResultBatch& batch, WorkerId id) {
+                        std::span<const wire::ComputedRun> results, WorkerId id) {
   const std::int64_t num_rounds_max = campaign.definition->num_rounds_max();
   const std::uint32_t num_draws_max = model().results().num_draws_max;
-  for (const wire::ComputedRun& computed : batch.results) {
+  for (const wire::ComputedRun& computed : results) {
     const std::vector<std::string> broken =
         broken_count_rules(computed.result, num_draws_max, num_rounds_max);
     if (!broken.empty()) {
@@ -183,12 +185,11 @@ void count_run_time(const State& state, Worker& worker, CampaignId id, CampaignS
 }
 
 /// The worker and its host can compute: what they show with every result.
-void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch,
-                   TimePoint now) {
+void count_results(State& state, Worker& worker, CampaignId id,
+                   std::span<const wire::ComputedRun> results, TimePoint now) {
   CampaignState& campaign = state.campaigns.at(id);
-  const auto num_results = static_cast<std::uint64_t>(
-      std::count_if(batch.results.begin(), batch.results.end(),
-                    [&](const auto& computed) { return !is_foreign(campaign, computed); }));
+  const auto num_results = static_cast<std::uint64_t>(std::ranges::count_if(
+      results, [&](const auto& computed) { return !is_foreign(campaign, computed); }));
   if (num_results == 0) return;
   Host& host = state.hosts.at(worker.host);
   host.num_crashes = 0;
@@ -196,7 +197,7 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
   worker.num_results += num_results;
   worker.num_retracts = 0;
   const auto unleased = worker.unleased.find(id);
-  for (const wire::ComputedRun& computed : batch.results) {
+  for (const wire::ComputedRun& computed : results) {
     if (is_foreign(campaign, computed)) continue;
     count_run_time(state, worker, id, campaign, computed, now);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
@@ -208,36 +209,35 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
 
 }  // namespace
 
-void on_results(State& state, WorkerId id, wire::ResultBatch batch, TimePoint now, Outbox& outbox) {
+void on_results(State& state, WorkerId id, CampaignId campaign_id, Attempt attempt,
+                std::vector<wire::ComputedRun> results, TimePoint now, Outbox& outbox) {
   Worker* const worker = detail::heard(state, id, now, outbox);
   if (worker == nullptr) return;
-  const auto found = state.campaigns.find(batch.campaign);
+  const auto found = state.campaigns.find(campaign_id);
   if (found == state.campaigns.end() || found->second.phase == Phase::cancelled) {
-    return detail::send_not_served(state, id, batch.campaign, outbox);
+    return detail::send_not_served(state, id, campaign_id, outbox);
   }
   CampaignState& campaign = found->second;
-  const RunSet foreign = foreign_runs(campaign, batch);
-  if (!foreign.empty()) {
-    outbox.send(id, wire::NotServed{.campaign = batch.campaign, .ranges = foreign.ranges()});
-  }
-  if (const std::string broken = broken_rule(state, campaign, batch, id); !broken.empty()) {
+  const RunSet foreign = foreign_runs(campaign, results);
+  if (!foreign.empty()) detail::send_not_served(id, campaign_id, foreign.ranges(), outbox);
+  if (const std::string broken = broken_rule(state, campaign, results, id); !broken.empty()) {
     outbox.log({.severity = Severity::error,
                 .kind = "results_refused",
                 .fields = {{"worker", id.value}, {"name", worker->name}, Field::reason(broken)}},
-               batch.campaign);
-    outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed, .text = broken});
+               campaign_id);
+    outbox.send(id, wire::rejection(proto::REJECT_REASON_MALFORMED, broken));
     return on_gone(state, id, LossReason::protocol, now, outbox);
   }
-  count_results(state, *worker, batch.campaign, batch, now);
-  Intake intake{state, id, batch.campaign, campaign, batch.attempt, outbox, {}, {}};
-  for (wire::ComputedRun& computed : batch.results) {
+  count_results(state, *worker, campaign_id, results, now);
+  Intake intake{state, id, campaign_id, campaign, attempt, outbox, {}, {}};
+  for (wire::ComputedRun& computed : results) {
     if (!is_foreign(campaign, computed)) intake.take(std::move(computed));
   }
   if (!intake.durable.empty()) {
-    send_acks(state, batch.campaign, {{id, std::move(intake.durable)}}, outbox);
+    send_acks(state, campaign_id, {{id, std::move(intake.durable)}}, outbox);
   }
   for (const auto& [holder, runs] : intake.holders) {
-    detail::send_retract(holder, batch.campaign, runs, outbox);
+    detail::send_retract(holder, campaign_id, runs, outbox);
   }
   reopen_if_unfinished(state, campaign);
   detail::lend(state, id, now, outbox);

@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
@@ -12,7 +13,9 @@ namespace proofmass::coordinator {
 
 /// Hands results of open runs to the store, and those of others to be compared; acknowledges at
 /// once those that are durable already.
-void on_results(State& state, WorkerId id, wire::ResultBatch batch, TimePoint now, Outbox& outbox);
+/// @param attempt  Under which the runs were lent, as the worker says.
+void on_results(State& state, WorkerId id, CampaignId campaign, Attempt attempt,
+                std::vector<wire::ComputedRun> results, TimePoint now, Outbox& outbox);
 
 /// Results that went to the store are durable: acknowledges them.
 /// @pre Each run was handed to Outbox::store() and is named here for the first time.

@@ -38,8 +38,8 @@ RunsByCampaign waiting_runs(const State& state, const Worker& worker) {
     }
   }
   for (const Progress& progress : worker.computing) {
-    const auto found = waiting.find(progress.batch.campaign);
-    if (found != waiting.end()) found->second.remove(RunSet(progress.batch.ranges));
+    const auto found = waiting.find(progress.campaign);
+    if (found != waiting.end()) found->second.remove(progress.runs);
   }
   return waiting;
 }

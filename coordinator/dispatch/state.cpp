@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "coordinator/dispatch/leases.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 
@@ -73,13 +74,8 @@ bool is_quarantined(const State& state, const std::string& host) {
 std::string runs_held_text(const State& state, WorkerId worker) {
   const auto found = state.workers.find(worker);
   if (found == state.workers.end()) return "none";
-  std::map<CampaignId, RunSet> runs;
-  for (const LeaseId id : found->second.leases) {
-    const Lease& lease = state.leases.at(id);
-    runs[lease.campaign].add(lease.remaining);
-  }
   std::string text;
-  for (const auto& [id, set] : runs) {
+  for (const auto& [id, set] : detail::leased_runs(state, found->second)) {
     if (!text.empty()) text += ' ';
     if (state.campaigns.size() > 1) text += state.campaigns.at(id).definition->name + ':';
     text += to_text(set);

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "coordinator/dispatch/run_set.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/campaign/campaign.hpp"
-#include "proto/wire/client_messages.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
@@ -96,7 +96,9 @@ struct DispatchConfig {
 
 /// A batch that a worker computes, and since when it has come no further.
 struct Progress {
-  wire::ComputedBatch batch;
+  CampaignId campaign;
+  RunSet runs;
+  std::uint32_t num_steps_done = 0;
   TimePoint advanced_at;
 };
 
@@ -244,20 +246,12 @@ struct CampaignState {
 /// A campaign as the store has it when the coordinator starts.
 struct StoredCampaign {
   std::shared_ptr<const Campaign> definition;
-  Phase phase = Phase::active;
-  int priority = 0;
-  double audit_fraction = 0.0;
-  std::vector<RunRange> finished;
-  std::vector<RunRange> given_up;
+  CampaignControl control = {};
+  std::vector<RunRange> finished = {};
+  std::vector<RunRange> given_up = {};
   std::vector<RunRange> elsewhere = {};  ///< Unfinished runs that are not to be lent here.
   std::vector<RunRange> compared = {};   ///< Finished runs of which a second result was compared.
-  /// Open runs that were blamed for crashes, how often, and under how many attempts they were lent.
-  struct Blamed {
-    RunIndex run;
-    std::uint32_t num_crashes = 0;
-    Attempt attempt;
-  };
-  std::vector<Blamed> blamed;
+  std::vector<BlamedRun> blamed = {};    ///< Open runs.
 };
 
 /// A computer with workers, or with a history.

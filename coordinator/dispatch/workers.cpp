@@ -15,34 +15,46 @@
 #include "coordinator/dispatch/speculation.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/wire/conversions.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-/// Why a worker that says Hello cannot be taken; nothing if it can.
-std::optional<wire::Reject> refusal(const State& state, const HostId& host,
-                                    const wire::Hello& hello) {
-  using wire::RejectReason;
-  if (hello.model_version != model().version()) {
-    return wire::Reject{.reason = RejectReason::incompatible,
-                        .text = fmt::format("model_version = {} (must be {}, the coordinator's)",
-                                            hello.model_version, model().version())};
+proto::Envelope drain_message() {
+  proto::Envelope envelope;
+  (void)envelope.mutable_drain();
+  return envelope;
+}
+
+proto::Envelope stop_message() {
+  proto::Envelope envelope;
+  (void)envelope.mutable_stop();
+  return envelope;
+}
+
+/// Why a worker that says Hello cannot be taken, as a Reject; nothing if it can.
+std::optional<proto::Envelope> refusal(const State& state, const HostId& host,
+                                       const proto::Hello& hello) {
+  if (hello.model_version() != model().version()) {
+    return wire::rejection(proto::REJECT_REASON_INCOMPATIBLE,
+                           fmt::format("model_version = {} (must be {}, the coordinator's)",
+                                       hello.model_version(), model().version()));
   }
-  if (hello.reference_digest != state.config.reference_digest) {
-    return wire::Reject{
-        .reason = RejectReason::incompatible,
-        .text = fmt::format("reference_digest = {:016x} (must be {:016x}, the coordinator's)",
-                            hello.reference_digest, state.config.reference_digest)};
+  if (hello.reference_digest() != state.config.reference_digest) {
+    return wire::rejection(
+        proto::REJECT_REASON_INCOMPATIBLE,
+        fmt::format("reference_digest = {:016x} (must be {:016x}, the coordinator's)",
+                    hello.reference_digest(), state.config.reference_digest));
   }
   if (state.quarantined.contains(host)) {
-    return wire::Reject{.reason = RejectReason::quarantined,
-                        .text = fmt::format("host = {} (too much crashed there)", hello.host)};
+    return wire::rejection(proto::REJECT_REASON_QUARANTINED,
+                           fmt::format("host = {} (too much crashed there)", hello.host()));
   }
   if (state.workers.size() >= state.config.num_workers_max) {
-    return wire::Reject{
-        .reason = RejectReason::full,
-        .text = fmt::format("number of workers = {} (no more are served)", state.workers.size())};
+    return wire::rejection(
+        proto::REJECT_REASON_FULL,
+        fmt::format("number of workers = {} (no more are served)", state.workers.size()));
   }
   return std::nullopt;
 }
@@ -63,14 +75,14 @@ void limit_hosts(State& state, const std::string& key) {
 }
 
 void register_worker(State& state, WorkerId id, SessionId session, const HostId& host,
-                     const wire::Hello& hello, TimePoint now, Outbox& outbox) {
+                     const proto::Hello& hello, TimePoint now, Outbox& outbox) {
   Worker& worker = state.workers[id];
   worker.session = session;
-  worker.name = hello.worker_name;
+  worker.name = hello.worker_name();
   worker.host = host;
-  worker.host_name = hello.host;
-  worker.process_id = hello.process_id;
-  worker.num_slots = hello.num_slots;
+  worker.host_name = hello.host();
+  worker.process_id = hello.process_id();
+  worker.num_slots = hello.num_slots();
   worker.registered_at = now;
   worker.heard_at = now;
   worker.heartbeat_at = now;
@@ -79,15 +91,15 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   state.num_slots_expected -= std::min<std::uint64_t>(state.num_slots_expected, worker.num_slots);
   detail::set_eligible(state, worker, true);
   Host& known = state.hosts[host];
-  if (known.name.empty()) known.name = hello.host;
+  if (known.name.empty()) known.name = hello.host();
   ++known.num_workers;
   limit_hosts(state, host.key);
   outbox.log({.kind = "worker_registered",
               .fields = {{"worker", id.value},
-                         {"name", hello.worker_name},
-                         {"host", hello.host},
-                         {"pid", hello.process_id},
-                         {"slots", hello.num_slots}}});
+                         {"name", worker.name},
+                         {"host", worker.host_name},
+                         {"pid", worker.process_id},
+                         {"slots", worker.num_slots}}});
 }
 
 /// True if a Hello may be answered: there is an allowance of so many a second.
@@ -118,30 +130,30 @@ void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
 }
 
 /// A batch of the worker hangs: tells the worker to end, and parts with it.
-void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch, Outbox& outbox) {
+void part_with_hung(State& state, WorkerId id, const Progress& batch, Outbox& outbox) {
   outbox.log({.severity = Severity::warning,
               .kind = "worker_gone",
               .fields = {{"worker", id.value},
                          {"name", state.workers.at(id).name},
                          {"reason", "hung"},
-                         {"runs", to_text(RunSet(batch.ranges))},
+                         {"runs", to_text(batch.runs)},
                          {"steps", batch.num_steps_done}}},
              batch.campaign);
-  outbox.send(id, wire::Stop{});
+  outbox.send(id, stop_message());
   const detail::RunsByCampaign blamed = detail::blame_batch(state, id, batch, outbox);
   detail::remove_worker(state, id, LossReason::hung, blamed, outbox);
 }
 
 /// The process before this one crashed: that is sooner known than that it is silent. Nobody but the
 /// same key on the same host may say so.
-void note_former(State& state, const HostId& host, const wire::FormerSession& former,
+void note_former(State& state, const HostId& host, const proto::FormerSession& former,
                  Outbox& outbox) {
-  state.awaited.erase(former.session);
-  const auto found =
-      std::find_if(state.workers.begin(), state.workers.end(),
-                   [&](const auto& item) { return item.second.session == former.session; });
+  const SessionId session{former.session()};
+  state.awaited.erase(session);
+  const auto found = std::ranges::find_if(
+      state.workers, [&](const auto& item) { return item.second.session == session; });
   if (found != state.workers.end() && found->second.host == host) {
-    part_with(state, found->first, former.reason, outbox);
+    part_with(state, found->first, wire::loss_reason(former.reason()), outbox);
   }
 }
 
@@ -158,9 +170,11 @@ void make_room(State& state, TimePoint now, Outbox& outbox) {
 
 /// Registered workers are answered again: the answer before may have been lost.
 void welcome(State& state, WorkerId id, Outbox& outbox) {
-  outbox.send(id, wire::Welcome{.worker = id,
-                                .heartbeat_interval_s = seconds(state.config.heartbeat_interval)});
-  if (!state.is_lending) outbox.send(id, wire::Drain{});
+  proto::Envelope envelope;
+  envelope.mutable_welcome()->set_worker_id(id.value);
+  envelope.mutable_welcome()->set_heartbeat_interval_s(seconds(state.config.heartbeat_interval));
+  outbox.send(id, std::move(envelope));
+  if (!state.is_lending) outbox.send(id, drain_message());
 }
 
 void end_quarantines(State& state, Outbox& outbox) {
@@ -173,36 +187,18 @@ void end_quarantines(State& state, Outbox& outbox) {
   });
 }
 
-void send_to_all(const State& state, const wire::Message& message, Outbox& outbox) {
+void send_to_all(const State& state, const proto::Envelope& message, Outbox& outbox) {
   for (const auto& [id, worker] : state.workers) outbox.send(id, message);
 }
 
-/// Calls the function for what a worker says: one overload for each of wire::WorkerMessage.
-struct Handler {
-  State& state;
-  WorkerId worker;
-  const HostId& from;
-  const wire::Header& header;
-  TimePoint now;
-  Outbox& outbox;
-
-  void operator()(const wire::Hello& hello) const {
-    on_hello(state, worker, header.session, from, hello, now, outbox);
+std::vector<wire::ComputedRun> results_of(const proto::ResultBatch& batch) {
+  std::vector<wire::ComputedRun> results;
+  results.reserve(static_cast<std::size_t>(batch.results_size()));
+  for (const proto::ComputedRun& run : batch.results()) {
+    results.push_back(wire::computed_run(run));
   }
-  void operator()(const wire::Heartbeat& heartbeat) const {
-    on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
-  }
-  void operator()(wire::ResultBatch&& batch) const {
-    on_results(state, worker, std::move(batch), now, outbox);
-  }
-  void operator()(const wire::GiveBack& give_back) const {
-    on_give_back(state, worker, give_back, now, outbox);
-  }
-  void operator()(const wire::CampaignRequest& request) const {
-    on_campaign_request(state, worker, request, now, outbox);
-  }
-  void operator()(const wire::Bye& bye) const { on_bye(state, worker, bye, now, outbox); }
-};
+  return results;
+}
 
 }  // namespace
 
@@ -221,25 +217,42 @@ Worker* heard(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
 }  // namespace detail
 
 void reject_unregistered(WorkerId id, Outbox& outbox) {
-  outbox.send(id, wire::Reject{.reason = wire::RejectReason::not_registered,
-                               .text = "this worker is not registered"});
+  outbox.send(
+      id, wire::rejection(proto::REJECT_REASON_NOT_REGISTERED, "this worker is not registered"));
 }
 
-void on_packet(State& state, WorkerId id, const HostId& from, wire::Packet&& packet, TimePoint now,
-               Outbox& outbox) {
-  const Handler handle{state, id, from, packet.header, now, outbox};
-  const bool is_of_worker = wire::visit_if<wire::WorkerMessage>(std::move(packet.message), handle);
-  PROOFMASS_EXPECT(is_of_worker);
+void on_message(State& state, WorkerId id, const HostId& from, const proto::Envelope& message,
+                TimePoint now, Outbox& outbox) {
+  switch (message.from_worker_case()) {
+    case proto::Envelope::kHello:
+      return on_hello(state, id, {message.session()}, from, message.hello(), now, outbox);
+    case proto::Envelope::kHeartbeat:
+      return on_heartbeat(state, id, message.heartbeat(), message.sequence(), now, outbox);
+    case proto::Envelope::kResultBatch:
+      return on_results(state, id, {message.result_batch().campaign()},
+                        {message.result_batch().attempt()}, results_of(message.result_batch()), now,
+                        outbox);
+    case proto::Envelope::kGiveBack:
+      return on_give_back(state, id, message.give_back(), now, outbox);
+    case proto::Envelope::kCampaignRequest:
+      return on_campaign_request(state, id, {message.campaign_request().campaign()},
+                                 message.campaign_request().offset(), now, outbox);
+    case proto::Envelope::kBye:
+      return on_bye(state, id, wire::loss_reason(message.bye().reason()), now, outbox);
+    case proto::Envelope::FROM_WORKER_NOT_SET:
+      break;
+  }
+  PROOFMASS_EXPECT(false);
 }
 
 void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
-              const wire::Hello& hello, TimePoint now, Outbox& outbox) {
+              const proto::Hello& hello, TimePoint now, Outbox& outbox) {
   if (!take_hello_allowance(state, now)) return;
-  if (state.is_stopped) return outbox.send(id, wire::Stop{});
-  if (hello.former) note_former(state, from, *hello.former, outbox);
+  if (state.is_stopped) return outbox.send(id, stop_message());
+  if (hello.has_former()) note_former(state, from, hello.former(), outbox);
   const bool is_new = !state.workers.contains(id);
   auto reject = is_new ? refusal(state, from, hello) : std::nullopt;
-  if (reject && reject->reason == wire::RejectReason::full) {
+  if (reject && reject->reject().reason() == proto::REJECT_REASON_FULL) {
     make_room(state, now, outbox);
     reject = refusal(state, from, hello);
   }
@@ -247,8 +260,8 @@ void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
     state.awaited.erase(session);
     outbox.log({.severity = Severity::warning,
                 .kind = "worker_refused",
-                .fields = {{"name", hello.worker_name}, Field::remark(reject->text)}});
-    outbox.send(id, *reject);
+                .fields = {{"name", hello.worker_name()}, Field::remark(reject->reject().text())}});
+    outbox.send(id, *std::move(reject));
   } else {
     if (is_new) register_worker(state, id, session, from, hello, now, outbox);
     state.workers.at(id).heard_at = now;
@@ -270,40 +283,44 @@ bool on_release_host(State& state, const std::string& host, TimePoint now, Outbo
   return true;
 }
 
-void on_campaign_request(State& state, WorkerId id, const wire::CampaignRequest& request,
+void on_campaign_request(State& state, WorkerId id, CampaignId campaign, std::uint64_t offset,
                          TimePoint now, Outbox& outbox) {
   if (detail::heard(state, id, now, outbox) == nullptr) return;
-  const auto found = state.campaigns.find(request.campaign);
+  const auto found = state.campaigns.find(campaign);
   if (found == state.campaigns.end() || found->second.phase == Phase::cancelled) {
-    return detail::send_not_served(state, id, request.campaign, outbox);
+    return detail::send_not_served(state, id, campaign, outbox);
   }
-  outbox.send_definition(id, request, found->second.definition);
+  outbox.send_definition(id, campaign, offset, found->second.definition);
 }
 
-void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat,
+void on_heartbeat(State& state, WorkerId id, const proto::Heartbeat& heartbeat,
                   std::uint64_t sequence, TimePoint now, Outbox& outbox) {
   Worker* const worker = detail::heard(state, id, now, outbox);
   if (worker == nullptr) return;
-  outbox.send(id, wire::HeartbeatAck{});
+  proto::Envelope answer;
+  (void)answer.mutable_heartbeat_ack();
+  outbox.send(id, std::move(answer));
   if (sequence <= worker->heartbeat_sequence) return;
   worker->heartbeat_sequence = sequence;
-  worker->num_runs_max = heartbeat.num_runs_max;
+  worker->num_runs_max = heartbeat.num_runs_max();
   detail::note_progress(state, *worker, heartbeat, now);
-  if (state.is_stopped) return outbox.send(id, wire::Stop{});
-  if (!state.is_lending) outbox.send(id, wire::Drain{});
+  if (state.is_stopped) return outbox.send(id, stop_message());
+  if (!state.is_lending) outbox.send(id, drain_message());
   detail::reconcile(state, id, heartbeat, now, outbox);
   state.awaited.erase(worker->session);
   detail::lend(state, id, now, outbox);
   detail::settle(state, now, outbox);
 }
 
-void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, TimePoint now,
+void on_give_back(State& state, WorkerId id, const proto::GiveBack& give_back, TimePoint now,
                   Outbox& outbox) {
   Worker* const worker = detail::heard(state, id, now, outbox);
   if (worker == nullptr) return;
-  for (const wire::HeldRuns& held : give_back.runs) {
-    const RunSet runs(held.ranges);
-    if (const auto found = worker->unleased.find(held.campaign); found != worker->unleased.end()) {
+  const LossReason reason = wire::loss_reason(give_back.reason());
+  for (const proto::HeldRuns& held : give_back.runs()) {
+    const CampaignId campaign{held.campaign()};
+    const RunSet runs(wire::ranges_of(held.ranges()));
+    if (const auto found = worker->unleased.find(campaign); found != worker->unleased.end()) {
       found->second.remove(runs);
       if (found->second.empty()) worker->unleased.erase(found);
     }
@@ -312,27 +329,27 @@ void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, Ti
       const auto found = state.leases.find(lease_id);
       if (found == state.leases.end()) continue;  // It ended with one before it.
       const Lease& lease = found->second;
-      if (lease.campaign != held.campaign || lease.known_as != held.attempt) continue;
+      if (lease.campaign != campaign || lease.known_as != Attempt{held.attempt()}) continue;
       const RunSet lost = lease.remaining.overlap(runs);
-      if (!lost.empty()) detail::lose(state, lease_id, lost, give_back.reason, {}, outbox);
+      if (!lost.empty()) detail::lose(state, lease_id, lost, reason, {}, outbox);
     }
   }
-  if (give_back.reason == LossReason::retracted) worker->num_retracts = 0;
+  if (reason == LossReason::retracted) worker->num_retracts = 0;
   // Other workers come first: this one may give back again what it is lent.
   state.hungry.erase(id);
   detail::settle(state, now, outbox);
   detail::lend(state, id, now, outbox);
 }
 
-void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox) {
+void on_bye(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox) {
   const auto found = state.workers.find(id);
   if (found == state.workers.end()) return;
   outbox.log(
       {.severity = Severity::info,
        .kind = "worker_left",
        .fields = {
-           {"worker", id.value}, {"name", found->second.name}, {"reason", name_of(bye.reason)}}});
-  detail::remove_worker(state, id, bye.reason, {}, outbox);
+           {"worker", id.value}, {"name", found->second.name}, {"reason", name_of(reason)}}});
+  detail::remove_worker(state, id, reason, {}, outbox);
   detail::settle(state, now, outbox);
 }
 
@@ -350,7 +367,7 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
   const Duration lost_after =
       state.is_behind ? state.config.lost_after_if_behind : state.config.lost_after;
   std::vector<WorkerId> silent;
-  std::vector<std::pair<WorkerId, wire::ComputedBatch>> hung;
+  std::vector<std::pair<WorkerId, Progress>> hung;
   for (auto& [id, worker] : state.workers) {
     detail::set_eligible(state, worker, detail::may_be_lent(state, worker, now));
     if (now - worker.heard_at >= lost_after) {
@@ -369,13 +386,13 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
 
 void on_drain(State& state, Outbox& outbox) {
   state.is_lending = false;
-  send_to_all(state, wire::Drain{}, outbox);
+  send_to_all(state, drain_message(), outbox);
 }
 
 void on_stop(State& state, Outbox& outbox) {
   state.is_lending = false;
   state.is_stopped = true;
-  send_to_all(state, wire::Stop{}, outbox);
+  send_to_all(state, stop_message(), outbox);
 }
 
 }  // namespace proofmass::coordinator

@@ -6,6 +6,12 @@
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
 
+namespace proofmass::proto {
+class GiveBack;
+class Heartbeat;
+class Hello;
+}  // namespace proofmass::proto
+
 namespace proofmass::coordinator {
 
 // Events of workers, of time and of the end of the service.
@@ -24,30 +30,30 @@ namespace proofmass::coordinator {
 void reject_unregistered(WorkerId id, Outbox& outbox);
 /// Calls the event of the message: one of those below, or on_results().
 /// @param from  The key and the address of the connection.
-/// @param packet  Moved from: a constant one, whose results would be copied, does not compile.
-/// @pre The message is one of a worker.
-void on_packet(State& state, WorkerId id, const HostId& from, wire::Packet&& packet, TimePoint now,
-               Outbox& outbox);
+/// @pre wire::is_of_worker(message).
+void on_message(State& state, WorkerId id, const HostId& from, const proto::Envelope& message,
+                TimePoint now, Outbox& outbox);
 /// Registers a worker, or answers again if it is registered already.
 /// @param from  The key and the address of the connection: whatever the worker calls its host.
 void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
-              const wire::Hello& hello, TimePoint now, Outbox& outbox);
+              const proto::Hello& hello, TimePoint now, Outbox& outbox);
 /// Workers of a quarantined host are taken again, whatever their keys.
 /// @param host  Its address, or the name that its workers gave.
 /// @return False if it is not quarantined.
 bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox);
 /// Answers with a part of the definition.
-void on_campaign_request(State& state, WorkerId id, const wire::CampaignRequest& request,
+/// @param offset  Of its first byte.
+void on_campaign_request(State& state, WorkerId id, CampaignId campaign, std::uint64_t offset,
                          TimePoint now, Outbox& outbox);
 /// Makes both sides agree about what the worker holds, and lends runs up to its share.
 /// @param sequence  Of the header; a heartbeat older than the newest one is ignored.
-void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat,
+void on_heartbeat(State& state, WorkerId id, const proto::Heartbeat& heartbeat,
                   std::uint64_t sequence, TimePoint now, Outbox& outbox);
 /// The worker will not compute these runs: lends them to others.
-void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, TimePoint now,
+void on_give_back(State& state, WorkerId id, const proto::GiveBack& give_back, TimePoint now,
                   Outbox& outbox);
 /// The worker leaves: lends to others what it holds. No run is blamed.
-void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox);
+void on_bye(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox);
 /// The worker's process has ended, or is taken for ended. Lends to others what it holds, and blames
 /// runs if the reason says that one of them may be the cause.
 void on_gone(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox);

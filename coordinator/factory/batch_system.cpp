@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <optional>
 #include <sstream>
@@ -53,28 +54,8 @@ std::string checked_id(std::string_view program, std::string id) {
                           name_rule));
 }
 
-std::string first_word(std::string_view program, std::string_view output) {
-  const std::vector<std::string> words = words_of(std::string(output));
-  return checked_id(program, words.empty() ? "" : words.front());
-}
-
-/// A list of lines `ID STATE`.
-std::vector<Allocation> with_states(std::string_view program, std::string_view output,
-                                    std::string_view running) {
-  std::vector<Allocation> allocations;
-  for (const std::string& line : lines_of(output)) {
-    const std::vector<std::string> words = words_of(line);
-    if (words.size() != 2) {
-      throw Error(
-          fmt::format("{}: line = \"{}\" (must be an identifier and a state)", program, line));
-    }
-    allocations.push_back({checked_id(program, words[0]), words[1] == running});
-  }
-  return allocations;
-}
-
 /// The script of an allocation whose identifier the batch system has in a variable.
-std::string script(const AllocationConfig& config, std::string_view variable) {
+std::string script(const FactoryConfig& config, std::string_view variable) {
   return fmt::format("#!/bin/bash\nset -- \"${}\"\n{}\n", variable, config.worker_command);
 }
 
@@ -84,50 +65,37 @@ void append(std::vector<std::string>& arguments, const std::vector<std::string>&
 
 // Slurm.
 
-BatchCommand slurm_submission(const AllocationConfig& config) {
+BatchCommand slurm_submission(const FactoryConfig& config) {
   BatchCommand command{{"sbatch", "--parsable", "--job-name=" + config.name, "--nodes=1",
                         "--ntasks=1", "--time=" + clock_text(config.walltime)},
                        script(config, "SLURM_JOB_ID")};
   command.arguments.push_back(config.num_processors
                                   ? fmt::format("--cpus-per-task={}", *config.num_processors)
                                   : std::string("--exclusive"));
-  append(command.arguments, config.options);
+  append(command.arguments, config.submit_options);
   return command;
 }
 
-// `4711`, or `4711;cluster` where there are several.
-std::string slurm_id(std::string_view output) {
-  return first_word("sbatch", output.substr(0, output.find(';')));
-}
-
-BatchCommand slurm_listing(const AllocationConfig& config) {
+BatchCommand slurm_listing(const FactoryConfig& config) {
   return {{"squeue", "--me", "--noheader", "--name=" + config.name,
            "--states=PENDING,CONFIGURING,RUNNING,SUSPENDED", "--sort=i", "--format=%i %T"}};
 }
 
-std::vector<Allocation> slurm_allocations(const AllocationConfig&, std::string_view output) {
-  return with_states("squeue", output, "RUNNING");
-}
-
-BatchCommand slurm_cancellation(const std::string& id) { return {{"scancel", id}}; }
-
 // PBS: OpenPBS and PBS Pro.
 
-BatchCommand pbs_submission(const AllocationConfig& config) {
+BatchCommand pbs_submission(const FactoryConfig& config) {
   BatchCommand command{{"qsub", "-N", config.name, "-l", "walltime=" + clock_text(config.walltime)},
                        script(config, "PBS_JOBID")};
   append(command.arguments,
          config.num_processors ? std::vector<std::string>{"-l", fmt::format("select=1:ncpus={}",
                                                                             *config.num_processors)}
                                : std::vector<std::string>{"-l", "select=1", "-l", "place=excl"});
-  append(command.arguments, config.options);
+  append(command.arguments, config.submit_options);
   return command;
 }
 
-std::string pbs_id(std::string_view output) { return first_word("qsub", output); }
-
 // qselect finds by name and state, and qstat cuts both; so it is asked twice.
-BatchCommand pbs_listing(const AllocationConfig& config) {
+BatchCommand pbs_listing(const FactoryConfig& config) {
   return {{"sh", "-c",
            "running=$(qselect -u \"$(id -un)\" -N \"$1\" -s R) || exit\n"
            "others=$(qselect -u \"$(id -un)\" -N \"$1\" -s HQSTUW) || exit\n"
@@ -135,12 +103,6 @@ BatchCommand pbs_listing(const AllocationConfig& config) {
            "for id in $running; do echo \"$id R\"; done\n",
            "sh", config.name}};
 }
-
-std::vector<Allocation> pbs_allocations(const AllocationConfig&, std::string_view output) {
-  return with_states("qselect", output, "R");
-}
-
-BatchCommand pbs_cancellation(const std::string& id) { return {{"qdel", id}}; }
 
 // HTCondor.
 
@@ -163,7 +125,7 @@ std::string quoted_for_condor(std::string_view text) {
   return quoted + "'";
 }
 
-BatchCommand condor_submission(const AllocationConfig& config) {
+BatchCommand condor_submission(const FactoryConfig& config) {
   std::string description = fmt::format(
       "universe = vanilla\n"
       "executable = /bin/bash\n"
@@ -175,15 +137,12 @@ BatchCommand condor_submission(const AllocationConfig& config) {
   if (config.num_processors) {
     description += fmt::format("request_cpus = {}\n", *config.num_processors);
   }
-  for (const std::string& option : config.options) description += option + "\n";
+  for (const std::string& option : config.submit_options) description += option + "\n";
   return {{"condor_submit", "-terse", "-"}, description + "queue\n"};
 }
 
-// `12.0 - 12.0`: the first and the last.
-std::string condor_id(std::string_view output) { return first_word("condor_submit", output); }
-
 // States: 1 waits, 2 runs, 5 is held, 7 is suspended; in the others it has ended or is about to.
-BatchCommand condor_listing(const AllocationConfig& config) {
+BatchCommand condor_listing(const FactoryConfig& config) {
   return {{"condor_q", "-constraint",
            fmt::format("JobBatchName == \"{}\" && (JobStatus <= 2 || JobStatus == 5 || "
                        "JobStatus == 7)",
@@ -192,25 +151,17 @@ BatchCommand condor_listing(const AllocationConfig& config) {
            "JobStatus"}};
 }
 
-std::vector<Allocation> condor_allocations(const AllocationConfig&, std::string_view output) {
-  return with_states("condor_q", output, "2");
-}
-
-BatchCommand condor_cancellation(const std::string& id) { return {{"condor_rm", id}}; }
-
 // This machine: workers are processes, and their numbers identify them.
 
-BatchCommand local_submission(const AllocationConfig& config) {
+BatchCommand local_submission(const FactoryConfig& config) {
   return {{"sh", "-c",
            "setsid sh -c 'set -- \"$$\"; eval \"$0\"' \"$1\" >/dev/null 2>&1 </dev/null & echo $!",
            "sh", config.worker_command}};
 }
 
-std::string local_id(std::string_view output) { return first_word("sh", output); }
+BatchCommand local_listing(const FactoryConfig&) { return {{"ps", "-e", "-o", "pid=,args="}}; }
 
-BatchCommand local_listing(const AllocationConfig&) { return {{"ps", "-e", "-o", "pid=,args="}}; }
-
-std::vector<Allocation> local_allocations(const AllocationConfig& config, std::string_view output) {
+std::vector<Allocation> local_workers(const FactoryConfig& config, std::string_view output) {
   std::vector<Allocation> allocations;
   for (const std::string& line : lines_of(output)) {
     const std::vector<std::string> words = words_of(line);
@@ -221,8 +172,6 @@ std::vector<Allocation> local_allocations(const AllocationConfig& config, std::s
   }
   return allocations;
 }
-
-BatchCommand local_cancellation(const std::string& id) { return {{"kill", id}}; }
 
 // Commands.
 
@@ -281,12 +230,33 @@ std::optional<int> status_at_end(pid_t process_id) {
 
 const std::vector<BatchSystem>& batch_systems() {
   static const std::vector<BatchSystem> systems{
-      {"slurm", slurm_submission, slurm_id, slurm_listing, slurm_allocations, slurm_cancellation},
-      {"pbs", pbs_submission, pbs_id, pbs_listing, pbs_allocations, pbs_cancellation},
-      {"condor", condor_submission, condor_id, condor_listing, condor_allocations,
-       condor_cancellation},
-      {"local", local_submission, local_id, local_listing, local_allocations, local_cancellation}};
+      {"slurm", slurm_submission, slurm_listing, "squeue", "RUNNING", {"scancel"}},
+      {"pbs", pbs_submission, pbs_listing, "qselect", "R", {"qdel"}},
+      {"condor", condor_submission, condor_listing, "condor_q", "2", {"condor_rm"}},
+      {"local", local_submission, local_listing, "ps", "", {"kill"}}};
   return systems;
+}
+
+// The first word: of Slurm `4711`, or `4711;cluster` where there are several; of HTCondor
+// `12.0 - 12.0`, the first and the last.
+std::string id_in(std::string_view output, std::string_view program) {
+  const std::vector<std::string> words = words_of(std::string(output.substr(0, output.find(';'))));
+  return checked_id(program, words.empty() ? "" : words.front());
+}
+
+std::vector<Allocation> allocations_of(const BatchSystem& system, const FactoryConfig& config,
+                                       std::string_view output) {
+  if (system.running.empty()) return local_workers(config, output);
+  std::vector<Allocation> allocations;
+  for (const std::string& line : lines_of(output)) {
+    const std::vector<std::string> words = words_of(line);
+    if (words.size() != 2) {
+      throw Error(fmt::format("{}: line = \"{}\" (must be an identifier and a state)",
+                              system.lister, line));
+    }
+    allocations.push_back({checked_id(system.lister, words[0]), words[1] == system.running});
+  }
+  return allocations;
 }
 
 std::string output_of(const BatchCommand& command) {
@@ -304,6 +274,47 @@ std::string output_of(const BatchCommand& command) {
   const std::vector<std::string> words = lines_of(errors.text());
   throw Error(fmt::format("{}: {}{}", program, wire::end_text(*status),
                           words.empty() ? "" : ": " + words.back()));
+}
+
+namespace {
+
+void cancel(const std::string& id, const BatchSystem& system, const wire::Log& log) {
+  try {
+    BatchCommand command{system.canceller};
+    command.arguments.push_back(id);
+    (void)output_of(command);
+    log({.kind = "allocation_cancelled", .fields = {{"allocation", id}}});
+  } catch (const Error& error) {
+    log({.severity = wire::Severity::warning,
+         .kind = "cancellation_failed",
+         .fields = {{"allocation", id}, wire::Field::reason(error.what())}});
+  }
+}
+
+/// @return Whether the batch system took it.
+bool submit(FactoryState& state, const BatchSystem& system, const FactoryConfig& config,
+            const wire::Log& log) {
+  const auto now = std::chrono::steady_clock::now();
+  try {
+    const BatchCommand command = system.submission(config);
+    const std::string id = id_in(output_of(command), command.arguments.front());
+    on_submitted(state, id, now);
+    log({.kind = "worker_requested", .fields = {{"allocation", id}}});
+    return true;
+  } catch (const Error& error) {
+    on_submission_failed(state, error.what(), now, log);
+    return false;
+  }
+}
+
+}  // namespace
+
+void carry_out(const FactoryActions& actions, FactoryState& state, const BatchSystem& system,
+               const FactoryConfig& config, const wire::Log& log) {
+  for (const std::string& id : actions.cancelled) cancel(id, system, log);
+  for (std::uint64_t i = 0; i < actions.num_submissions; ++i) {
+    if (!submit(state, system, config, log)) return;
+  }
 }
 
 }  // namespace proofmass::coordinator

@@ -15,7 +15,7 @@ namespace proofmass::coordinator {
 
 using FactoryTime = std::chrono::steady_clock::time_point;
 
-/// How many workers a factory keeps.
+/// How many workers a factory keeps, and what each of its allocations is to be.
 struct FactoryConfig {
   std::string name =
       "proofmass";  ///< Of its allocations; a worker's name is NAME-ID. is_name() holds.
@@ -26,6 +26,9 @@ struct FactoryConfig {
   std::chrono::seconds walltime = std::chrono::hours(8);  ///< Of an allocation.
   /// Share of its walltime, in (0, 1], that a worker must find work for, or it is not asked for.
   double utilisation_min = 0.1;
+  std::string worker_command = {};  ///< A line of `sh` that ends as a worker named NAME-"$1".
+  std::optional<unsigned> num_processors = {};   ///< Of a worker; nothing: a node of its own.
+  std::vector<std::string> submit_options = {};  ///< Further ones, as the batch system has them.
 };
 
 /// A worker's place in the queue of a batch system.

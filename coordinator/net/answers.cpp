@@ -41,19 +41,19 @@ constexpr int copy_duration_factor = 30;
 
 /// A command that answers a question, and those of its options that only concern the answer.
 struct AnswerCommand {
-  wire::Question question;
+  proto::Question question;
   std::string_view name;
   std::vector<std::string_view> options;
 };
 
-const AnswerCommand& command_for(wire::Question question) {
+const AnswerCommand& command_for(proto::Question question) {
   static const std::array<AnswerCommand, 4> commands{
-      AnswerCommand{wire::Question::report, "report", {"--requirement", "--json"}},
+      AnswerCommand{proto::QUESTION_REPORT, "report", {"--requirement", "--json"}},
       AnswerCommand{
-          wire::Question::sensitivity, "sensitivity", {"--parameter", "--run", "--rows", "--json"}},
+          proto::QUESTION_SENSITIVITY, "sensitivity", {"--parameter", "--run", "--rows", "--json"}},
       AnswerCommand{
-          wire::Question::query, "query", {"--format", "--timeout", "--rows-max", "--columns"}},
-      AnswerCommand{wire::Question::database, "backup", {}}};
+          proto::QUESTION_QUERY, "query", {"--format", "--timeout", "--rows-max", "--columns"}},
+      AnswerCommand{proto::QUESTION_DATABASE, "backup", {}}};
   const auto* const found = std::ranges::find(commands, question, &AnswerCommand::question);
   PROOFMASS_EXPECT(found != commands.end());
   return *found;
@@ -82,23 +82,23 @@ double seconds_of(const Order& order) {
   return std::chrono::duration<double>(order.duration_max).count();
 }
 
-Order order_for(const wire::AnswerRequest& request, const ServiceConfig& config,
+Order order_for(const proto::AnswerRequest& request, const ServiceConfig& config,
                 const std::filesystem::path& database, std::uint64_t id) {
-  const AnswerCommand& command = command_for(request.question);
+  const AnswerCommand& command = command_for(request.question());
   Order order{.arguments = {config.answer_program.string(), std::string(command.name)},
               .directory = config.answer_directory,
               .copy = {},
               .duration_max = config.answer_duration_max,
-              .known_size = request.known_size,
-              .known_sha256 = request.known_sha256};
-  for (const std::string& option : request.options) {
+              .known_size = request.known_size(),
+              .known_sha256 = request.known_sha256()};
+  for (const std::string& option : request.options()) {
     require_option(command, option);
     order.arguments.push_back(option);
   }
   order.arguments.insert(order.arguments.end(),
                          {"--", std::filesystem::absolute(database).string()});
-  if (request.question == wire::Question::query) order.arguments.push_back(request.statement);
-  if (request.question == wire::Question::database) {
+  if (request.question() == proto::QUESTION_QUERY) order.arguments.push_back(request.statement());
+  if (request.question() == proto::QUESTION_DATABASE) {
     order.copy = config.answer_directory / fmt::format("copy-{:016x}.db", id);
     order.duration_max = copy_duration_factor * config.answer_duration_max;
     order.arguments.push_back(order.copy->string());
@@ -276,16 +276,18 @@ std::string sha256_of(const UnnamedFile& file, std::uint64_t size) {
   return hash.finish();
 }
 
-wire::AnswerReply reply_about(const UnnamedFile& file, const Order& order, int exit_code,
-                              const std::string& error_text) {
+proto::AnswerReply reply_about(const UnnamedFile& file, const Order& order, int exit_code,
+                               const std::string& error_text) {
   const std::uint64_t size = file.size();
   const bool is_known = order.known_size > 0 && order.known_size <= size &&
                         sha256_of(file, order.known_size) == order.known_sha256;
-  return {.size = size,
-          .sha256 = sha256_of(file, size),
-          .offset = is_known ? order.known_size : 0,
-          .exit_code = exit_code,
-          .error_text = error_text};
+  proto::AnswerReply reply;
+  reply.set_size(size);
+  reply.set_sha256(sha256_of(file, size));
+  reply.set_offset(is_known ? order.known_size : 0);
+  reply.set_exit_code(static_cast<std::uint32_t>(exit_code));
+  reply.set_error_text(error_text);
+  return reply;
 }
 
 /// Removes the copy at the end, whatever happens.
@@ -358,7 +360,7 @@ void Answers::make_room() {
   if (oldest != kept_.end()) kept_.erase(oldest);
 }
 
-void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
+void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::path& database,
                   const Asker& asker, Respond respond) {
   if (context_.config.answer_program.empty()) {
     throw Error(
@@ -386,8 +388,8 @@ void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::pat
         if (descriptor < 0) fail(order.copy->string());
         file = std::make_unique<UnnamedFile>(descriptor);
       }
-      wire::AnswerReply reply = reply_about(*file, order, exit_code, process.error_text());
-      reply.answer_id = id;
+      proto::AnswerReply reply = reply_about(*file, order, exit_code, process.error_text());
+      reply.set_answer_id(id);
       return {.failure = {}, .file = std::move(file), .reply = std::move(reply)};
     } catch (const std::exception& error) {
       return {.failure = error.what(), .file = nullptr, .reply = {}};
@@ -399,18 +401,19 @@ void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::pat
                         .result = std::async(std::launch::async, compute)});
 }
 
-wire::AnswerPartReply Answers::part(const wire::AnswerPartRequest& request, const Asker& asker) {
-  const auto found = kept_.find(request.answer_id);
+proto::ReplyEnvelope Answers::part(const proto::AnswerPartRequest& request, const Asker& asker) {
+  const auto found = kept_.find(request.answer_id());
   if (found == kept_.end() || found->second.owner != asker.name) {
     throw Error("this answer is not kept any more; ask again");
   }
   Kept& kept = found->second;
   kept.read_at = context_.now();
-  wire::AnswerPartReply reply{.content =
-                                  kept.file->read(request.offset, wire::answer_part_size_max)};
-  const bool is_end = request.offset >= kept.size ||  // So that the difference is not negative.
-                      kept.size - request.offset <= reply.content.size();
+  std::string content = kept.file->read(request.offset(), wire::answer_part_size_max);
+  const bool is_end = request.offset() >= kept.size ||  // So that the difference is not negative.
+                      kept.size - request.offset() <= content.size();
   if (is_end) kept.is_read = true;
+  proto::ReplyEnvelope reply;
+  reply.mutable_answer_part()->set_content(std::move(content));
   return reply;
 }
 
@@ -429,15 +432,17 @@ void Answers::review() {
 
 void Answers::finish(Computing& computing) {
   Computed computed = computing.result.get();
-  if (!computed.failure.empty()) return computing.respond(wire::ErrorReply{computed.failure});
+  if (!computed.failure.empty()) return computing.respond(wire::error_reply(computed.failure));
   // A client that lacks nothing, of an empty answer for example, reads no part of it.
-  kept_.emplace(computed.reply.answer_id,
+  kept_.emplace(computed.reply.answer_id(),
                 Kept{.owner = computing.owner,
                      .file = std::move(computed.file),
-                     .size = computed.reply.size,
+                     .size = computed.reply.size(),
                      .read_at = context_.now(),
-                     .is_read = computed.reply.offset >= computed.reply.size});
-  computing.respond(std::move(computed.reply));
+                     .is_read = computed.reply.offset() >= computed.reply.size()});
+  proto::ReplyEnvelope reply;
+  *reply.mutable_answer() = std::move(computed.reply);
+  computing.respond(std::move(reply));
 }
 
 }  // namespace proofmass::coordinator

@@ -12,9 +12,8 @@
 #include <string_view>
 
 #include "coordinator/net/authentication/rights.hpp"
-#include "coordinator/net/client_gateway.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_context.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -61,12 +60,12 @@ class Answers {
   /// @param database  Of the campaign.
   /// @throws Error if the question has an option that its command does not have, or too many
   ///         questions are being answered.
-  void ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
+  void ask(const proto::AnswerRequest& request, const std::filesystem::path& database,
            const Asker& asker, Respond respond);
 
   /// @throws Error if there is no such answer, or it was given to another key.
-  [[nodiscard]] wire::AnswerPartReply part(const wire::AnswerPartRequest& request,
-                                           const Asker& asker);
+  [[nodiscard]] proto::ReplyEnvelope part(const proto::AnswerPartRequest& request,
+                                          const Asker& asker);
 
   /// Responds to questions whose answers are there, and drops answers that nobody reads. To be
   /// called several times a second.
@@ -77,7 +76,7 @@ class Answers {
   struct Computed {
     std::string failure;  ///< Why there is no answer; else empty.
     std::unique_ptr<UnnamedFile> file;
-    wire::AnswerReply reply;
+    proto::AnswerReply reply;
   };
   struct Computing {
     std::string owner;

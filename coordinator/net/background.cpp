@@ -20,9 +20,8 @@ bool Background::post(Work work) {
   {
     const std::lock_guard lock(mutex_);
     if (pending_.size() >= num_pending_max) return false;
-    pending_.push_back(std::move(work));
   }
-  changed_.notify_all();
+  post_next(std::move(work));  // One thread posts: nobody has taken the place meanwhile.
   return true;
 }
 

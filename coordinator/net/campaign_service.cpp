@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"
 
@@ -31,95 +32,53 @@ CampaignService::CampaignService(const ServiceContext& context, WorkerHistory& h
 
 CampaignService::~CampaignService() = default;
 
-void CampaignService::serve(PreparedCampaign prepared) {
-  ServedCampaign& campaign = prepared.campaign;
-  const CampaignId id = campaign.store.id();
-  const std::string& name = campaign.definition->name;
-  const std::optional<Entry> entry = find(name);
-  const bool is_again = entry && entry->is_closed && entry->id == id;
-  if ((entry && !is_again) || served_.contains(id) || (ended_.contains(id) && !is_again)) {
-    throw Error(fmt::format("campaign = {} in {} (is served already, from another file)", name,
-                            campaign.file.string()));
-  }
-  const TimePoint now = context_.now();
-  served_.emplace(id, Served{.file = campaign.file,
-                             .name = name,
-                             .owner = prepared.owner,
-                             .rate = RateMeter(now),
-                             .written = prepared.control,
-                             .plan = prepared.plan,
-                             .is_decided = prepared.control.phase == Phase::finished,
-                             .num_failures_before = prepared.num_failures,
-                             .is_end_told = prepared.control.phase == Phase::finished,
-                             .summary = {}});
-  if (is_again) {
-    ended_.erase(id);
-  } else {
-    order_.push_back(id);
-  }
-  writer_.open(id, std::move(campaign.store));
-  on_campaign(state_, id, prepared.stored, now, outbox_);
+std::optional<CampaignRecord> CampaignService::find(std::string_view name) const {
+  const auto has_name = [&](CampaignId id) {
+    const auto served = served_.find(id);
+    return (served == served_.end() ? closed_.at(id) : served->second.record).status.name == name;
+  };
+  const auto found = std::ranges::find_if(order_, has_name);
+  if (found == order_.end()) return std::nullopt;
+  return record_of(*found);
 }
 
-void CampaignService::list(EndedCampaign campaign) {
-  const CampaignId id = campaign.id;
-  if (find(campaign.status.name) || served_.contains(id) || ended_.contains(id)) {
-    throw Error(fmt::format("campaign = {} in {} (is served already, from another file)",
-                            campaign.status.name, campaign.file.string()));
+std::vector<CampaignRecord> CampaignService::records(std::size_t first,
+                                                     std::size_t count_max) const {
+  std::vector<CampaignRecord> records;
+  for (std::size_t i = first; i < order_.size() && records.size() < count_max; ++i) {
+    records.push_back(record_of(order_[i]));
   }
-  on_ended(state_, id, campaign.status.num_runs);
-  ended_.emplace(id, std::move(campaign));
-  order_.push_back(id);
+  return records;
 }
 
-std::optional<CampaignService::Entry> CampaignService::find(std::string_view name) const {
-  for (const auto& [id, served] : served_) {
-    if (served.name == name) return Entry{.id = id, .file = served.file, .owner = served.owner};
-  }
-  for (const auto& [id, ended] : ended_) {
-    if (ended.status.name != name) continue;
-    return Entry{.id = id, .file = ended.file, .owner = ended.status.owner, .is_closed = true};
-  }
-  return std::nullopt;
-}
-
-KnownCampaigns CampaignService::known() const {
-  KnownCampaigns known;
-  for (const auto& [id, served] : served_) {
-    known.files.insert(served.file);
-    known.ids.insert(id);
-    known.names.insert(served.name);
-  }
-  for (const auto& [id, ended] : ended_) {
-    known.files.insert(ended.file);
-    known.ids.insert(id);
-    known.names.insert(ended.status.name);
-  }
-  return known;
-}
-
-std::vector<EndedFile> CampaignService::ended_files() const {
-  std::vector<EndedFile> files;
-  for (const auto& [id, ended] : ended_) {
-    files.push_back(
-        {.id = id, .file = ended.file, .name = ended.status.name, .stamp = ended.stamp});
-  }
-  return files;
-}
-
-bool CampaignService::unlist(const EndedFile& changed) {
-  const auto found = ended_.find(changed.id);
-  if (found == ended_.end() || found->second.stamp != changed.stamp) return false;
-  ended_.erase(found);
-  std::erase(order_, changed.id);
-  on_unlisted(state_, changed.id);
-  return true;
+CampaignRecord CampaignService::record_of(CampaignId id) const {
+  const auto closed = closed_.find(id);
+  if (closed != closed_.end()) return closed->second;
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const Served& served = served_.at(id);
+  CampaignRecord record = served.record;
+  record.num_waiting = campaign.delivered.size();
+  wire::CampaignStatus& status = record.status;
+  status.phase = phase_of(id);
+  status.priority = campaign.priority;
+  status.num_runs = campaign.definition->num_runs;
+  status.num_done = campaign.committed.size();
+  status.num_without_estimate = campaign.num_without_estimate;
+  status.num_given_up = campaign.given_up.size();
+  status.num_lent = campaign.lent.size();
+  status.num_duplicates = campaign.num_duplicates;
+  status.num_audited = campaign.num_audited;
+  status.num_mismatches = campaign.num_mismatches;
+  status.rate_hz = served.rate.rate_hz(context_.now());
+  status.remaining_s = remaining_s(campaign, status.rate_hz);
+  status.storage_failure = campaign.storage_failure;
+  return record;
 }
 
 CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
-    if (served.owner != owner) continue;
+    if (served.record.status.owner != owner) continue;
     const Holdings one = holdings_of(id);
     holdings.num_campaigns += one.num_campaigns;
     holdings.size += one.size;
@@ -137,8 +96,8 @@ void CampaignService::take_hold(CampaignId id) {
   if (!campaign.storage_failure.empty()) throw Error(campaign.storage_failure);
   Served& served = served_.at(id);
   if (served.is_held) {
-    throw Error(
-        fmt::format("campaign = {} (is being changed by another request; try again)", served.name));
+    throw Error(fmt::format("campaign = {} (is being changed by another request; try again)",
+                            served.record.status.name));
   }
   served.is_held = true;
 }
@@ -170,9 +129,10 @@ void CampaignService::resume(CampaignId id) {
   on_resume(state_, id, context_.now(), outbox_);
 }
 
-wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlRequest& request) {
+proto::ReplyEnvelope CampaignService::control(CampaignId id, wire::ControlAction action,
+                                              int priority) {
   const CampaignState& campaign = state_.campaigns.at(id);
-  switch (request.action) {
+  switch (action) {
     case wire::ControlAction::pause:
       on_pause(state_, id, outbox_);
       break;
@@ -183,7 +143,7 @@ wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlReq
       on_cancel(state_, id, outbox_);
       break;
     case wire::ControlAction::set_priority:
-      on_control(state_, id, request.priority, campaign.audit_fraction);
+      on_control(state_, id, priority, campaign.audit_fraction);
       break;
     case wire::ControlAction::archive:
       PROOFMASS_EXPECT(false);  // See archive().
@@ -194,56 +154,6 @@ wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlReq
   }
   review();
   return done_reply(id);
-}
-
-std::vector<wire::CampaignStatus> CampaignService::statuses(std::size_t first,
-                                                            std::size_t count_max) const {
-  std::vector<wire::CampaignStatus> statuses;
-  for (std::size_t i = first; i < order_.size() && statuses.size() < count_max; ++i) {
-    statuses.push_back(status_of(order_[i]));
-  }
-  return statuses;
-}
-
-wire::CampaignStatus CampaignService::status_of(CampaignId id) const {
-  const auto ended = ended_.find(id);
-  return ended == ended_.end() ? status_of_served(id) : ended->second.status;
-}
-
-std::vector<CampaignSnapshot> CampaignService::snapshots() const {
-  std::vector<CampaignSnapshot> snapshots;
-  snapshots.reserve(order_.size());
-  for (const CampaignId id : order_) {
-    const auto served = served_.find(id);
-    const bool is_here = served != served_.end();
-    snapshots.push_back(
-        {.id = id,
-         .status = status_of(id),
-         .file = is_here ? served->second.file : ended_.at(id).file,
-         .num_waiting = is_here ? state_.campaigns.at(id).delivered.size() : std::uint64_t{0}});
-  }
-  return snapshots;
-}
-
-wire::CampaignStatus CampaignService::status_of_served(CampaignId id) const {
-  const CampaignState& campaign = state_.campaigns.at(id);
-  const Served& served = served_.at(id);
-  const double rate_hz = served.rate.rate_hz(context_.now());
-  return {.name = served.name,
-          .phase = phase_of(id),
-          .priority = campaign.priority,
-          .num_runs = campaign.definition->num_runs,
-          .num_done = campaign.committed.size(),
-          .num_without_estimate = campaign.num_without_estimate,
-          .num_given_up = campaign.given_up.size(),
-          .num_lent = campaign.lent.size(),
-          .num_duplicates = campaign.num_duplicates,
-          .num_audited = campaign.num_audited,
-          .num_mismatches = campaign.num_mismatches,
-          .rate_hz = rate_hz,
-          .remaining_s = remaining_s(campaign, rate_hz),
-          .storage_failure = campaign.storage_failure,
-          .owner = served.owner};
 }
 
 bool CampaignService::is_undecided(CampaignId id) const {
@@ -359,12 +269,9 @@ void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
   wanted->num_runs = num_runs;
   context_.background.post_next([this, id, wanted]() -> Background::Finish {
     std::shared_ptr<const Campaign> extended;
-    std::string failure;
-    try {
+    const std::string failure = failure_of([&] {
       writer_.access(id, [&](Store& store) { extended = files_->extend(store, *wanted); });
-    } catch (const std::exception& error) {
-      failure = error.what();
-    }
+    });
     return [this, id, extended, failure, num_runs = wanted->num_runs] {
       Served& served = served_.at(id);
       served.is_held = false;
@@ -384,23 +291,68 @@ void CampaignService::begin_summary(CampaignId id, Served& served) {
   served.num_summarised = state_.campaigns.at(id).num_committed_here;
   served.summary = std::async(
       std::launch::async,
-      [this, id, file = served.file, definition = state_.campaigns.at(id).definition] {
-        try {
-          return Summarised{.failure = {},
-                            .num_runs = files_->summarise(
-                                file, *definition, [&](const std::function<void(Store&)>& action) {
-                                  writer_.access(id, action);
-                                })};
-        } catch (const std::exception& error) {
-          return Summarised{.failure = error.what(), .num_runs = {}};
-        }
+      [this, id, file = served.record.file, definition = state_.campaigns.at(id).definition] {
+        const auto write = [&](const std::function<void(Store&)>& action) {
+          writer_.access(id, action);
+        };
+        Summarised summarised;
+        summarised.failure =
+            failure_of([&] { summarised.num_runs = files_->summarise(file, *definition, write); });
+        return summarised;
       });
 }
 
-wire::DoneReply CampaignService::done_reply(CampaignId id) const {
-  const wire::CampaignStatus status = status_of(id);
-  return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
-                              wire::phase_name(status), status.num_runs, status.num_done)};
+void CampaignService::review_notices(CampaignId id, Served& served) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  if (phase_of(id) == Phase::active) served.is_end_told = false;
+  if (!served.is_end_told && is_finished_and_settled(id, served)) {
+    served.is_end_told = true;
+    const bool has_failed = wire::has_failed(record_of(id).status);
+    tell(served, has_failed ? CampaignNotice::Kind::failed : CampaignNotice::Kind::finished,
+         has_failed ? "most of its runs were given up" : "");
+  }
+  const bool has_failed = !campaign.storage_failure.empty();
+  if (has_failed && !served.is_storage_failure_told) {
+    tell(served, CampaignNotice::Kind::failed, campaign.storage_failure);
+  }
+  served.is_storage_failure_told = has_failed;
+  if (campaign.num_mismatches > served.num_mismatches_told) {
+    tell(served, CampaignNotice::Kind::failed,
+         fmt::format("{} runs were computed again with another result", campaign.num_mismatches));
+  }
+  served.num_mismatches_told = campaign.num_mismatches;
+}
+
+void CampaignService::tell(const Served& served, CampaignNotice::Kind kind,
+                           std::string reason) const {
+  if (!context_.config.on_notice) return;
+  context_.config.on_notice({.kind = kind,
+                             .campaign = served.record.status.name,
+                             .file = served.record.file,
+                             .reason = std::move(reason)});
+}
+
+bool CampaignService::is_all_done() const {
+  return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
+    const auto& [id, campaign] = item;
+    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided(id)) ||
+           served_.at(id).is_abandoned;
+  });
+}
+
+bool CampaignService::is_all_told() const {
+  if (!context_.config.on_notice) return true;
+  return std::ranges::all_of(served_, [&](const auto& item) {
+    const auto& [id, served] = item;
+    return phase_of(id) != Phase::finished || served.is_end_told ||
+           !served.summary_failure.empty() || !state_.campaigns.at(id).storage_failure.empty();
+  });
+}
+
+proto::ReplyEnvelope CampaignService::done_reply(CampaignId id) const {
+  const wire::CampaignStatus status = record_of(id).status;
+  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
+                                      wire::phase_name(status), status.num_runs, status.num_done));
 }
 
 }  // namespace proofmass::coordinator

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,7 +14,8 @@
 
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/directory_look.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/net/timing.hpp"
@@ -23,19 +25,27 @@
 
 namespace proofmass::coordinator {
 
-/// The campaigns of a coordinator: those that are served, and those that have ended and whose files
-/// are closed. Keeps in the files what must outlive the process. Status comes from memory alone;
-/// what may wait for a disk is done in the background.
+/// The campaigns of a coordinator, from the first look at a file to the archive. Keeps in the files
+/// what must outlive the process. Status comes from memory alone; what may wait for a disk is done
+/// in the background.
+///
+/// Each database is in one of these states:
+///
+///     state     what it is                                  next state
+///     unserved  a file of the directory that cannot be      any, at the next look; gone
+///               served for now; tried again every 5 s
+///     served    open; the dispatch lends its runs           settled
+///     settled   open; finished or cancelled, and all is     served by submit, resume, retry or the
+///               stored that followed from it                stop rule; closing if 16 others are
+///                                                           settled since then, or by archive
+///     closing   held, until its log is folded in            closed; settled if somebody reads it
+///     closed    a line of the list; the file is complete    served by submit, resume, retry;
+///               and has no lock, log or descriptor          any if the file changes; archived;
+///               gone
+///     archived  moved to where nothing is served            -
+///     gone      removed by somebody                         any if it comes back
 class CampaignService {
  public:
-  /// A campaign by its name.
-  struct Entry {
-    CampaignId id;
-    std::filesystem::path file;
-    std::string owner;
-    bool is_closed = false;  ///< It has ended, and so has the service of its file.
-  };
-
   /// A served campaign as it is to be from now on.
   struct Change {
     std::shared_ptr<const Campaign> definition;
@@ -50,20 +60,15 @@ class CampaignService {
   CampaignService(const CampaignService&) = delete;
   CampaignService& operator=(const CampaignService&) = delete;
 
-  /// Begins to serve a campaign, one that has ended before perhaps.
-  /// @throws Error if one of that name or number is served already.
-  void serve(PreparedCampaign campaign);
-  /// Lists a campaign that is not served.
-  void list(EndedCampaign campaign);
+  /// Begins to serve a campaign, one that has ended before perhaps, or lists one that has ended.
+  /// @throws Error if one of that name or number is there already.
+  void add(FileLook look);
+  /// add() for a file of the directory: if that is not possible, it waits and is looked at again.
+  void take(FileLook look);
 
-  [[nodiscard]] std::optional<Entry> find(std::string_view name) const;
+  /// The campaign of that name as it stands.
+  [[nodiscard]] std::optional<CampaignRecord> find(std::string_view name) const;
   [[nodiscard]] bool is_served(CampaignId id) const { return served_.contains(id); }
-  [[nodiscard]] KnownCampaigns known() const;
-  /// The files of the campaigns that are listed as ended.
-  [[nodiscard]] std::vector<EndedFile> ended_files() const;
-  /// Takes a campaign whose file has changed from the list of those that have ended.
-  /// @return False if it is not there any more, or was looked at again since.
-  bool unlist(const EndedFile& changed);
   /// Unfinished campaigns of an owner, and the bytes of their definitions.
   struct Holdings {
     std::size_t num_campaigns = 0;
@@ -84,41 +89,45 @@ class CampaignService {
   void change(CampaignId id, const Change& change);
   // Of a served campaign.
   [[nodiscard]] const StopPlan& plan_of(CampaignId id) const { return served_.at(id).plan; }
-  [[nodiscard]] const std::filesystem::path& file_of(CampaignId id) const {
-    return served_.at(id).file;
-  }
   [[nodiscard]] std::uint64_t num_runs_of(CampaignId id) const {
     return state_.campaigns.at(id).definition->num_runs;
   }
 
   /// Carries out an action on a campaign that is served.
-  [[nodiscard]] wire::ClientReply control(CampaignId id, const wire::ControlRequest& request);
-  [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
+  /// @param priority  For set_priority.
+  [[nodiscard]] proto::ReplyEnvelope control(CampaignId id, wire::ControlAction action,
+                                             int priority);
+  [[nodiscard]] proto::ReplyEnvelope done_reply(CampaignId id) const;
 
   /// Takes a campaign that is finished or cancelled from the list and moves its file to where it is
   /// not served.
   /// @param respond  Called when that is done, or with the reason why it is not.
   /// @throws Error if results are still to be stored, statistics to be computed, or another request
   ///         is changing it.
-  void archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
+  void archive(CampaignId id, const Respond& respond);
 
   /// Follows what the dispatch did: measures rates, stores phases, brings the statistics of
   /// finished campaigns up to date. To be called several times a second.
   void review();
+  /// Looks at the directory if it is time. To be called some times a second.
+  void review_directory();
 
+  [[nodiscard]] CampaignRecord record_of(CampaignId id) const;
   /// At most `count_max` campaigns from the index `first` on, in the order in which they came.
-  [[nodiscard]] std::vector<wire::CampaignStatus> statuses(std::size_t first,
-                                                           std::size_t count_max) const;
+  [[nodiscard]] std::vector<CampaignRecord> records(
+      std::size_t first = 0, std::size_t count_max = std::numeric_limits<std::size_t>::max()) const;
   [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
-  [[nodiscard]] wire::CampaignStatus status_of(CampaignId id) const;
-  /// All campaigns, in the same order.
-  [[nodiscard]] std::vector<CampaignSnapshot> snapshots() const;
+  [[nodiscard]] std::size_t num_unserved() const { return unserved_.size(); }
+  /// By name, at most so many.
+  [[nodiscard]] std::vector<wire::UnservedFile> unserved(std::size_t count_max) const;
 
   /// True if nobody waits to be told of the end of a campaign, see ServiceConfig::on_notice.
   [[nodiscard]] bool is_all_told() const;
 
   /// True if every campaign is finished, cancelled or abandoned.
   [[nodiscard]] bool is_all_done() const;
+  /// True if no file waits to be served; copies of served campaigns do not count.
+  [[nodiscard]] bool is_all_served() const;
 
   /// Ends the service of all campaigns and gives the files that are open back, in the order in
   /// which they came.
@@ -133,9 +142,7 @@ class CampaignService {
 
   /// What is known of a campaign beside the dispatch's state.
   struct Served {
-    std::filesystem::path file;
-    std::string name;
-    std::string owner;
+    CampaignRecord record;  ///< Without what changes; see record_of().
     RateMeter rate;
     std::uint64_t num_committed_seen = 0;
     CampaignControl written;  ///< As the file has it.
@@ -158,7 +165,23 @@ class CampaignService {
     std::future<Summarised> summary;
   };
 
-  [[nodiscard]] wire::CampaignStatus status_of_served(CampaignId id) const;
+  /// What came of looking at the directory.
+  struct Findings {
+    std::vector<CampaignRecord> changed;  ///< Closed files that are other ones now.
+    std::vector<FileLook> looks;
+  };
+
+  // From state to state.
+  void serve(FileLook look);
+  void list(CampaignRecord campaign);
+  void note_unserved(FileLook look);
+  /// Takes a campaign from the list of those whose files are closed.
+  void unlist(CampaignId id);
+  [[nodiscard]] KnownCampaigns known() const;
+  static Findings look(const CampaignDirectory& directory, KnownCampaigns known,
+                       const std::vector<CampaignRecord>& closed, const CoordinatorStart& start);
+  void take_findings(Findings findings);
+
   /// All runs of now are there, and its stop rule is still to be checked with them.
   [[nodiscard]] bool is_undecided(CampaignId id) const;
   /// As shown and stored: a campaign that is undecided, or has runs elsewhere, is not finished.
@@ -182,8 +205,7 @@ class CampaignService {
   /// Closes the file if it is still settled when its log is folded in, and nobody reads it.
   /// @param then  Called with true when the closing is under way, with false if it is not.
   void begin_closing(CampaignId id, std::function<void(bool is_closing)> then);
-  void move_to_archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
-  void note_archived(CampaignId id, const std::string& name, const std::filesystem::path& place);
+  void move_to_archive(CampaignId id, const Respond& respond);
   void close_ended(CampaignId id);
   void say_not_closed(std::string_view reason);
 
@@ -194,8 +216,11 @@ class CampaignService {
   Outbox& outbox_;
   CampaignFiles* files_;
   std::map<CampaignId, Served> served_;
-  std::map<CampaignId, EndedCampaign> ended_;
+  std::map<CampaignId, CampaignRecord> closed_;
   std::vector<CampaignId> order_;  ///< Of both.
+  std::map<std::filesystem::path, FileLook> unserved_;
+  TimePoint looked_at_;  ///< At the directory.
+  bool is_looking_ = false;
 };
 
 }  // namespace proofmass::coordinator

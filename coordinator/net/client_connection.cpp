@@ -15,7 +15,6 @@
 #include "proto/link/connection_monitor.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/link/surroundings.hpp"
-#include "proto/wire/client_codec.hpp"
 #include "proto/wire/endpoint.hpp"
 
 namespace proofmass::coordinator {
@@ -41,8 +40,9 @@ class ClientConnection::Impl {
         dealer_(wire::make_dealer(context_, security_, wire::KeyRole::client)),
         monitor_(context_, dealer_, config.endpoint, security_, Clock::now()) {}
 
-  wire::ClientReply ask(const wire::ClientRequest& request) {
-    request_ = wire::encode(wire::RequestPacket{++request_id_, request});
+  proto::ReplyEnvelope ask(proto::RequestEnvelope request) {
+    request.set_request_id(++request_id_);
+    request_ = wire::encode(std::move(request));
     offset_ = 0;
     is_sent_ = false;
     hear();
@@ -68,24 +68,23 @@ class ClientConnection::Impl {
   /// The whole request, or the part of it that the coordinator wants.
   [[nodiscard]] std::string next_message() const {
     if (request_.size() <= wire::request_part_size_max) return request_;
-    return wire::encode(wire::RequestPacket{
-        request_id_,
-        wire::RequestPart{.total_size = request_.size(),
-                          .offset = offset_,
-                          .slice = request_.substr(offset_, wire::request_part_size_max)}});
+    proto::RequestEnvelope message;
+    message.set_request_id(request_id_);
+    proto::RequestPart& part = *message.mutable_part();
+    part.set_total_size(request_.size());
+    part.set_offset(offset_);
+    part.set_slice(request_.substr(offset_, wire::request_part_size_max));
+    return wire::encode(std::move(message));
   }
 
   /// True if the reply to the request itself follows this one.
-  [[nodiscard]] bool is_interim(const wire::ClientReply& reply) {
-    if (const auto* const part = std::get_if<wire::PartReply>(&reply)) {
-      hear();
-      if (part->next_offset >= request_.size()) return true;
-      offset_ = part->next_offset;
-      is_sent_ = false;
-      return true;
-    }
-    if (!std::holds_alternative<wire::WaitReply>(reply)) return false;
+  [[nodiscard]] bool is_interim(const proto::ReplyEnvelope& reply) {
+    if (!reply.has_part() && !reply.has_wait()) return false;
     hear();
+    if (reply.has_part() && reply.part().next_offset() < request_.size()) {
+      offset_ = reply.part().next_offset();
+      is_sent_ = false;
+    }
     return true;
   }
 
@@ -119,17 +118,17 @@ class ClientConnection::Impl {
   }
 
   /// The reply to the last request, if it is there.
-  std::optional<wire::ClientReply> receive() {
+  std::optional<proto::ReplyEnvelope> receive() {
     zmq::message_t message;
     while (dealer_.recv(message, zmq::recv_flags::dontwait)) {
       auto decoded = wire::decode_reply(message.to_string_view());
       if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) fail_foreign(*error);
-      auto& packet = std::get<wire::ReplyPacket>(decoded);
+      auto& reply = std::get<proto::ReplyEnvelope>(decoded);
       // The answer to an earlier request may come after its time.
-      const bool is_late = packet.id != 0 && packet.id < request_id_;
+      const bool is_late = reply.request_id() != 0 && reply.request_id() < request_id_;
       if (is_late) continue;
-      if (packet.id > request_id_) fail("answers what was not asked");
-      return std::move(packet.reply);
+      if (reply.request_id() > request_id_) fail("answers what was not asked");
+      return std::move(reply);
     }
     return std::nullopt;
   }
@@ -175,8 +174,8 @@ ClientConnection::ClientConnection(const ClientConnectionConfig& config) {
 
 ClientConnection::~ClientConnection() = default;
 
-wire::ClientReply ClientConnection::ask(const wire::ClientRequest& request) {
-  return impl_->ask(request);
+proto::ReplyEnvelope ClientConnection::ask(proto::RequestEnvelope request) {
+  return impl_->ask(std::move(request));
 }
 
 }  // namespace proofmass::coordinator

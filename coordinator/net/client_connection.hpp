@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -30,9 +30,10 @@ class ClientConnection {
   ClientConnection(const ClientConnection&) = delete;
   ClientConnection& operator=(const ClientConnection&) = delete;
 
-  /// Sends a request, a large one in parts, and waits for its reply, as long as the coordinator
-  /// says that it is at work. The request is sent again when the connection was lost meanwhile, so
-  /// the coordinator may carry it out twice; each leads to the same end as once.
+  /// Sends a request with a number of its own, a large one in parts, and waits for its reply, as
+  /// long as the coordinator says that it is at work. The request is sent again when the connection
+  /// was lost meanwhile, so the coordinator may carry it out twice; each leads to the same end as
+  /// once.
   ///
   /// Refused connections end the wait at once if there was never a successful one. Otherwise the
   /// coordinator may be starting again, and a refusal is only the reason if time runs out.
@@ -41,7 +42,7 @@ class ClientConnection {
   /// @throws Error reading `connect = endpoint (reason)` if nobody is there, the coordinator lets
   ///         this client not in, or it does not answer in time or in the same words;
   ///         InvalidArgument if the request is too large.
-  [[nodiscard]] wire::ClientReply ask(const wire::ClientRequest& request);
+  [[nodiscard]] proto::ReplyEnvelope ask(proto::RequestEnvelope request);
 
  private:
   class Impl;

@@ -18,39 +18,20 @@ namespace {
 constexpr std::chrono::seconds told_every(1);
 constexpr std::chrono::seconds silence_max(30);  // Between two parts of a request.
 
-Request read(wire::SubmitRequest&& sent) {
-  auto campaign =
-      model().campaign_of(std::move(sent.definition), TableColumns::included, "definition");
-  check_campaign_name(campaign->name, NameOrigin::given);
-  return Submission{.campaign = std::move(campaign),
-                    .priority = sent.priority,
-                    .audit_fraction = sent.audit_fraction,
-                    .stop_rule = std::move(sent.stop_rule),
-                    .failures_max = sent.failures_max};
+proto::ReplyEnvelope part_reply(std::uint64_t next_offset) {
+  proto::ReplyEnvelope reply;
+  reply.mutable_part()->set_next_offset(next_offset);
+  return reply;
 }
 
-template <typename Other>
-Request read(Other&& sent) {
-  return std::forward<Other>(sent);
-}
-
-wire::ErrorReply refusal(std::string text) { return {.text = std::move(text)}; }
-
-/// A request that has been read, with the number that its reply has.
-struct Received {
-  std::uint64_t id = 0;
-  Request request;
-};
-
-using Decoded = std::variant<Received, wire::DecodeError>;
+using Decoded = std::variant<Request, wire::DecodeError>;
 
 /// Never throws: memory may be short for what a request would become.
 Decoded decode(std::string_view bytes) {
   try {
     auto decoded = wire::decode_request(bytes);
     if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) return *error;
-    auto& [id, request] = std::get<wire::RequestPacket>(decoded);
-    return Received{.id = id, .request = request_of(std::move(request))};
+    return request_of(std::move(std::get<proto::RequestEnvelope>(decoded)));
   } catch (const std::exception& error) {
     return wire::DecodeError{.fault = wire::DecodeFault::invalid, .text = error.what()};
   }
@@ -58,35 +39,39 @@ Decoded decode(std::string_view bytes) {
 
 }  // namespace
 
-Request request_of(wire::ClientRequest sent) {
-  return std::visit([](auto&& content) { return read(std::move(content)); }, std::move(sent));
+Request request_of(proto::RequestEnvelope message) {
+  if (!message.has_submit()) return {.message = std::move(message)};
+  std::shared_ptr<const Campaign> campaign = model().campaign_of(
+      wire::take_definition(*message.mutable_submit()), TableColumns::included, "definition");
+  check_campaign_name(campaign->name, NameOrigin::given);
+  return {.message = std::move(message), .campaign = std::move(campaign)};
 }
 
 RequestParts::Outcome RequestParts::take(const std::string& connection, std::uint64_t request,
-                                         const wire::RequestPart& part, TimePoint now) {
+                                         const proto::RequestPart& part, TimePoint now) {
   auto found = unfinished_.find(connection);
   const bool is_known = found != unfinished_.end() && found->second.request == request &&
-                        found->second.total_size == part.total_size;
+                        found->second.total_size == part.total_size();
   if (!is_known) {
-    if (part.offset != 0) return wire::PartReply{0};
+    if (part.offset() != 0) return part_reply(0);
     if (found != unfinished_.end()) drop(found);
-    if (part.total_size > size_max_ - size_held_) {
-      return wire::ErrorReply{
+    if (part.total_size() > size_max_ - size_held_) {
+      return wire::error_reply(
           fmt::format("request size = {} bytes (the coordinator is receiving {} bytes of others, "
                       "at most {} together: try again later)",
-                      part.total_size, size_held_, size_max_)};
+                      part.total_size(), size_held_, size_max_));
     }
     Unfinished begun{
-        .request = request, .total_size = part.total_size, .bytes = {}, .heard_at = now};
+        .request = request, .total_size = part.total_size(), .bytes = {}, .heard_at = now};
     begun.bytes.reserve(begun.total_size);
     size_held_ += begun.total_size;
     found = unfinished_.emplace(connection, std::move(begun)).first;
   }
   Unfinished& unfinished = found->second;
   unfinished.heard_at = now;
-  if (part.offset == unfinished.bytes.size()) unfinished.bytes += part.slice;
+  if (part.offset() == unfinished.bytes.size()) unfinished.bytes += part.slice();
   if (unfinished.bytes.size() < unfinished.total_size) {
-    return wire::PartReply{unfinished.bytes.size()};
+    return part_reply(unfinished.bytes.size());
   }
   Whole whole{.bytes = std::move(unfinished.bytes)};
   unfinished_.erase(found);
@@ -117,47 +102,46 @@ void ClientGateway::receive(const Incoming& message) {
   try {
     take(message);
   } catch (const std::exception& error) {
-    send({.routing_id = message.from.routing_id, .request = 0}, refusal(error.what()));
+    send({.routing_id = message.from.routing_id, .request = 0}, wire::error_reply(error.what()));
   }
 }
 
 void ClientGateway::take(const Incoming& message) {
   const Waiter unknown{.routing_id = message.from.routing_id, .request = 0};
   if (!callbacks_.asker_of(message.from.key)) {
-    return send(unknown,
-                refusal(fmt::format("key = {} (is not authorized any more)", message.from.key)));
+    return send(unknown, wire::error_reply(fmt::format("key = {} (is not authorized any more)",
+                                                       message.from.key)));
   }
   if (message.frames.size() != 1) {
-    return send(unknown,
-                refusal(fmt::format("request = {} frames (must be one)", message.frames.size())));
+    return send(unknown, wire::error_reply(fmt::format("request = {} frames (must be one)",
+                                                       message.frames.size())));
   }
   const std::string_view bytes = message.frames.front();
   if (bytes.size() > wire::request_message_size_max) {
-    return send(unknown, refusal(fmt::format("request size = {} bytes (must be at most {} in one "
-                                             "message; larger ones travel in parts)",
-                                             bytes.size(), wire::request_message_size_max)));
+    return send(unknown,
+                wire::error_reply(fmt::format("request size = {} bytes (must be at most {} in one "
+                                              "message; larger ones travel in parts)",
+                                              bytes.size(), wire::request_message_size_max)));
   }
   Decoded decoded = decode(bytes);
   if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
-    return send(unknown, refusal(error->text));
+    return send(unknown, wire::error_reply(error->text));
   }
-  auto& [id, request] = std::get<Received>(decoded);
-  if (const auto* const part = std::get_if<wire::RequestPart>(&request)) {
-    return take_part(message.from, id, *part);
-  }
+  auto& request = std::get<Request>(decoded);
+  const std::uint64_t id = request.message.request_id();
+  if (request.message.has_part()) return take_part(message.from, id, request.message.part());
   const auto ticket = begin(message.from, id, bytes);
   if (ticket) carry_out(*ticket, message.from.key, std::move(request));
 }
 
 void ClientGateway::take_part(const Address& from, std::uint64_t request,
-                              const wire::RequestPart& part) {
+                              const proto::RequestPart& part) {
   RequestParts::Outcome outcome = parts_.take(from.routing_id, request, part, callbacks_.now());
   const Waiter waiter{.routing_id = from.routing_id, .request = request};
-  if (const auto* const next = std::get_if<wire::PartReply>(&outcome)) return send(waiter, *next);
-  if (const auto* const error = std::get_if<wire::ErrorReply>(&outcome)) {
-    return send(waiter, *error);
+  if (auto* const reply = std::get_if<proto::ReplyEnvelope>(&outcome)) {
+    return send(waiter, std::move(*reply));
   }
-  send(waiter, wire::PartReply{part.total_size});
+  send(waiter, part_reply(part.total_size()));
   take_whole(from, request, std::move(std::get<RequestParts::Whole>(outcome).bytes));
 }
 
@@ -174,16 +158,16 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
         return [this, ticket, decoded, size, key] {
           parts_.release(size);
           if (const auto* const error = std::get_if<wire::DecodeError>(decoded.get())) {
-            return respond(ticket, refusal(error->text));
+            return respond(ticket, wire::error_reply(error->text));
           }
-          carry_out(ticket, key, std::move(std::get<Received>(*decoded).request));
+          carry_out(ticket, key, std::move(std::get<Request>(*decoded)));
         };
       });
   if (is_posted) return;
   parts_.release(size);
-  respond(ticket,
-          refusal(fmt::format("{} requests are under way, which is the limit; try again later",
-                              Background::num_pending_max)));
+  respond(ticket, wire::error_reply(
+                      fmt::format("{} requests are under way, which is the limit; try again later",
+                                  Background::num_pending_max)));
 }
 
 void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
@@ -192,9 +176,9 @@ void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Requ
     if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));
     callbacks_.carry_out(
         std::move(request), *asker,
-        [this, ticket](const wire::ClientReply& reply) { respond(ticket, reply); });
+        [this, ticket](const proto::ReplyEnvelope& reply) { respond(ticket, reply); });
   } catch (const std::exception& error) {
-    respond(ticket, refusal(error.what()));
+    respond(ticket, wire::error_reply(error.what()));
   }
 }
 
@@ -207,10 +191,10 @@ std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint
     if (pending.waiters.size() < waiters_max) {
       pending.waiters.push_back(waiter);
     } else {
-      send(waiter,
-           refusal(fmt::format("{} clients wait for the answer to this request already; try again "
-                               "later",
-                               waiters_max)));
+      send(waiter, wire::error_reply(fmt::format(
+                       "{} clients wait for the answer to this request already; try again "
+                       "later",
+                       waiters_max)));
     }
     return std::nullopt;
   }
@@ -223,7 +207,7 @@ std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint
   return ticket;
 }
 
-void ClientGateway::respond(std::uint64_t ticket, const wire::ClientReply& reply) {
+void ClientGateway::respond(std::uint64_t ticket, const proto::ReplyEnvelope& reply) {
   const auto found = pending_.find(ticket);
   if (found == pending_.end()) return;
   const std::vector<Waiter> waiters = std::move(found->second.waiters);
@@ -231,24 +215,29 @@ void ClientGateway::respond(std::uint64_t ticket, const wire::ClientReply& reply
   for (const Waiter& waiter : waiters) send(waiter, reply);
 }
 
-void ClientGateway::send(const Waiter& waiter, wire::ClientReply reply) {
+void ClientGateway::send(const Waiter& waiter, proto::ReplyEnvelope reply) {
   callbacks_.paths.hide_in(reply);
+  reply.set_request_id(waiter.request);
   std::string bytes;
   try {
-    bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = reply});
+    bytes = wire::encode(std::move(reply));
   } catch (const Error& error) {
-    bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = refusal(error.what())});
+    proto::ReplyEnvelope refused = wire::error_reply(error.what());
+    refused.set_request_id(waiter.request);
+    bytes = wire::encode(std::move(refused));
   }
   callbacks_.transmit(waiter.routing_id, bytes);
 }
 
 void ClientGateway::review() {
   const TimePoint now = callbacks_.now();
+  proto::ReplyEnvelope wait;
+  wait.mutable_wait();
   parts_.drop_stale(now);
   for (auto& [ticket, pending] : pending_) {
     if (now - pending.told_at < told_every) continue;
     pending.told_at = now;
-    for (const Waiter& waiter : pending.waiters) send(waiter, wire::WaitReply{});
+    for (const Waiter& waiter : pending.waiters) send(waiter, wait);
   }
 }
 

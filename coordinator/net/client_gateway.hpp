@@ -8,48 +8,30 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/peers.hpp"
 #include "coordinator/net/server_paths.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/wire/client_codec.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
-/// A SubmitRequest whose definition has been read.
-struct Submission {
-  /// Valid, with its table columns; shared with the work that stores it.
-  std::shared_ptr<const Campaign> campaign;
-  std::optional<int> priority = {};
-  std::optional<double> audit_fraction = {};
-  std::string stop_rule = {};
-  std::optional<std::uint64_t> failures_max = {};
+/// What a client asks for, ready to be carried out.
+struct Request {
+  proto::RequestEnvelope message;  ///< It has been checked.
+  /// Of a submission: what its definition says, which the message does not hold any more. Valid,
+  /// with its table columns; shared with the work that stores it.
+  std::shared_ptr<const Campaign> campaign = nullptr;
 };
-
-namespace detail {
-
-template <typename Sent>
-struct ReadyToCarryOut;
-template <typename... Sent>
-struct ReadyToCarryOut<std::variant<Sent...>> {
-  using type = std::variant<
-      std::conditional_t<std::is_same_v<Sent, wire::SubmitRequest>, Submission, Sent>...>;
-};
-
-}  // namespace detail
-
-/// What a client asks for, ready to be carried out: a Submission in place of the SubmitRequest.
-using Request = detail::ReadyToCarryOut<wire::ClientRequest>::type;
 
 /// @throws DefinitionError if a submission's definition is not one.
-[[nodiscard]] Request request_of(wire::ClientRequest sent);
+[[nodiscard]] Request request_of(proto::RequestEnvelope message);
 
 /// Joins requests that are too large for one message from their parts. A connection has one such
 /// request at a time: the first part of another one replaces it.
@@ -59,7 +41,7 @@ class RequestParts {
   struct Whole {
     std::string bytes;
   };
-  using Outcome = std::variant<wire::PartReply, Whole, wire::ErrorReply>;
+  using Outcome = std::variant<Whole, proto::ReplyEnvelope>;
 
   /// @param size_max  Of all requests together, bytes. Room for a request is taken with its first
   ///                  part.
@@ -67,7 +49,7 @@ class RequestParts {
 
   /// @param connection  Its routing id.
   [[nodiscard]] Outcome take(const std::string& connection, std::uint64_t request,
-                             const wire::RequestPart& part, TimePoint now);
+                             const proto::RequestPart& part, TimePoint now);
 
   /// The bytes of a whole request have been read and freed.
   void release(std::size_t size);
@@ -92,9 +74,6 @@ class RequestParts {
   std::size_t size_held_ = 0;  ///< Counted by total_size; with whole ones until release().
   Connections unfinished_;
 };
-
-/// Answers a request, now or later; called once, in the service's thread.
-using Respond = std::function<void(wire::ClientReply)>;
 
 /// Stands between the clients' socket and the RequestService: checks messages, reads large requests
 /// in the background, and sends each reply to all connections that wait for it. It knows no socket.
@@ -144,15 +123,15 @@ class ClientGateway {
   };
 
   void take(const Incoming& message);
-  void take_part(const Address& from, std::uint64_t request, const wire::RequestPart& part);
+  void take_part(const Address& from, std::uint64_t request, const proto::RequestPart& part);
   void take_whole(const Address& from, std::uint64_t request, std::string bytes);
   void carry_out(std::uint64_t ticket, const std::string& key, Request request);
   /// Lets a waiter join those of a request that is being carried out already.
   /// @return The ticket of a request that is not; nothing otherwise.
   std::optional<std::uint64_t> begin(const Address& from, std::uint64_t request,
                                      std::string_view bytes);
-  void respond(std::uint64_t ticket, const wire::ClientReply& reply);
-  void send(const Waiter& waiter, wire::ClientReply reply);
+  void respond(std::uint64_t ticket, const proto::ReplyEnvelope& reply);
+  void send(const Waiter& waiter, proto::ReplyEnvelope reply);
 
   Background& background_;
   Callbacks callbacks_;

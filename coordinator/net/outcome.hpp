@@ -2,20 +2,34 @@
 
 #include <exception>
 #include <functional>
+#include <string>
 
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
+
+/// Answers a request, now or later; called once, in the service's thread.
+using Respond = std::function<void(proto::ReplyEnvelope)>;
 
 /// The reply of an action, or the reason why it throws. What is done for a request in its
 /// background part goes through here, because a client waits for as long as its request is not
 /// answered.
-[[nodiscard]] inline wire::ClientReply outcome_of(
-    const std::function<wire::ClientReply()>& action) {
+[[nodiscard]] inline proto::ReplyEnvelope outcome_of(
+    const std::function<proto::ReplyEnvelope()>& action) {
   try {
     return action();
   } catch (const std::exception& error) {
-    return wire::ErrorReply{error.what()};
+    return wire::error_reply(error.what());
+  }
+}
+
+/// Why an action throws; empty if it does not.
+[[nodiscard]] inline std::string failure_of(const std::function<void()>& action) {
+  try {
+    action();
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.hpp"
+#include "proto/proofmass.pb.h"
 
 namespace proofmass::coordinator {
 
@@ -66,11 +67,11 @@ std::vector<WorkerId> Peers::workers() const {
   return workers;
 }
 
-wire::Header Peers::next_header(WorkerId worker, wire::Epoch epoch) {
+void Peers::address(WorkerId worker, proto::Envelope& message) {
   const auto found = peers_.find(worker);
   PROOFMASS_EXPECT(found != peers_.end());
-  Peer& peer = found->second;
-  return {.session = peer.session, .epoch = epoch, .sequence = ++peer.num_sent};
+  message.set_session(found->second.session.value);
+  message.set_sequence(++found->second.num_sent);
 }
 
 void Peers::forget(WorkerId worker) {

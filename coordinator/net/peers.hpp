@@ -14,6 +14,10 @@
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass::proto {
+class Envelope;
+}  // namespace proofmass::proto
+
 namespace proofmass::coordinator {
 
 /// Where a message came from, as the transport has it.
@@ -67,9 +71,9 @@ class Peers {
   /// All whose addresses are known.
   [[nodiscard]] std::vector<wire::WorkerId> workers() const;
 
-  /// What the next message to a known worker must say: session and ascending number.
+  /// Addresses the next message to a known worker: writes its session and an ascending number.
   /// @pre address_of(worker) is not null.
-  [[nodiscard]] wire::Header next_header(wire::WorkerId worker, wire::Epoch epoch);
+  void address(wire::WorkerId worker, proto::Envelope& message);
 
   void forget(wire::WorkerId worker);
 

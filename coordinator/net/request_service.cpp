@@ -10,10 +10,8 @@
 #include <set>
 #include <string_view>
 #include <utility>
-#include <variant>
 
 #include "coordinator/dispatch/workers.hpp"
-#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
@@ -49,9 +47,10 @@ void require_possible(const wire::CampaignStatus& campaign, wire::ControlAction 
   if (is_retry && campaign.num_given_up == 0) refuse("has no run that was given up");
 }
 
-StopPlan plan_of(const Submission& request) {
-  StopPlan plan{
-      .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
+StopPlan plan_of(const Request& request) {
+  const proto::SubmitRequest& sent = request.message.submit();
+  StopPlan plan{.stop_rule = sent.stop_rule(), .num_runs_max = {}, .failures_max = {}};
+  if (sent.has_failures_max()) plan.failures_max = sent.failures_max();
   if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign->num_runs;
   return plan;
 }
@@ -60,7 +59,7 @@ void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
 
 /// What cannot be read at all is left to the command that answers, which says why.
 /// @throws Error if another campaign's file has taken the place of this one's.
-void require_own_file(const CampaignService::Entry& campaign) {
+void require_own_file(const CampaignRecord& campaign) {
   try {
     if (peek_campaign(campaign.file).id == campaign.id) return;
   } catch (const StoreError&) {
@@ -84,12 +83,11 @@ void require_own_file(const CampaignService::Entry& campaign) {
 
 }  // namespace
 
-RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns,
-                               const DirectoryService& directory)
+RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
     : context_(context),
       campaigns_(campaigns),
-      directory_(directory),
       began_at_(context.now()),
+      paths_(context.config.answer_directory.parent_path()),
       answers_(context) {}
 
 wire::StatusReply RequestService::service_status() const {
@@ -102,8 +100,8 @@ wire::StatusReply RequestService::service_status() const {
                           .num_slots = state.num_slots,
                           .campaigns = {},
                           .num_campaigns = campaigns_.num_campaigns(),
-                          .unserved_files = directory_.unserved(wire::unserved_files_per_reply_max),
-                          .num_unserved_files = directory_.num_unserved(),
+                          .unserved_files = campaigns_.unserved(wire::unserved_files_per_reply_max),
+                          .num_unserved_files = campaigns_.num_unserved(),
                           .factories = factories_.current(now)};
   const std::set<std::string> hosts = quarantined_hosts(state);
   reply.num_quarantined_hosts = hosts.size();
@@ -114,105 +112,110 @@ wire::StatusReply RequestService::service_status() const {
   return reply;
 }
 
-template <>
-void RequestService::take(Submission&& submission, const Asker& asker, const Respond& respond) {
-  submit(std::make_shared<const Submission>(std::move(submission)), asker, respond);
-}
-
-template <>
-void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  const auto campaign = campaigns_.find(request.campaign);
+void RequestService::control(const proto::ControlRequest& request, const Asker& asker,
+                             const Respond& respond) {
+  const std::string& name = request.campaign();
+  const auto action = static_cast<wire::ControlAction>(request.action());
+  const auto campaign = campaigns_.find(name);
   if (!campaign) {
     require_right(asker, Right::submit);
-    throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+    throw Error(fmt::format("campaign = {} (is not served)", name));
   }
-  require_control(asker, request.campaign, campaign->owner);
-  require_possible(campaigns_.status_of(campaign->id), request.action);
-  if (request.action == wire::ControlAction::archive) {
-    if (under_way_.contains(request.campaign)) refuse_as_under_way(request.campaign);
+  require_control(asker, name, campaign->status.owner);
+  require_possible(campaign->status, action);
+  if (action == wire::ControlAction::archive) {
+    if (under_way_.contains(name)) refuse_as_under_way(name);
     return campaigns_.archive(campaign->id, respond);
   }
-  if (campaign->is_closed) return control_ended(*campaign, request.action, respond);
-  check_limits(request.campaign, *campaign, request.action);
-  respond(campaigns_.control(campaign->id, request));
-}
-
-void RequestService::control_ended(const CampaignService::Entry& campaign,
-                                   wire::ControlAction action, const Respond& respond) {
-  if (action == wire::ControlAction::resume || action == wire::ControlAction::retry) {
-    return reopen(campaign, action, respond);
+  if (campaign->is_closed) {
+    const bool begins =
+        action == wire::ControlAction::resume || action == wire::ControlAction::retry;
+    return begins ? reopen(*campaign, action, respond)
+                  : respond(campaigns_.done_reply(campaign->id));
   }
-  respond(campaigns_.done_reply(campaign.id));
+  check_limits(name, *campaign, action);
+  respond(campaigns_.control(campaign->id, action, request.priority()));
 }
 
-template <>
-void RequestService::take(wire::StatusRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
-  wire::StatusReply reply = service_status();
-  reply.campaigns = campaigns_.statuses(request.first_campaign, wire::campaigns_per_reply_max);
-  respond(std::move(reply));
+proto::ReplyEnvelope RequestService::status(const proto::StatusRequest& request) const {
+  wire::StatusReply status = service_status();
+  for (CampaignRecord& campaign :
+       campaigns_.records(request.first_campaign(), wire::campaigns_per_reply_max)) {
+    status.campaigns.push_back(std::move(campaign.status));
+  }
+  paths_.hide_in(status);
+  proto::ReplyEnvelope reply;
+  wire::write(status, *reply.mutable_status());
+  return reply;
 }
 
-template <>
-void RequestService::take(wire::WorkersRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
+proto::ReplyEnvelope RequestService::workers(const proto::WorkersRequest& request) const {
   const State& state = context_.state;
   const TimePoint now = context_.now();
-  wire::WorkersReply reply{.workers = {}, .num_workers = state.workers.size()};
-  for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id});
-       item != state.workers.end() && reply.workers.size() < wire::workers_per_reply_max; ++item) {
+  wire::WorkersReply workers{.workers = {}, .num_workers = state.workers.size()};
+  for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id()});
+       item != state.workers.end() && workers.workers.size() < wire::workers_per_reply_max;
+       ++item) {
     const auto& [id, worker] = *item;
-    reply.workers.push_back(status_of(state, id, worker, now));
+    workers.workers.push_back(record_of(state, id, worker, now).status);
   }
-  respond(std::move(reply));
+  proto::ReplyEnvelope reply;
+  wire::write(workers, *reply.mutable_workers());
+  return reply;
 }
 
-template <>
-void RequestService::take(wire::ReleaseHostRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::control);
-  if (!on_release_host(context_.state, request.host, context_.now(), context_.outbox)) {
-    throw Error(fmt::format("host = {} (is not in quarantine)", request.host));
+proto::ReplyEnvelope RequestService::release_host(const std::string& host) {
+  if (!on_release_host(context_.state, host, context_.now(), context_.outbox)) {
+    throw Error(fmt::format("host = {} (is not in quarantine)", host));
   }
-  respond(
-      wire::DoneReply{fmt::format("host {}: runs are lent to its workers again", request.host)});
+  return wire::done_reply(fmt::format("host {}: runs are lent to its workers again", host));
 }
 
-template <>
-void RequestService::take(wire::AnswerRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
-  const auto campaign = campaigns_.find(request.campaign);
-  if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+void RequestService::ask(const proto::AnswerRequest& request, const Asker& asker,
+                         const Respond& respond) {
+  const auto campaign = campaigns_.find(request.campaign());
+  if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign()));
   require_own_file(*campaign);
   answers_.ask(request, campaign->file, asker, respond);
 }
 
-template <>
-void RequestService::take(wire::AnswerPartRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
-  respond(answers_.part(request, asker));
-}
-
-template <>
-void RequestService::take(wire::FactoryReport&& report, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
+proto::ReplyEnvelope RequestService::take(const wire::FactoryReport& report, const Asker& asker) {
   factories_.take(report, asker.name, context_.now());
-  respond(wire::DoneReply{fmt::format("factory {}: noted", report.name)});
-}
-
-template <>
-void RequestService::take(wire::RequestPart&&, const Asker&, const Respond&) {
-  throw Error("request = a part (must be a request when its parts are together)");
+  return wire::done_reply(fmt::format("factory {}: noted", report.name));
 }
 
 void RequestService::carry_out(Request request, const Asker& asker, Respond respond) {
-  std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
+  const proto::RequestEnvelope& message = request.message;
+  const auto may_observe = [&] { require_right(asker, Right::observe); };
+  switch (message.request_case()) {
+    case proto::RequestEnvelope::kSubmit:
+      return submit(std::make_shared<const Request>(std::move(request)), asker, respond);
+    case proto::RequestEnvelope::kStatus:
+      may_observe();
+      return respond(status(message.status()));
+    case proto::RequestEnvelope::kWorkers:
+      may_observe();
+      return respond(workers(message.workers()));
+    case proto::RequestEnvelope::kControl:
+      return control(message.control(), asker, respond);
+    case proto::RequestEnvelope::kPart:
+      throw Error("request = a part (must be a request when its parts are together)");
+    case proto::RequestEnvelope::kReleaseHost:
+      require_right(asker, Right::control);
+      return respond(release_host(message.release_host().host()));
+    case proto::RequestEnvelope::kAnswer:
+      may_observe();
+      return ask(message.answer(), asker, respond);
+    case proto::RequestEnvelope::kAnswerPart:
+      may_observe();
+      return respond(answers_.part(message.answer_part(), asker));
+    case proto::RequestEnvelope::kFactoryReport:
+      may_observe();
+      return respond(take(wire::read(message.factory_report()), asker));
+    case proto::RequestEnvelope::REQUEST_NOT_SET:
+      break;
+  }
+  PROOFMASS_EXPECT(false);
 }
 
 // Submissions.
@@ -226,9 +229,9 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
                     "start one with --directory",
                     name));
   }
-  const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
+  const std::optional<CampaignRecord> entry = campaigns_.find(name);
   if (entry) {
-    require_control(asker, name, entry->owner);
+    require_control(asker, name, entry->status.owner);
   } else {
     require_right(asker, Right::submit);
   }
@@ -237,7 +240,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
     return;
   }
-  UnderWay under_way{.owner = entry ? entry->owner : asker.name,
+  UnderWay under_way{.owner = entry ? entry->status.owner : asker.name,
                      .added = added_by(*request, entry)};
   check_limits(name, under_way.owner, under_way.added);
   if (entry && !entry->is_closed) {
@@ -249,7 +252,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
 
 bool RequestService::is_busy(const std::string& name) const {
   if (under_way_.contains(name)) return true;
-  const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
+  const std::optional<CampaignRecord> entry = campaigns_.find(name);
   return entry && !entry->is_closed && campaigns_.is_held(entry->id);
 }
 
@@ -259,7 +262,7 @@ void RequestService::review() {
     try {
       submit(waiting.request, waiting.asker, waiting.respond);
     } catch (const std::exception& error) {
-      waiting.respond(wire::ErrorReply{error.what()});
+      waiting.respond(wire::error_reply(error.what()));
     }
   }
 }
@@ -267,7 +270,7 @@ void RequestService::review() {
 // More runs of an unfinished campaign may make its tables larger. One that has ended begins again
 // if it was cancelled, gets more runs, or has a stop rule that was not checked yet.
 RequestService::Holdings RequestService::added_by(
-    const Submission& request, const std::optional<CampaignService::Entry>& entry) const {
+    const Request& request, const std::optional<CampaignRecord>& entry) const {
   const Holdings wanted{.num_campaigns = 1, .size = definition_size(*request.campaign)};
   if (!entry || entry->is_closed) return wanted;
   const CampaignId id = entry->id;
@@ -279,16 +282,17 @@ RequestService::Holdings RequestService::added_by(
   const std::uint64_t num_runs_now = campaigns_.num_runs_of(id);
   const bool has_more = horizon_of(plan, request.campaign->num_runs, num_runs_now) > num_runs_now;
   const bool has_new_rule = !plan.stop_rule.empty() && plan != campaigns_.plan_of(id);
-  const bool is_cancelled = campaigns_.status_of(id).phase == Phase::cancelled;
+  const bool is_cancelled = entry->status.phase == Phase::cancelled;
   return has_more || has_new_rule || is_cancelled ? wanted : Holdings{};
 }
 
-void RequestService::check_limits(const std::string& campaign, const CampaignService::Entry& entry,
+void RequestService::check_limits(const std::string& campaign, const CampaignRecord& entry,
                                   wire::ControlAction action) const {
   const bool begins = action == wire::ControlAction::resume || action == wire::ControlAction::retry;
   if (!begins || campaigns_.holdings_of(entry.id).num_campaigns > 0) return;
   const Campaign& definition = *context_.state.campaigns.at(entry.id).definition;
-  check_limits(campaign, entry.owner, {.num_campaigns = 1, .size = definition_size(definition)});
+  check_limits(campaign, entry.status.owner,
+               {.num_campaigns = 1, .size = definition_size(definition)});
 }
 
 // Files without an owner, and all files of a coordinator without keys, are not limited: a client
@@ -318,8 +322,8 @@ void RequestService::check_limits(const std::string& campaign, const std::string
 }
 
 void RequestService::open_file(const Submitted& request, const Asker& asker,
-                               const std::optional<CampaignService::Entry>& closed,
-                               UnderWay under_way, Respond respond) {
+                               const std::optional<CampaignRecord>& closed, UnderWay under_way,
+                               Respond respond) {
   CampaignFiles& files = *context_.config.files;
   serve_opened(
       request->campaign->name, std::move(under_way),
@@ -329,53 +333,50 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
                       : files.open(*request->campaign, plan, asker);
       },
       [request](Store& store) {
-        const CampaignControl control = store.control();
-        write(store, CampaignControl{.phase = Phase::active,
-                                     .priority = request->priority.value_or(control.priority),
-                                     .audit_fraction =
-                                         request->audit_fraction.value_or(control.audit_fraction)});
+        const proto::SubmitRequest& sent = request->message.submit();
+        CampaignControl control = store.control();
+        control.phase = Phase::active;
+        if (sent.has_priority()) control.priority = sent.priority();
+        if (sent.has_audit_fraction()) control.audit_fraction = sent.audit_fraction();
+        write(store, control);
       },
       std::move(respond));
 }
 
-void RequestService::reopen(const CampaignService::Entry& campaign, wire::ControlAction action,
+void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction action,
                             Respond respond) {
-  const wire::CampaignStatus status = campaigns_.status_of(campaign.id);
+  const wire::CampaignStatus& status = campaign.status;
   if (under_way_.contains(status.name)) refuse_as_under_way(status.name);
-  if (campaign.owner.empty()) {
+  if (campaign.status.owner.empty()) {
     return reopen_measured(status.name, campaign, action, 0, std::move(respond));
   }
-  check_limits(status.name, campaign.owner, {.num_campaigns = 1, .size = 0});
+  check_limits(status.name, campaign.status.owner, {.num_campaigns = 1, .size = 0});
   // What its definition takes is known when the file is read, which must not change if that is too
   // much: so it is opened twice.
   const auto work = [this, &directory = *context_.config.directory, name = status.name, campaign,
                      action, respond]() -> Background::Finish {
     std::uint64_t size = 0;
-    std::string failure;
-    try {
-      size = definition_size(*directory.load(campaign.file).definition);
-    } catch (const std::exception& error) {
-      failure = error.what();
-    }
+    const std::string failure =
+        failure_of([&] { size = definition_size(*directory.load(campaign.file).definition); });
     return [this, name, campaign, action, size, failure, respond] {
       under_way_.erase(name);
-      if (!failure.empty()) return respond(wire::ErrorReply{failure});
+      if (!failure.empty()) return respond(wire::error_reply(failure));
       try {
         reopen_measured(name, campaign, action, size, respond);
       } catch (const std::exception& error) {
-        respond(wire::ErrorReply{error.what()});
+        respond(wire::error_reply(error.what()));
       }
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();
-  under_way_.emplace(status.name, UnderWay{.owner = campaign.owner, .added = {.num_campaigns = 1}});
+  under_way_.emplace(status.name,
+                     UnderWay{.owner = campaign.status.owner, .added = {.num_campaigns = 1}});
 }
 
-void RequestService::reopen_measured(const std::string& name,
-                                     const CampaignService::Entry& campaign,
+void RequestService::reopen_measured(const std::string& name, const CampaignRecord& campaign,
                                      wire::ControlAction action, std::uint64_t size,
                                      Respond respond) {
-  UnderWay under_way{.owner = campaign.owner, .added = {.num_campaigns = 1, .size = size}};
+  UnderWay under_way{.owner = campaign.status.owner, .added = {.num_campaigns = 1, .size = size}};
   check_limits(name, under_way.owner, under_way.added);
   const CampaignDirectory& directory = *context_.config.directory;
   serve_opened(
@@ -396,23 +397,20 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
   const auto work = [this, name, open = std::move(open), activate = std::move(activate),
                      respond]() -> Background::Finish {
     // Copyable, as the function is.
-    const auto prepared = std::make_shared<std::optional<PreparedCampaign>>();
+    const auto look = std::make_shared<FileLook>();
     std::filesystem::path made;
-    std::string failure;
-    try {
+    const std::string failure = failure_of([&] {
       ServedCampaign campaign = open();
       if (campaign.is_new) made = campaign.file;
       activate(campaign.store);
-      *prepared = prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
-    } catch (const std::exception& error) {
-      failure = error.what();
-      if (!made.empty()) remove_made(made);
-    }
-    return [this, name, prepared, failure, respond] {
+      *look = prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
+    });
+    if (!failure.empty() && !made.empty()) remove_made(made);
+    return [this, name, look, made, failure, respond] {
       under_way_.erase(name);
-      respond(outcome_of([&]() -> wire::ClientReply {
-        if (!*prepared) return wire::ErrorReply{failure};
-        return serve(std::move(**prepared));
+      respond(outcome_of([&] {
+        if (!failure.empty()) return wire::error_reply(failure);
+        return serve(std::move(*look), made);
       }));
     };
   };
@@ -421,14 +419,12 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
 }
 
 // A campaign of that name may have come into the directory while the file was made.
-wire::DoneReply RequestService::serve(PreparedCampaign prepared) {
-  const CampaignId id = prepared.campaign.store.id();
-  const bool is_new = prepared.campaign.is_new;
-  const std::filesystem::path file = prepared.campaign.file;
+proto::ReplyEnvelope RequestService::serve(FileLook look, const std::filesystem::path& made) {
+  const CampaignId id = look.record.id;
   try {
-    campaigns_.serve(std::move(prepared));
+    campaigns_.add(std::move(look));
   } catch (const std::exception&) {
-    if (is_new && !campaigns_.is_served(id)) remove_made(file);
+    if (!made.empty() && !campaigns_.is_served(id)) remove_made(made);
     throw;
   }
   campaigns_.review();
@@ -443,13 +439,12 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
   const bool has_new_plan = plan != campaigns_.plan_of(id);
   campaigns_.take_hold(id);
   const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
-                     file = campaigns_.file_of(id)]() -> Background::Finish {
-    CampaignService::Change change{.definition = nullptr,
-                                   .plan = plan,
-                                   .priority = request->priority,
-                                   .audit_fraction = request->audit_fraction};
-    std::string failure;
-    try {
+                     file = campaigns_.record_of(id).file]() -> Background::Finish {
+    const proto::SubmitRequest& sent = request->message.submit();
+    CampaignService::Change change{.definition = nullptr, .plan = plan};
+    if (sent.has_priority()) change.priority = sent.priority();
+    if (sent.has_audit_fraction()) change.audit_fraction = sent.audit_fraction();
+    const std::string failure = failure_of([&] {
       const std::unique_ptr<Campaign> wanted = request->campaign->clone();
       wanted->num_runs = num_runs;
       context_.config.files->require_same(file, *wanted);
@@ -457,14 +452,12 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
         change.definition = context_.config.files->extend(store, *wanted);
         if (has_new_plan) store.set_stop_plan(plan);
       });
-    } catch (const std::exception& error) {
-      failure = error.what();
-    }
+    });
     return [this, id, name = request->campaign->name, change, failure, respond] {
       under_way_.erase(name);
       if (!failure.empty()) {
         campaigns_.let_go(id);
-        return respond(wire::ErrorReply{failure});
+        return respond(wire::error_reply(failure));
       }
       respond(outcome_of([&] {
         campaigns_.change(id, change);

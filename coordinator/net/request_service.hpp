@@ -13,11 +13,10 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/directory_service.hpp"
+#include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/factory_reports.hpp"
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_context.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -25,9 +24,8 @@ namespace proofmass::coordinator {
 /// made, opened and extended in the background, so that the service goes on meanwhile.
 class RequestService {
  public:
-  /// @param campaigns, directory  Outlive this object.
-  RequestService(const ServiceContext& context, CampaignService& campaigns,
-                 const DirectoryService& directory);
+  /// @param campaigns  Outlives this object.
+  RequestService(const ServiceContext& context, CampaignService& campaigns);
 
   /// Responds at once, or later if a file must be opened, made or extended, or if the campaign of a
   /// submission is being changed, opened or closed.
@@ -43,7 +41,7 @@ class RequestService {
   void review();
 
  private:
-  using Submitted = std::shared_ptr<const Submission>;
+  using Submitted = std::shared_ptr<const Request>;
 
   using Holdings = CampaignService::Holdings;
 
@@ -60,33 +58,33 @@ class RequestService {
     Respond respond;
   };
 
-  /// Has a specialisation for each kind of Request.
-  template <typename Content>
-  void take(Content&& request, const Asker& asker, const Respond& respond) = delete;
-  void control_ended(const CampaignService::Entry& campaign, wire::ControlAction action,
-                     const Respond& respond);
+  void control(const proto::ControlRequest& request, const Asker& asker, const Respond& respond);
+  [[nodiscard]] proto::ReplyEnvelope status(const proto::StatusRequest& request) const;
+  [[nodiscard]] proto::ReplyEnvelope workers(const proto::WorkersRequest& request) const;
+  [[nodiscard]] proto::ReplyEnvelope release_host(const std::string& host);
+  void ask(const proto::AnswerRequest& request, const Asker& asker, const Respond& respond);
+  [[nodiscard]] proto::ReplyEnvelope take(const wire::FactoryReport& report, const Asker& asker);
 
   void submit(const Submitted& request, const Asker& asker, Respond respond);
   [[nodiscard]] bool is_busy(const std::string& name) const;
   /// What a submission adds to the unfinished campaigns of an owner.
   /// @param entry  The campaign, if it is known.
-  [[nodiscard]] Holdings added_by(const Submission& request,
-                                  const std::optional<CampaignService::Entry>& entry) const;
+  [[nodiscard]] Holdings added_by(const Request& request,
+                                  const std::optional<CampaignRecord>& entry) const;
   /// To be asked wherever a request makes a campaign active or larger.
   /// @throws Error if its owner would have more than SubmissionLimits allow.
   void check_limits(const std::string& campaign, const std::string& owner,
                     const Holdings& added) const;
   /// check_limits() for an action on a campaign whose file is open.
-  void check_limits(const std::string& campaign, const CampaignService::Entry& entry,
+  void check_limits(const std::string& campaign, const CampaignRecord& entry,
                     wire::ControlAction action) const;
   /// @param closed  The campaign if it has been served; otherwise its file may have to be made.
   void open_file(const Submitted& request, const Asker& asker,
-                 const std::optional<CampaignService::Entry>& closed, UnderWay under_way,
-                 Respond respond);
+                 const std::optional<CampaignRecord>& closed, UnderWay under_way, Respond respond);
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs, if its owner
   /// may have it unfinished.
-  void reopen(const CampaignService::Entry& campaign, wire::ControlAction action, Respond respond);
-  void reopen_measured(const std::string& name, const CampaignService::Entry& campaign,
+  void reopen(const CampaignRecord& campaign, wire::ControlAction action, Respond respond);
+  void reopen_measured(const std::string& name, const CampaignRecord& campaign,
                        wire::ControlAction action, std::uint64_t size, Respond respond);
   void change_served(CampaignId id, const Submitted& request, UnderWay under_way, Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it. If that fails, a file that
@@ -95,13 +93,14 @@ class RequestService {
   void serve_opened(const std::string& name, UnderWay under_way,
                     std::function<ServedCampaign()> open, std::function<void(Store&)> activate,
                     Respond respond);
-  [[nodiscard]] wire::DoneReply serve(PreparedCampaign prepared);
+  /// @param made  The file if it was made for this campaign; else empty.
+  [[nodiscard]] proto::ReplyEnvelope serve(FileLook look, const std::filesystem::path& made);
 
   const ServiceContext& context_;
   CampaignService& campaigns_;
-  const DirectoryService& directory_;
   FactoryReports factories_;
   TimePoint began_at_;
+  ServerPaths paths_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
   Answers answers_;

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <system_error>
-#include <variant>
+
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -51,15 +52,11 @@ void ServerPaths::hide_in(wire::StatusReply& reply) const {
   }
 }
 
-void ServerPaths::hide_in(wire::ClientReply& reply) const {
-  if (auto* const status = std::get_if<wire::StatusReply>(&reply)) hide_in(*status);
-  if (auto* const done = std::get_if<wire::DoneReply>(&reply)) done->text = hidden_in(done->text);
-  if (auto* const error = std::get_if<wire::ErrorReply>(&reply)) {
-    error->text = hidden_in(error->text);
-  }
-  if (auto* const answer = std::get_if<wire::AnswerReply>(&reply)) {
-    answer->error_text = hidden_in(answer->error_text);
-  }
+void ServerPaths::hide_in(proto::ReplyEnvelope& reply) const {
+  const auto hide = [&](std::string* text) { *text = hidden_in(*text); };
+  if (reply.has_done()) hide(reply.mutable_done()->mutable_text());
+  if (reply.has_error()) hide(reply.mutable_error()->mutable_text());
+  if (reply.has_answer()) hide(reply.mutable_answer()->mutable_error_text());
 }
 
 }  // namespace proofmass::coordinator

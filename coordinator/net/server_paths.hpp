@@ -7,6 +7,10 @@
 
 #include "proto/wire/client_messages.hpp"
 
+namespace proofmass::proto {
+class ReplyEnvelope;
+}  // namespace proofmass::proto
+
 namespace proofmass::coordinator {
 
 /// Where a coordinator keeps its files, which concerns nobody on another machine: what is said to
@@ -20,8 +24,9 @@ class ServerPaths {
   /// The text with files of the directory named within it: `campaign database = a.db (is no file)`.
   /// Other paths stay: they are those that a client sent.
   [[nodiscard]] std::string hidden_in(std::string_view text) const;
-  /// Hides paths in all that the reply says of files and failures.
-  void hide_in(wire::ClientReply& reply) const;
+  /// Hides paths in all that the reply says of files and failures; in a status before it is
+  /// written, since that may change or cut a path.
+  void hide_in(proto::ReplyEnvelope& reply) const;
   void hide_in(wire::StatusReply& reply) const;
 
  private:

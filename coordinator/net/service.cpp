@@ -13,8 +13,7 @@
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/directory_service.hpp"
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/request_service.hpp"
 #include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_context.hpp"
@@ -54,12 +53,11 @@ class Service::Impl final : public Outbox {
         worker_gateway_(state_, start_.epoch, worker_callbacks()),
         context_{config_, start_, state_, writer_, background_, *this, [this] { return now(); }},
         campaign_service_(context_, history_),
-        directory_service_(context_, campaign_service_),
-        request_service_(context_, campaign_service_, directory_service_),
+        request_service_(context_, campaign_service_),
         client_gateway_(background_, client_callbacks()),
         background_([this] { sockets_.wake(); }) {
     limit_workers();
-    for (FileOutcome& outcome : beginning.campaigns) begin_with(std::move(outcome));
+    for (FileLook& look : beginning.campaigns) begin_with(std::move(look));
   }
 
   /// For all that is measured here and in the dispatch.
@@ -68,7 +66,7 @@ class Service::Impl final : public Outbox {
   [[nodiscard]] const CampaignService& campaign_service() const { return campaign_service_; }
   [[nodiscard]] const ServiceSockets& sockets() const { return sockets_; }
   [[nodiscard]] bool is_done() const {
-    return campaign_service_.is_all_done() && directory_service_.is_all_served();
+    return campaign_service_.is_all_done() && campaign_service_.is_all_served();
   }
   [[nodiscard]] bool has_storage_failed() const { return has_storage_failed_; }
 
@@ -83,14 +81,14 @@ class Service::Impl final : public Outbox {
 
   [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) {
     ServiceSnapshot snapshot{.status = request_service_.service_status(),
-                             .campaigns = campaign_service_.snapshots(),
+                             .campaigns = campaign_service_.records(),
                              .workers = {},
                              .num_leases = state_.leases.size(),
                              .num_sockets_reset = sockets_.num_resets(),
                              .num_messages_unsent = worker_gateway_.num_unsent()};
     add_workers(state_, now(), depth, snapshot);
     paths_.hide_in(snapshot.status);
-    for (CampaignSnapshot& campaign : snapshot.campaigns) {
+    for (CampaignRecord& campaign : snapshot.campaigns) {
       campaign.status.storage_failure = paths_.hidden_in(campaign.status.storage_failure);
     }
     return snapshot;
@@ -107,16 +105,15 @@ class Service::Impl final : public Outbox {
 
   // Outbox.
 
-  void send(WorkerId worker, wire::Message message) override {
-    if (std::holds_alternative<wire::Welcome>(message)) history_.note_registered(worker);
-    const auto* lease = std::get_if<wire::RunLease>(&message);
-    if (lease != nullptr) history_.note_lent(lease->campaign, worker);
+  void send(WorkerId worker, proto::Envelope message) override {
+    if (message.has_welcome()) history_.note_registered(worker);
+    if (message.has_run_lease()) history_.note_lent({message.run_lease().campaign()}, worker);
     worker_gateway_.send(worker, std::move(message));
   }
 
-  void send_definition(WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(WorkerId worker, CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override {
-    worker_gateway_.send_definition(worker, request, definition);
+    worker_gateway_.send_definition(worker, campaign, offset, definition);
   }
 
   void store(WorkerId worker, wire::LeasedResult result) override {
@@ -129,15 +126,10 @@ class Service::Impl final : public Outbox {
     writer_.compare(result.campaign, delivery_of(worker, std::move(result)));
   }
 
-  void record(const Loss& loss) override {
-    const auto session = worker_gateway_.peers().session_of(loss.worker);
-    history_.note_lent(loss.campaign, loss.worker);
-    history_.note_reason(loss.worker, loss.reason);
-    writer_.record_loss(loss.campaign, {.runs = loss.runs,
-                                        .attempt = loss.attempt,
-                                        .worker = session.value_or(SessionId{}),
-                                        .reason = loss.reason,
-                                        .is_blamed = loss.is_blamed});
+  void record(CampaignId campaign, WorkerId worker, const ReturnedRuns& returned) override {
+    history_.note_lent(campaign, worker);
+    history_.note_reason(worker, returned.reason);
+    writer_.record_loss(campaign, returned);
   }
 
   void give_up(CampaignId campaign, RunIndex run) override { writer_.give_up(campaign, run); }
@@ -170,11 +162,9 @@ class Service::Impl final : public Outbox {
   }
 
   /// Campaigns that are handed over are served or end the start; those of the directory may wait.
-  void begin_with(FileOutcome outcome) {
-    const auto* const prepared = std::get_if<PreparedCampaign>(&outcome);
-    const bool is_of_directory = config_.directory != nullptr || prepared == nullptr;
-    if (is_of_directory) return directory_service_.take(std::move(outcome));
-    campaign_service_.serve(std::get<PreparedCampaign>(std::move(outcome)));
+  void begin_with(FileLook look) {
+    if (config_.directory != nullptr) return campaign_service_.take(std::move(look));
+    campaign_service_.add(std::move(look));
   }
 
   WorkerGateway::Callbacks worker_callbacks() {
@@ -253,7 +243,7 @@ class Service::Impl final : public Outbox {
     ticked_at_ = now();
     on_tick(state_, ticked_at_, *this);
     campaign_service_.review();
-    directory_service_.review(ticked_at_);
+    campaign_service_.review_directory();
     request_service_.review();
     client_gateway_.review();
     history_.review();
@@ -400,7 +390,6 @@ class Service::Impl final : public Outbox {
   WorkerGateway worker_gateway_;
   ServiceContext context_;
   CampaignService campaign_service_;
-  DirectoryService directory_service_;
   RequestService request_service_;
   ClientGateway client_gateway_;
   std::optional<TimePoint> drained_until_;
@@ -428,7 +417,11 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
 }
 
 std::vector<wire::CampaignStatus> Service::campaigns() const {
-  return impl_->campaign_service().statuses(0, impl_->campaign_service().num_campaigns());
+  std::vector<wire::CampaignStatus> statuses;
+  for (CampaignRecord& campaign : impl_->campaign_service().records()) {
+    statuses.push_back(std::move(campaign.status));
+  }
+  return statuses;
 }
 
 ServiceSnapshot Service::snapshot(SnapshotDepth depth) const { return impl_->snapshot(depth); }

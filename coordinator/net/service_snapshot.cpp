@@ -3,35 +3,34 @@
 namespace proofmass::coordinator {
 
 std::string_view name_of(WorkerActivity activity) {
-  switch (activity) {
-    case WorkerActivity::computing:
-      return "computing";
-    case WorkerActivity::idle:
-      return "idle";
-    case WorkerActivity::silent:
-      return "silent";
-    case WorkerActivity::quarantined:
-      return "quarantined";
-  }
-  return "idle";
+  constexpr std::array<std::string_view, worker_activities.size()> names{"computing", "idle",
+                                                                         "silent", "quarantined"};
+  return names.at(static_cast<std::size_t>(activity));
 }
 
-wire::WorkerStatus status_of(const State& state, WorkerId id, const Worker& worker, TimePoint now) {
-  return {.id = id,
-          .name = worker.name,
-          .host = worker.host_name,
-          .process_id = worker.process_id,
-          .num_slots = worker.num_slots,
-          .num_lent = worker.num_lent,
-          .num_results = worker.num_results,
-          .silent_s = seconds(now - worker.heard_at),
-          .is_quarantined = state.quarantined.contains(worker.host)};
-}
+namespace {
 
 WorkerActivity activity_of(const State& state, const Worker& worker, TimePoint now) {
   if (state.quarantined.contains(worker.host)) return WorkerActivity::quarantined;
   if (now - worker.heard_at > state.config.suspect_after) return WorkerActivity::silent;
   return worker.num_lent > 0 ? WorkerActivity::computing : WorkerActivity::idle;
+}
+
+}  // namespace
+
+RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker, TimePoint now) {
+  const WorkerActivity activity = activity_of(state, worker, now);
+  return {.status = {.id = id,
+                     .name = worker.name,
+                     .host = worker.host_name,
+                     .process_id = worker.process_id,
+                     .num_slots = worker.num_slots,
+                     .num_lent = worker.num_lent,
+                     .num_results = worker.num_results,
+                     .silent_s = seconds(now - worker.heard_at),
+                     .is_quarantined = activity == WorkerActivity::quarantined},
+          .activity = activity,
+          .registered_s = seconds(now - worker.registered_at)};
 }
 
 void add_workers(const State& state, TimePoint now, SnapshotDepth depth,
@@ -41,10 +40,7 @@ void add_workers(const State& state, TimePoint now, SnapshotDepth depth,
   for (const auto& [id, worker] : state.workers) {
     const WorkerActivity activity = activity_of(state, worker, now);
     ++snapshot.num_workers_by_activity[static_cast<std::size_t>(activity)];
-    if (!is_listed) continue;
-    snapshot.workers.push_back({.status = status_of(state, id, worker, now),
-                                .activity = activity,
-                                .registered_s = seconds(now - worker.registered_at)});
+    if (is_listed) snapshot.workers.push_back(record_of(state, id, worker, now));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -26,26 +27,38 @@ inline constexpr std::array worker_activities{WorkerActivity::computing, WorkerA
 [[nodiscard]] std::string_view name_of(WorkerActivity activity);  ///< `computing`, `idle`, ...
 
 /// A registered worker.
-struct WorkerSnapshot {
+struct RegisteredWorker {
   wire::WorkerStatus status = {};
   WorkerActivity activity = WorkerActivity::idle;
   double registered_s = 0.0;  ///< Since it registered with this coordinator.
 };
 
-/// A campaign, served or ended.
-struct CampaignSnapshot {
-  wire::CampaignId id = {};  ///< Another campaign of the same name has another one.
-  wire::CampaignStatus status = {};
+/// Tells whether a file is still the one that it was, with the same content.
+struct FileStamp {
+  std::uint64_t inode = 0;
+  std::int64_t size = 0;
+  std::int64_t written_ns = 0;
+
+  bool operator==(const FileStamp&) const = default;
+};
+
+/// A campaign of a coordinator as it stands: served, or ended and its file closed.
+struct CampaignRecord {
+  wire::CampaignId id = {};         ///< Another campaign of the same name has another one.
   std::filesystem::path file = {};  ///< Its database.
-  std::uint64_t num_waiting = 0;    ///< Results that were delivered and are not stored yet.
+  wire::CampaignStatus status = {};
+  std::uint64_t num_waiting = 0;        ///< Results that were delivered and are not stored yet.
+  bool is_closed = false;               ///< It has ended, and its file is closed and complete.
+  std::optional<FileStamp> stamp = {};  ///< Of a closed file that was looked at since.
 };
 
 /// Everything about a service at one instant. It refers to nothing of the service, so that another
 /// thread may keep it.
 struct ServiceSnapshot {
-  wire::StatusReply status = {};                 ///< Without the campaigns, which are below.
-  std::vector<CampaignSnapshot> campaigns = {};  ///< All, in the order in which they came.
-  std::vector<WorkerSnapshot> workers = {};  ///< All, by number; none if they were not asked for.
+  TimePoint taken_at = {};        ///< By the clock of whoever keeps it; set by SnapshotBoard.
+  wire::StatusReply status = {};  ///< Without the campaigns, which are below.
+  std::vector<CampaignRecord> campaigns = {};  ///< All, in the order in which they came.
+  std::vector<RegisteredWorker> workers = {};  ///< All, by number; none if they were not asked for.
   /// Of each of worker_activities, whether or not `workers` lists them.
   std::array<std::uint64_t, worker_activities.size()> num_workers_by_activity{};
   std::uint64_t num_leases = 0;
@@ -56,10 +69,9 @@ struct ServiceSnapshot {
 /// How much a snapshot holds. A copy of 10,000 workers takes some milliseconds.
 enum class SnapshotDepth : std::uint8_t { without_workers, with_workers };
 
-/// The worker as a client sees it.
-[[nodiscard]] wire::WorkerStatus status_of(const State& state, WorkerId id, const Worker& worker,
-                                           TimePoint now);
-[[nodiscard]] WorkerActivity activity_of(const State& state, const Worker& worker, TimePoint now);
+/// The worker as it stands.
+[[nodiscard]] RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker,
+                                         TimePoint now);
 
 /// Counts the workers by activity and, if they are asked for, copies them.
 void add_workers(const State& state, TimePoint now, SnapshotDepth depth, ServiceSnapshot& snapshot);

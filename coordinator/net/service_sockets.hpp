@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "coordinator/net/authentication/authenticator.hpp"
-#include "coordinator/net/descriptors.hpp"
 #include "coordinator/net/memory_guard.hpp"
 #include "coordinator/net/router_socket.hpp"
 #include "coordinator/net/service.hpp"

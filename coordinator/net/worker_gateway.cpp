@@ -9,17 +9,12 @@
 #include "coordinator/dispatch/workers.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/codec.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using wire::KillPoint;
-using wire::RejectReason;
-
-template <typename Kind>
-bool is_a(const wire::Message& message) {
-  return std::holds_alternative<Kind>(message);
-}
 
 std::string revoked_text(const Address& address) {
   return fmt::format("key = {} (is not authorized any more)", address.key);
@@ -32,15 +27,11 @@ HostId host_of(const Address& from) {
           .address = from.host.starts_with(local) ? std::string(local) : from.host};
 }
 
-bool is_of_a_worker(const wire::Message& message) {
-  return wire::visit_if<wire::WorkerMessage>(message, [](const auto&) {});
-}
-
 }  // namespace
 
-wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
-                                           const std::shared_ptr<const Campaign>& definition) {
-  auto found = entries_.find(request.campaign);
+proto::DefinitionPart DefinitionCache::part(wire::CampaignId campaign, std::uint64_t offset,
+                                            const std::shared_ptr<const Campaign>& definition) {
+  auto found = entries_.find(campaign);
   if (found != entries_.end() && found->second.definition != definition) {
     size_ -= found->second.encoded.size();
     entries_.erase(found);
@@ -52,10 +43,10 @@ wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
                 .encoded = wire::EncodedDefinition(definition->definition(TableColumns::left_out))};
     size_ += entry.encoded.size();
     ++num_encoded_;
-    found = entries_.emplace(request.campaign, std::move(entry)).first;
+    found = entries_.emplace(campaign, std::move(entry)).first;
   }
   found->second.used = ++num_uses_;
-  return found->second.encoded.part(request);
+  return found->second.encoded.part(campaign, offset);
 }
 
 void DefinitionCache::make_room() {
@@ -74,97 +65,105 @@ WorkerGateway::WorkerGateway(State& state, wire::Epoch epoch, Callbacks callback
 void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outbox) {
   if (peers_.is_closed_out(message.from.routing_id)) return;
   if (!callbacks_.is_allowed(message.from.key, now)) {
-    return close_out(message.from, RejectReason::revoked, revoked_text(message.from), now, outbox);
+    return close_out(message.from, proto::REJECT_REASON_REVOKED, revoked_text(message.from), now,
+                     outbox);
   }
-  std::optional<wire::Packet> packet = decode(message, now, outbox);
-  if (!packet) return;
-  const wire::Header& header = packet->header;
-  const auto worker = peers_.meet(header.session, header.sequence, message.from);
+  google::protobuf::Arena arena;
+  const proto::Envelope* const envelope = decode(message, arena, now, outbox);
+  if (envelope == nullptr) return;
+  const auto worker = peers_.meet({envelope->session()}, envelope->sequence(), message.from);
   if (!worker) {
     return close_out(
-        message.from, RejectReason::malformed,
-        fmt::format("session = {} (must be one connection's and one key's)", header.session.value),
+        message.from, proto::REJECT_REASON_MALFORMED,
+        fmt::format("session = {} (must be one connection's and one key's)", envelope->session()),
         now, outbox);
   }
-  if (header.epoch != epoch_ && !is_a<wire::Hello>(packet->message)) {
+  if (envelope->epoch() != epoch_.value && !envelope->has_hello()) {
     return reject_unregistered(*worker, outbox);
   }
-  if (const auto* const bye = std::get_if<wire::Bye>(&packet->message)) {
-    callbacks_.on_leaving(*worker, bye->reason);
+  if (envelope->has_bye()) {
+    callbacks_.on_leaving(*worker, wire::loss_reason(envelope->bye().reason()));
   }
-  if (is_a<wire::ResultBatch>(packet->message)) wire::kill_point(KillPoint::after_receive);
-  on_packet(state_, *worker, host_of(message.from), *std::move(packet), now, outbox);
+  if (envelope->has_result_batch()) wire::kill_point(KillPoint::after_receive);
+  on_message(state_, *worker, host_of(message.from), *envelope, now, outbox);
 }
 
-std::optional<wire::Packet> WorkerGateway::decode(const Incoming& message, TimePoint now,
-                                                  Outbox& outbox) {
+const proto::Envelope* WorkerGateway::decode(const Incoming& message,
+                                             google::protobuf::Arena& arena, TimePoint now,
+                                             Outbox& outbox) {
   if (message.frames.size() != 1) {
-    close_out(message.from, RejectReason::malformed,
+    close_out(message.from, proto::REJECT_REASON_MALFORMED,
               fmt::format("message = {} frames (must be one)", message.frames.size()), now, outbox);
-    return std::nullopt;
+    return nullptr;
   }
-  auto decoded = wire::decode(message.frames.front());
+  const auto decoded = wire::decode(message.frames.front(), arena);
   if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
     const bool is_other_version = error->fault == wire::DecodeFault::wrong_version;
-    close_out(message.from, is_other_version ? RejectReason::incompatible : RejectReason::malformed,
+    close_out(message.from,
+              is_other_version ? proto::REJECT_REASON_INCOMPATIBLE : proto::REJECT_REASON_MALFORMED,
               error->text, now, outbox);
-    return std::nullopt;
+    return nullptr;
   }
-  auto& packet = std::get<wire::Packet>(decoded);
-  if (!is_of_a_worker(packet.message)) {
-    close_out(message.from, RejectReason::malformed,
+  const auto* const envelope = std::get<const proto::Envelope*>(decoded);
+  if (!wire::is_of_worker(*envelope)) {
+    close_out(message.from, proto::REJECT_REASON_MALFORMED,
               "message = one of a coordinator (must be one of a worker)", now, outbox);
-    return std::nullopt;
+    return nullptr;
   }
-  return std::move(packet);
+  return envelope;
 }
 
-void WorkerGateway::close_out(const Address& from, RejectReason reason, const std::string& text,
-                              TimePoint now, Outbox& outbox) {
+void WorkerGateway::close_out(const Address& from, proto::RejectReason reason,
+                              const std::string& text, TimePoint now, Outbox& outbox) {
   wire::Fields fields = fields_of(from);
   fields.push_back(Field::reason(text));
   outbox.log(
       {.severity = Severity::warning, .kind = "peer_closed_out", .fields = std::move(fields)});
-  const wire::Reject reject{.reason = reason, .text = text};
+  proto::Envelope reject = wire::rejection(reason, text);
   const auto worker = peers_.worker_at(from.routing_id);
   if (worker) {
-    send(*worker, reject);
+    send(*worker, std::move(reject));
     callbacks_.on_leaving(*worker, LossReason::protocol);
     on_gone(state_, *worker, LossReason::protocol, now, outbox);
     peers_.forget(*worker);
   } else {
     // The session is not known; the peer accepts any as its own.
-    send_packet(from,
-                {.header = {.session = {1}, .epoch = epoch_, .sequence = 1}, .message = reject});
+    reject.set_session(1);
+    reject.set_sequence(1);
+    transmit(from, std::move(reject));
   }
   peers_.close_out(from.routing_id);
 }
 
-void WorkerGateway::send(WorkerId worker, wire::Message message) {
+void WorkerGateway::send(WorkerId worker, proto::Envelope message) {
   const Address* const address = peers_.address_of(worker);
   if (address == nullptr) return;
-  const bool is_lease = is_a<wire::RunLease>(message);
-  const bool is_acknowledgement = is_a<wire::ResultAck>(message);
-  send_packet(*address,
-              {.header = peers_.next_header(worker, epoch_), .message = std::move(message)});
+  const bool is_lease = message.has_run_lease();
+  const bool is_acknowledgement = message.has_result_ack();
+  peers_.address(worker, message);
+  transmit(*address, std::move(message));
   if (is_lease) wire::kill_point(KillPoint::after_lend);
   if (is_acknowledgement) wire::kill_point(KillPoint::after_acknowledge);
 }
 
-void WorkerGateway::send_definition(WorkerId worker, const wire::CampaignRequest& request,
+void WorkerGateway::send_definition(WorkerId worker, wire::CampaignId campaign,
+                                    std::uint64_t offset,
                                     const std::shared_ptr<const Campaign>& definition) {
-  send(worker, definitions_.part(request, definition));
+  proto::Envelope envelope;
+  *envelope.mutable_definition_part() = definitions_.part(campaign, offset, definition);
+  send(worker, std::move(envelope));
 }
 
-void WorkerGateway::send_packet(const Address& to, const wire::Packet& packet) {
-  if (!callbacks_.transmit(to.routing_id, wire::encode(packet))) ++num_unsent_;
+void WorkerGateway::transmit(const Address& to, proto::Envelope message) {
+  message.set_epoch(epoch_.value);
+  if (!callbacks_.transmit(to.routing_id, wire::encode(std::move(message)))) ++num_unsent_;
 }
 
 void WorkerGateway::review(TimePoint now, Outbox& outbox) {
   for (const WorkerId worker : peers_.workers()) {
     const Address address = *peers_.address_of(worker);
     if (callbacks_.is_allowed(address.key, now)) continue;
-    close_out(address, RejectReason::revoked, revoked_text(address), now, outbox);
+    close_out(address, proto::REJECT_REASON_REVOKED, revoked_text(address), now, outbox);
   }
   peers_.limit([&](WorkerId worker) { return state_.workers.contains(worker); });
 }

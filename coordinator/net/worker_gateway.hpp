@@ -12,6 +12,7 @@
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/peers.hpp"
 #include "core/campaign/campaign.hpp"
+#include "proto/proofmass.pb.h"
 #include "proto/wire/definition_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -25,10 +26,10 @@ class DefinitionCache {
 
   explicit DefinitionCache(std::size_t size_max = default_size_max) : size_max_(size_max) {}
 
-  /// The answer to a request. @pre The definition was accepted as a submission: it is not too
-  /// large.
-  [[nodiscard]] wire::DefinitionPart part(const wire::CampaignRequest& request,
-                                          const std::shared_ptr<const Campaign>& definition);
+  /// The part of a campaign's definition that starts at the offset, or at 0 if that is beyond the
+  /// end. @pre The definition was accepted as a submission: it is not too large.
+  [[nodiscard]] proto::DefinitionPart part(wire::CampaignId campaign, std::uint64_t offset,
+                                           const std::shared_ptr<const Campaign>& definition);
 
   [[nodiscard]] std::uint64_t num_encoded() const { return num_encoded_; }  ///< So far.
   [[nodiscard]] std::size_t size() const { return size_; }                  ///< Bytes kept.
@@ -73,10 +74,10 @@ class WorkerGateway {
 
   /// Carries out Outbox::send(). A message for which the connection has no room is dropped and
   /// counted: the dispatch is made for that.
-  void send(WorkerId worker, wire::Message message);
+  void send(WorkerId worker, proto::Envelope message);
 
   /// Carries out Outbox::send_definition().
-  void send_definition(WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(WorkerId worker, wire::CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition);
 
   /// Ends the sessions of workers whose keys were revoked, and forgets strangers once there are too
@@ -88,11 +89,13 @@ class WorkerGateway {
   [[nodiscard]] std::uint64_t num_unsent() const { return num_unsent_; }
 
  private:
-  [[nodiscard]] std::optional<wire::Packet> decode(const Incoming& message, TimePoint now,
-                                                   Outbox& outbox);
-  void close_out(const Address& from, wire::RejectReason reason, const std::string& text,
+  /// Null if it is none of a worker: then the peer is closed out.
+  [[nodiscard]] const proto::Envelope* decode(const Incoming& message,
+                                              google::protobuf::Arena& arena, TimePoint now,
+                                              Outbox& outbox);
+  void close_out(const Address& from, proto::RejectReason reason, const std::string& text,
                  TimePoint now, Outbox& outbox);
-  void send_packet(const Address& to, const wire::Packet& packet);
+  void transmit(const Address& to, proto::Envelope message);
 
   State& state_;
   wire::Epoch epoch_;

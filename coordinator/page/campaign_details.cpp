@@ -13,8 +13,11 @@
 #include <iterator>
 #include <utility>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/net/server_paths.hpp"
-#include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/model.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -41,7 +44,7 @@ void append_events(const CampaignHistory& history, std::deque<StoredEvent>& even
   while (events.size() > page_events_max) events.pop_front();
 }
 
-std::shared_ptr<const CampaignEvents> read_events_of(const DetailSubject& campaign,
+std::shared_ptr<const CampaignEvents> read_events_of(const CampaignRecord& campaign,
                                                      const CampaignEvents* before) {
   auto now = before == nullptr ? std::make_shared<CampaignEvents>()
                                : std::make_shared<CampaignEvents>(*before);
@@ -59,21 +62,26 @@ std::shared_ptr<const CampaignEvents> read_events_of(const DetailSubject& campai
   return now;
 }
 
-std::uint64_t num_finished_in(const Store& store) {
-  std::uint64_t count = 0;
-  for (const RunRange& range : store.finished_runs()) count += range.count;
-  return count;
+/// A range of runs that has to be looked up costs as much as so many results of one range.
+constexpr std::uint64_t results_a_range = 32;
+
+/// The runs from `first` on, below `end`, that are not in the set.
+std::vector<RunRange> missing_from(const RunSet& runs, std::uint64_t first, std::uint64_t end) {
+  RunSet missing;
+  if (first < end) missing.add(RunRange{{first}, end - first});
+  missing.remove(runs);
+  return missing.ranges();
 }
 
 /// Whether the file has what was read before. To count its runs takes long, and is done only if the
 /// coordinator knows of fewer than were read.
-bool goes_on(const ResultsReading* reading, const Store& store, const DetailSubject& campaign) {
+bool goes_on(const ResultsReading* reading, const Store& store, const CampaignRecord& campaign) {
   if (reading == nullptr || !reading->is_of(store)) return false;
-  return reading->num_read() <= campaign.num_finished ||
-         reading->num_read() <= num_finished_in(store);
+  return reading->num_read() <= campaign.status.num_done ||
+         reading->num_read() <= num_runs_in(store.finished_runs());
 }
 
-std::shared_ptr<const CampaignResults> read_results_of(const DetailSubject& campaign,
+std::shared_ptr<const CampaignResults> read_results_of(const CampaignRecord& campaign,
                                                        const CampaignResults* before) {
   auto now = before == nullptr ? std::make_shared<CampaignResults>()
                                : std::make_shared<CampaignResults>(*before);
@@ -113,14 +121,14 @@ bool is_wanted(TimePoint asked_at, TimePoint now) {
   return now - asked_at < DetailReader::wanted_for;
 }
 
-bool is_same(const DetailSubject& a, const DetailSubject& b) {
+bool is_same(const CampaignRecord& a, const CampaignRecord& b) {
   return a.id == b.id && a.file == b.file;
 }
 
 /// Whether there is something to be read. There may be more results than are known to be finished,
 /// because a reading is newer than the number, or because the file is an older copy now.
-bool has_other_results(const CampaignResults* read, const DetailSubject& campaign) {
-  return read == nullptr || !read->failure.empty() || read->num_runs != campaign.num_finished;
+bool has_other_results(const CampaignResults* read, const CampaignRecord& campaign) {
+  return read == nullptr || !read->failure.empty() || read->num_runs != campaign.status.num_done;
 }
 
 /// What a reading that failed has is as old as before.
@@ -142,6 +150,29 @@ CampaignDetails without_room(TimePoint now) {
 }
 
 }  // namespace
+
+ResultsReading::ResultsReading(const Store& store)
+    : campaign_(store.id()), results_(*stored_campaign(store)) {}
+
+bool ResultsReading::is_of(const Store& store) const { return campaign_ == store.id(); }
+
+void ResultsReading::read_further(const Store& store, std::uint64_t num_results_max) {
+  std::uint64_t num_left = num_results_max;
+  for (const RunRange& range : missing_from(read_, next_run_, store.num_runs())) {
+    ResultReader reader = store.results(range);
+    while (const std::optional<RunResult> result = reader.next()) {
+      require_in_range(*result, model().results());
+      results_.add(*result);
+      read_.add(RunRange{result->run, 1});
+      next_run_ = result->run.value + 1;
+      if (--num_left == 0) return;
+    }
+    next_run_ = range.end();
+    num_left -= std::min(num_left, results_a_range);
+    if (num_left == 0) return;
+  }
+  next_run_ = 0;
+}
 
 DetailSources database_sources() {
   return {.read_events = read_events_of, .read_results = read_results_of};
@@ -167,8 +198,8 @@ DetailReader::~DetailReader() {
   thread_.join();
 }
 
-CampaignDetails DetailReader::details(const std::string& name, const DetailSubject& campaign,
-                                      TimePoint now) {
+CampaignDetails DetailReader::details(const CampaignRecord& campaign, TimePoint now) {
+  const std::string& name = campaign.status.name;
   const std::lock_guard lock(mutex_);
   if (!watched_.contains(name) && !make_room(now)) return without_room(now);
   Watched& watched = watched_[name];
@@ -216,7 +247,7 @@ std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
 }
 
 void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock) {
-  const DetailSubject campaign = watched_.at(choice.name).campaign;
+  const CampaignRecord campaign = watched_.at(choice.name).campaign;
   const CampaignDetails before = watched_.at(choice.name).details;
   lock.unlock();
   const TimePoint began_at = steady_now();

@@ -15,9 +15,11 @@
 #include <thread>
 #include <vector>
 
-#include "coordinator/dispatch/state.hpp"
-#include "coordinator/page/results_reading.hpp"
+#include "coordinator/dispatch/run_set.hpp"
+#include "coordinator/net/service_snapshot.hpp"
+#include "coordinator/report/live_results.hpp"
 #include "coordinator/store/campaign_history.hpp"
+#include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
 
@@ -28,6 +30,33 @@ inline constexpr std::size_t page_losses_max = 1'000;
 inline constexpr std::size_t page_given_up_max = 100;
 /// Results that are read at a time: about 20 ms of a core.
 inline constexpr std::uint64_t page_results_a_reading = 16'384;
+
+/// Results that were read of a campaign database, a part at a time. Results never change: what was
+/// read once stays, and only what has come since is read further. A copy costs little.
+class ResultsReading {
+ public:
+  /// Nothing is read yet.
+  /// @throws StoreError, ConfigError as stored_campaign().
+  explicit ResultsReading(const Store& store);
+
+  /// Whether the file has the campaign that this was begun with, and not another one that has its
+  /// place now.
+  [[nodiscard]] bool is_of(const Store& store) const;
+
+  /// Reads some `num_results_max` results at most that are in the file and were not read before;
+  /// the next call goes on after them.
+  /// @throws StoreError if the file cannot be read or is damaged.
+  void read_further(const Store& store, std::uint64_t num_results_max);
+
+  [[nodiscard]] std::uint64_t num_read() const { return read_.size(); }
+  [[nodiscard]] const LiveResults& results() const { return results_; }
+
+ private:
+  wire::CampaignId campaign_;
+  LiveResults results_;
+  RunSet read_;
+  std::uint64_t next_run_ = 0;  ///< Where the next call begins.
+};
 
 /// What happened to a campaign, as its database has it.
 struct CampaignEvents {
@@ -55,19 +84,12 @@ struct CampaignDetails {
   TimePoint results_at{};
 };
 
-/// What is known of a campaign without looking into its database.
-struct DetailSubject {
-  wire::CampaignId id = {};
-  std::filesystem::path file = {};
-  std::uint64_t num_finished = 0;  ///< Results are read until these were.
-};
-
 /// How campaign databases are read: each time further than before.
 struct DetailSources {
   /// @param before  What was read of the campaign last time; null at first.
   template <typename Part>
   using ReadPart =
-      std::function<std::shared_ptr<const Part>(const DetailSubject&, const Part* before)>;
+      std::function<std::shared_ptr<const Part>(const CampaignRecord&, const Part* before)>;
   ReadPart<CampaignEvents> read_events;
   ReadPart<CampaignResults> read_results;  ///< Some results at a time.
 };
@@ -100,12 +122,11 @@ class DetailReader {
 
   /// What was read of the campaign so far; asks for more. Never waits. If too many others are
   /// wanted, both parts say so.
-  [[nodiscard]] CampaignDetails details(const std::string& name, const DetailSubject& campaign,
-                                        TimePoint now);
+  [[nodiscard]] CampaignDetails details(const CampaignRecord& campaign, TimePoint now);
 
  private:
   struct Watched {
-    DetailSubject campaign;
+    CampaignRecord campaign;
     TimePoint asked_at;
     CampaignDetails details;
     TimePoint events_due{};

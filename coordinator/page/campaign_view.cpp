@@ -5,8 +5,8 @@
 #include "coordinator/page/attempts_chart.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/report/status_notes.hpp"
+#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
-#include "coordinator/table/html_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -22,7 +22,7 @@ std::string fact(std::string_view name, std::string_view value) {
   return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name, value);
 }
 
-std::string facts_of(const CampaignSnapshot& campaign) {
+std::string facts_of(const CampaignRecord& campaign) {
   const wire::CampaignStatus& status = campaign.status;
   std::string html =
       "<dl>" + fact("phase", wire::phase_name(status)) + fact("done", grouped(status.num_done)) +
@@ -132,7 +132,7 @@ std::string events_of(const CampaignEvents& events, const std::string& name, std
   return html + "</section>\n";
 }
 
-std::string history_of(const CampaignDetails& details, const CampaignSnapshot& campaign,
+std::string history_of(const CampaignDetails& details, const CampaignRecord& campaign,
                        const PageRequest& request) {
   if (details.events == nullptr) return "<p class=\"note\">The database is being read.</p>\n";
   const CampaignEvents& events = *details.events;
@@ -147,7 +147,7 @@ std::string history_of(const CampaignDetails& details, const CampaignSnapshot& c
 
 }  // namespace
 
-PageContent campaign_page(const CampaignSnapshot& campaign, const CampaignDetails& details,
+PageContent campaign_page(const CampaignRecord& campaign, const CampaignDetails& details,
                           const PageRequest& request, TimePoint now) {
   const wire::CampaignStatus& status = campaign.status;
   return {.title = "Campaign " + status.name,

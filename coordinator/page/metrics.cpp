@@ -18,16 +18,14 @@
 namespace proofmass::coordinator {
 namespace {
 
-enum class MetricKind : std::uint8_t { counter, gauge };
-
 /// Writes metrics one after the other.
 class MetricWriter {
  public:
-  /// Begins a metric, whose samples follow.
-  void begin(std::string_view name, MetricKind kind, std::string_view help) {
+  /// Begins a metric, whose samples follow: a counter if its name ends in `_total`.
+  void begin(std::string_view name, std::string_view help) {
     name_ = name;
-    text_ += fmt::format("# HELP {} {}\n# TYPE {} {}\n", name, help, name,
-                         kind == MetricKind::counter ? "counter" : "gauge");
+    text_ += fmt::format("# HELP {0} {1}\n# TYPE {0} {2}\n", name, help,
+                         name.ends_with("_total") ? "counter" : "gauge");
   }
   /// @param labels  `{campaign="a"}`, or nothing.
   template <typename Number>
@@ -35,8 +33,8 @@ class MetricWriter {
     text_ += fmt::format("{}{} {}\n", name_, labels, value);
   }
   template <typename Number>
-  void write(std::string_view name, MetricKind kind, std::string_view help, Number value) {
-    begin(name, kind, help);
+  void write(std::string_view name, std::string_view help, Number value) {
+    begin(name, help);
     add("", value);
   }
   [[nodiscard]] std::string take() { return std::move(text_); }
@@ -51,8 +49,8 @@ std::string campaign_label(const wire::CampaignStatus& campaign) {
 }
 
 /// Those with metrics of their own: campaigns that may still change first, then the newest ones.
-std::vector<const CampaignSnapshot*> measured_campaigns(const ServiceSnapshot& service) {
-  std::vector<const CampaignSnapshot*> campaigns;
+std::vector<const CampaignRecord*> measured_campaigns(const ServiceSnapshot& service) {
+  std::vector<const CampaignRecord*> campaigns;
   const auto add_those = [&](bool is_over) {
     for (auto item = service.campaigns.rbegin(); item != service.campaigns.rend(); ++item) {
       if (campaigns.size() == campaigns_with_metrics_max) return;
@@ -64,60 +62,29 @@ std::vector<const CampaignSnapshot*> measured_campaigns(const ServiceSnapshot& s
   return campaigns;
 }
 
-/// A metric of each campaign.
-struct CampaignMetric {
-  std::string_view name;
-  MetricKind kind;
-  std::string_view help;
-  std::function<double(const CampaignSnapshot&)> value;
-};
-
-const std::vector<CampaignMetric>& campaign_metrics() {
-  using Snapshot = const CampaignSnapshot&;
-  const auto number = [](std::uint64_t count) { return static_cast<double>(count); };
-  static const std::vector<CampaignMetric> metrics{
-      {"proofmass_runs_wanted", MetricKind::gauge, "Runs that the campaign is to have.",
-       [=](Snapshot of) { return number(of.status.num_runs); }},
-      {"proofmass_runs_finished_total", MetricKind::counter, "Runs whose results are on disk.",
-       [=](Snapshot of) { return number(of.status.num_done); }},
-      {"proofmass_runs_without_estimate_total", MetricKind::counter,
-       "Runs that ended without an estimate since the coordinator started.",
-       [=](Snapshot of) { return number(of.status.num_without_estimate); }},
-      {"proofmass_runs_given_up", MetricKind::gauge, "Runs that crashed too many workers.",
-       [=](Snapshot of) { return number(of.status.num_given_up); }},
-      {"proofmass_runs_lent", MetricKind::gauge, "Runs that workers hold.",
-       [=](Snapshot of) { return number(of.status.num_lent); }},
-      {"proofmass_results_waiting", MetricKind::gauge, "Results that are to be stored.",
-       [=](Snapshot of) { return number(of.num_waiting); }},
-      {"proofmass_results_duplicate_total", MetricKind::counter, "Results that were there already.",
-       [=](Snapshot of) { return number(of.status.num_duplicates); }},
-      {"proofmass_results_compared_total", MetricKind::counter,
-       "Results that were compared with a second computation.",
-       [=](Snapshot of) { return number(of.status.num_audited); }},
-      {"proofmass_results_different_total", MetricKind::counter,
-       "Compared results that differ; must be 0.",
-       [=](Snapshot of) { return number(of.status.num_mismatches); }},
-      {"proofmass_storage_failed", MetricKind::gauge, "1 while nothing can be stored.",
-       [](Snapshot of) { return of.status.storage_failure.empty() ? 0.0 : 1.0; }},
-      {"proofmass_campaign_priority", MetricKind::gauge,
-       "Runs of a higher priority are lent first.",
-       [](Snapshot of) { return static_cast<double>(of.status.priority); }},
-  };
-  return metrics;
-}
+using ValueOf = std::function<double(const CampaignRecord&)>;
 
 void write_campaigns(const ServiceSnapshot& service, MetricWriter& writer) {
-  const std::vector<const CampaignSnapshot*> campaigns = measured_campaigns(service);
-  for (const CampaignMetric& metric : campaign_metrics()) {
-    writer.begin(metric.name, metric.kind, metric.help);
-    for (const CampaignSnapshot* campaign : campaigns) {
-      writer.add(campaign_label(campaign->status), metric.value(*campaign));
+  const std::vector<const CampaignRecord*> campaigns = measured_campaigns(service);
+  const auto write = [&](std::string_view name, std::string_view help, const ValueOf& value) {
+    writer.begin(name, help);
+    for (const CampaignRecord* campaign : campaigns) {
+      writer.add(campaign_label(campaign->status), value(*campaign));
     }
+  };
+  for (const wire::CampaignCounter& counter : wire::campaign_counters) {
+    write(counter.metric, counter.help,
+          [&](const CampaignRecord& of) { return static_cast<double>(of.status.*counter.count); });
   }
-  writer.write("proofmass_campaigns_left_out", MetricKind::gauge,
-               "Campaigns without metrics of their own.",
+  write("proofmass_results_waiting", "Results that are to be stored.",
+        [](const auto& of) { return static_cast<double>(of.num_waiting); });
+  write("proofmass_storage_failed", "1 while nothing can be stored.",
+        [](const auto& of) { return of.status.storage_failure.empty() ? 0.0 : 1.0; });
+  write("proofmass_campaign_priority", "Runs of a higher priority are lent first.",
+        [](const auto& of) { return static_cast<double>(of.status.priority); });
+  writer.write("proofmass_campaigns_left_out", "Campaigns without metrics of their own.",
                service.campaigns.size() - campaigns.size());
-  writer.begin("proofmass_campaigns", MetricKind::gauge, "Campaigns by phase.");
+  writer.begin("proofmass_campaigns", "Campaigns by phase.");
   using wire::CampaignPhase;
   for (const CampaignPhase phase : {CampaignPhase::active, CampaignPhase::paused,
                                     CampaignPhase::finished, CampaignPhase::cancelled}) {
@@ -129,58 +96,47 @@ void write_campaigns(const ServiceSnapshot& service, MetricWriter& writer) {
 
 void write_service(const ServiceSnapshot& service, MetricWriter& writer) {
   const wire::StatusReply& status = service.status;
-  writer.begin("proofmass_info", MetricKind::gauge, "1, with the versions as labels.");
+  writer.begin("proofmass_info", "1, with the versions as labels.");
   writer.add(fmt::format("{{version=\"{}\",model=\"{}\"}}", label_value(status.version),
                          label_value(status.model_version)),
              1);
-  writer.begin("proofmass_workers", MetricKind::gauge, "Registered workers by state.");
+  writer.begin("proofmass_workers", "Registered workers by state.");
   for (std::size_t i = 0; i < worker_activities.size(); ++i) {
     writer.add(fmt::format("{{state=\"{}\"}}", name_of(worker_activities[i])),
                service.num_workers_by_activity[i]);
   }
-  const auto gauge = [&](std::string_view name, std::string_view help, std::uint64_t value) {
-    writer.write(name, MetricKind::gauge, help, value);
-  };
-  const auto counter = [&](std::string_view name, std::string_view help, std::uint64_t value) {
-    writer.write(name, MetricKind::counter, help, value);
-  };
-  gauge("proofmass_worker_slots", "Runs that all workers compute at a time.", status.num_slots);
-  gauge("proofmass_leases", "Leases of runs to workers.", service.num_leases);
-  gauge("proofmass_quarantined_hosts", "Hosts that are lent nothing.",
-        status.num_quarantined_hosts);
-  gauge("proofmass_unserved_files", "Files of the directory that cannot be served.",
-        status.num_unserved_files);
-  gauge("proofmass_factories", "Factories that report.", status.factories.size());
-  counter("proofmass_sockets_reset_total",
-          "How often a lack of memory or descriptors closed the sockets.",
-          service.num_sockets_reset);
-  counter("proofmass_messages_unsent_total", "Messages to workers that found no room.",
-          service.num_messages_unsent);
+  writer.write("proofmass_worker_slots", "Runs that all workers compute at a time.",
+               status.num_slots);
+  writer.write("proofmass_leases", "Leases of runs to workers.", service.num_leases);
+  writer.write("proofmass_quarantined_hosts", "Hosts that are lent nothing.",
+               status.num_quarantined_hosts);
+  writer.write("proofmass_unserved_files", "Files of the directory that cannot be served.",
+               status.num_unserved_files);
+  writer.write("proofmass_factories", "Factories that report.", status.factories.size());
+  writer.write("proofmass_sockets_reset_total",
+               "How often a lack of memory or descriptors closed the sockets.",
+               service.num_sockets_reset);
+  writer.write("proofmass_messages_unsent_total", "Messages to workers that found no room.",
+               service.num_messages_unsent);
 }
 
 void write_page(const HttpCounts& page, double age_s, MetricWriter& writer) {
-  writer.write("proofmass_page_connections", MetricKind::gauge, "Open connections of the page.",
-               page.num_connections);
-  writer.write("proofmass_page_requests_total", MetricKind::counter, "Requests to the page.",
-               page.num_requests);
-  writer.write("proofmass_page_connections_refused_total", MetricKind::counter,
+  writer.write("proofmass_page_connections", "Open connections of the page.", page.num_connections);
+  writer.write("proofmass_page_requests_total", "Requests to the page.", page.num_requests);
+  writer.write("proofmass_page_connections_refused_total",
                "Connections to the page that were one too many.", page.num_refused);
-  writer.write("proofmass_snapshot_age_seconds", MetricKind::gauge,
-               "Age of what these figures say of the service.", age_s);
+  writer.write("proofmass_snapshot_age_seconds", "Age of what these figures say of the service.",
+               age_s);
 }
 
 void write_process(const ProcessFigures& process, MetricWriter& writer) {
-  writer.write("process_cpu_seconds_total", MetricKind::counter, "Processor time in seconds.",
-               process.cpu_s);
-  writer.write("process_resident_memory_bytes", MetricKind::gauge, "Resident memory in bytes.",
-               process.resident_size);
-  writer.write("process_virtual_memory_bytes", MetricKind::gauge, "Virtual memory in bytes.",
-               process.virtual_size);
-  writer.write("process_open_fds", MetricKind::gauge, "Open descriptors.", process.num_descriptors);
-  writer.write("process_max_fds", MetricKind::gauge, "Descriptors that may be open.",
-               process.num_descriptors_max);
-  writer.write("process_start_time_seconds", MetricKind::gauge,
-               "When the process started, in seconds since 1970.", process.start_unix_s);
+  writer.write("process_cpu_seconds_total", "Processor time in seconds.", process.cpu_s);
+  writer.write("process_resident_memory_bytes", "Resident memory in bytes.", process.resident_size);
+  writer.write("process_virtual_memory_bytes", "Virtual memory in bytes.", process.virtual_size);
+  writer.write("process_open_fds", "Open descriptors.", process.num_descriptors);
+  writer.write("process_max_fds", "Descriptors that may be open.", process.num_descriptors_max);
+  writer.write("process_start_time_seconds", "When the process started, in seconds since 1970.",
+               process.start_unix_s);
 }
 
 /// The fields of /proc/self/stat behind the name of the program, which may hold anything.
@@ -257,14 +213,14 @@ ProcessFigures process_figures() {
   return figures;
 }
 
-std::string metrics_text(const PageSnapshot& snapshot, TimePoint now, const ProcessFigures& process,
-                         const HttpCounts& page) {
+std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
+                         const ProcessFigures& process, const HttpCounts& page) {
   MetricWriter writer;
   const double age_s = seconds(now - snapshot.taken_at);
-  write_service(snapshot.service, writer);
-  writer.write("proofmass_uptime_seconds", MetricKind::gauge, "Since the coordinator started.",
-               snapshot.service.status.uptime_s + age_s);
-  write_campaigns(snapshot.service, writer);
+  write_service(snapshot, writer);
+  writer.write("proofmass_uptime_seconds", "Since the coordinator started.",
+               snapshot.status.uptime_s + age_s);
+  write_campaigns(snapshot, writer);
   write_page(page, age_s, writer);
   write_process(process, writer);
   return writer.take();

@@ -28,7 +28,7 @@ inline constexpr std::size_t campaigns_with_metrics_max = 200;
 
 /// All metrics in Prometheus' text format 0.0.4. README.md names those that deserve an
 /// alert.
-[[nodiscard]] std::string metrics_text(const PageSnapshot& snapshot, TimePoint now,
+[[nodiscard]] std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
                                        const ProcessFigures& process, const HttpCounts& page);
 
 /// A label's value with backslash, quote and end of line escaped, and what is not UTF-8 visible.

@@ -72,8 +72,8 @@ struct Page::Impl {
         reader(database_sources()),
         site({.access = PageAccess(token_of(page_config)),
               .board = &board,
-              .details = [this](const std::string& name, const DetailSubject& campaign,
-                                TimePoint now) { return reader.details(name, campaign, now); },
+              .details = [this](const CampaignRecord& campaign,
+                                TimePoint now) { return reader.details(campaign, now); },
               .counts = [this] { return server->counts(); },
               .now = clock_now}) {
     server = std::make_unique<HttpServer>(

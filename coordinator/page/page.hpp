@@ -8,7 +8,7 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/service.hpp"
-#include "coordinator/page/page_address.hpp"
+#include "coordinator/page/page_access.hpp"
 
 namespace proofmass::coordinator {
 

@@ -11,12 +11,34 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
+#include <system_error>
 
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+/// 127.0.0.0/8.
+bool is_loopback(const in_addr& address) {
+  constexpr std::uint32_t loopback_network = 127;
+  return ntohl(address.s_addr) >> 24 == loopback_network;
+}
+
+[[noreturn]] void refuse_page_address(std::string_view text) {
+  throw InvalidArgument(
+      fmt::format("page = {} (must be HOST:PORT, with localhost, * or the address of an interface "
+                  "and a port up to 65535; IPv6 in brackets)",
+                  text));
+}
+
+std::uint16_t port_in(std::string_view digits, std::string_view text) {
+  std::uint16_t port = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
+  if (error != std::errc() || end != digits.data() + digits.size()) refuse_page_address(text);
+  return port;
+}
 
 constexpr std::size_t token_size_min = 16;
 constexpr std::size_t token_size_max = 256;
@@ -88,6 +110,30 @@ std::string_view bearer_in(std::string_view header) {
 
 }  // namespace
 
+PageAddress parse_page_address(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos) refuse_page_address(text);
+  std::string host(text.substr(0, colon));
+  const std::uint16_t port = port_in(text.substr(colon + 1), text);
+  if (host == "localhost") host = "127.0.0.1";
+  if (host == "*") host = "0.0.0.0";
+  in_addr ipv4{};
+  if (inet_pton(AF_INET, host.c_str(), &ipv4) == 1) {
+    return {.host = host, .port = port, .is_loopback = is_loopback(ipv4)};
+  }
+  if (!host.starts_with('[') || !host.ends_with(']')) refuse_page_address(text);
+  host = host.substr(1, host.size() - 2);
+  in6_addr ipv6{};
+  if (inet_pton(AF_INET6, host.c_str(), &ipv6) != 1) refuse_page_address(text);
+  return {.host = host, .port = port, .is_loopback = IN6_IS_ADDR_LOOPBACK(&ipv6) != 0};
+}
+
+std::string url_of(const PageAddress& address) {
+  const bool is_ipv6 = address.host.find(':') != std::string::npos;
+  return is_ipv6 ? fmt::format("http://[{}]:{}/", address.host, address.port)
+                 : fmt::format("http://{}:{}/", address.host, address.port);
+}
+
 PageToken PageToken::read(const std::filesystem::path& file) {
   const TokenFile opened{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   if (opened.descriptor < 0) refuse_token_file(file, std::strerror(errno));
@@ -157,9 +203,7 @@ bool is_loopback_host(std::string_view host) {
   const std::string name(host.substr(0, host.find(':')));
   if (strcasecmp(name.c_str(), "localhost") == 0) return true;
   in_addr ipv4{};
-  constexpr std::uint32_t loopback_network = 127;
-  return inet_pton(AF_INET, name.c_str(), &ipv4) == 1 &&
-         ntohl(ipv4.s_addr) >> 24 == loopback_network;
+  return inet_pton(AF_INET, name.c_str(), &ipv4) == 1 && is_loopback(ipv4);
 }
 
 }  // namespace proofmass::coordinator

@@ -1,7 +1,7 @@
 #include <string>
 
 #include "coordinator/page/page_layout.hpp"
-#include "coordinator/report/review_html.hpp"
+#include "coordinator/report/review_documents.hpp"
 
 namespace proofmass::coordinator {
 

@@ -62,7 +62,7 @@ std::optional<HttpAnswer> PageSite::answer_to_visitor(const PageRequest& request
   const SnapshotDepth depth = !path.empty() && is_about_workers(request)
                                   ? SnapshotDepth::with_workers
                                   : SnapshotDepth::without_workers;
-  std::shared_ptr<const PageSnapshot> snapshot = sources_.board->want(depth, sources_.now());
+  std::shared_ptr<const ServiceSnapshot> snapshot = sources_.board->want(depth, sources_.now());
   if (snapshot == nullptr && patience == Patience::left) return std::nullopt;
   if (snapshot == nullptr) snapshot = sources_.board->newest();
   if (snapshot == nullptr) return text_answer(503, "the coordinator has not said anything yet");
@@ -78,7 +78,7 @@ HttpAnswer PageSite::health() const {
 }
 
 std::optional<HttpAnswer> PageSite::about_service(const PageRequest& request,
-                                                  const PageSnapshot& snapshot) const {
+                                                  const ServiceSnapshot& snapshot) const {
   const std::vector<std::string>& path = request.path;
   const TimePoint now = sources_.now();
   if (path.empty()) return html_answer(request, overview_page(snapshot, request, now));
@@ -93,19 +93,17 @@ std::optional<HttpAnswer> PageSite::about_service(const PageRequest& request,
 }
 
 HttpAnswer PageSite::about_campaign(const PageRequest& request,
-                                    const PageSnapshot& snapshot) const {
+                                    const ServiceSnapshot& snapshot) const {
   if (request.path.size() != 2 || request.path[0] != "campaigns") return not_found();
   const std::string& name = request.path[1];
-  const auto& campaigns = snapshot.service.campaigns;
+  const auto& campaigns = snapshot.campaigns;
   const auto found = std::ranges::find(
       campaigns, name,
-      [](const CampaignSnapshot& one) -> const std::string& { return one.status.name; });
+      [](const CampaignRecord& one) -> const std::string& { return one.status.name; });
   if (found == campaigns.end()) return not_found();
   const TimePoint now = sources_.now();
   // The page shows what has been read, and the rest two seconds later.
-  const CampaignDetails details = sources_.details(
-      name, {.id = found->id, .file = found->file, .num_finished = found->status.num_done}, now);
-  return html_answer(request, campaign_page(*found, details, request, now));
+  return html_answer(request, campaign_page(*found, sources_.details(*found, now), request, now));
 }
 
 }  // namespace proofmass::coordinator

@@ -18,7 +18,7 @@ struct SiteSources {
   PageAccess access{std::nullopt};
   SnapshotBoard* board = nullptr;  ///< Outlives the site; not null.
   /// As DetailReader::details().
-  std::function<CampaignDetails(const std::string&, const DetailSubject&, TimePoint)> details;
+  std::function<CampaignDetails(const CampaignRecord&, TimePoint)> details;
   std::function<HttpCounts()> counts;  ///< Of the server.
   std::function<TimePoint()> now;      ///< Steady clock.
 };
@@ -40,9 +40,9 @@ class PageSite {
   [[nodiscard]] std::optional<HttpAnswer> answer_to_visitor(const PageRequest& request,
                                                             Patience patience) const;
   [[nodiscard]] std::optional<HttpAnswer> about_service(const PageRequest& request,
-                                                        const PageSnapshot& snapshot) const;
+                                                        const ServiceSnapshot& snapshot) const;
   [[nodiscard]] HttpAnswer about_campaign(const PageRequest& request,
-                                          const PageSnapshot& snapshot) const;
+                                          const ServiceSnapshot& snapshot) const;
 
   SiteSources sources_;
 };

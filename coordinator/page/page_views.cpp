@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <tuple>
 
 #include "coordinator/report/status_notes.hpp"
+#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
-#include "coordinator/table/html_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -38,19 +39,19 @@ std::string time_left_cell(const CampaignStatus& campaign) {
   return campaign.remaining_s ? duration_text(*campaign.remaining_s) : "–";
 }
 
-std::string title_of(const PageSnapshot& snapshot) {
-  const wire::StatusReply& status = snapshot.service.status;
+std::string title_of(const ServiceSnapshot& snapshot) {
+  const wire::StatusReply& status = snapshot.status;
   return fmt::format("<p>Proofmass {}, model {}, up {}</p>\n", markup_text(status.version),
                      markup_text(status.model_version), duration_text(status.uptime_s));
 }
 
 /// The line that screen readers announce when it changes: it must not change often.
-std::string summary_line(const PageSnapshot& snapshot) {
+std::string summary_line(const ServiceSnapshot& snapshot) {
   std::uint64_t num_active = 0;
-  for (const CampaignSnapshot& campaign : snapshot.service.campaigns) {
+  for (const CampaignRecord& campaign : snapshot.campaigns) {
     if (campaign.status.phase == wire::CampaignPhase::active) ++num_active;
   }
-  const wire::StatusReply& status = snapshot.service.status;
+  const wire::StatusReply& status = snapshot.status;
   return fmt::format("<p aria-live=\"polite\">{} to compute, {} with {}</p>\n",
                      counted(num_active, "campaign"), counted(status.num_workers, "worker"),
                      counted(status.num_slots, "slot"));
@@ -81,22 +82,14 @@ std::vector<Remark> overview_notes(const ServiceSnapshot& service, const PageOfL
 
 // Workers.
 
+/// In the order of worker_activities: those that need a look come first.
 int place_of(WorkerActivity activity) {
-  switch (activity) {
-    case WorkerActivity::quarantined:
-      return 0;
-    case WorkerActivity::silent:
-      return 1;
-    case WorkerActivity::computing:
-      return 2;
-    case WorkerActivity::idle:
-      return 3;
-  }
-  return 3;
+  constexpr std::array places{2, 3, 1, 0};
+  return places.at(static_cast<std::size_t>(activity));
 }
 
-bool comes_before(const WorkerSnapshot& a, const WorkerSnapshot& b, WorkerOrder order) {
-  const auto key = [](const WorkerSnapshot& worker) {
+bool comes_before(const RegisteredWorker& a, const RegisteredWorker& b, WorkerOrder order) {
+  const auto key = [](const RegisteredWorker& worker) {
     return std::tie(worker.status.name, worker.status.id.value);
   };
   if (order == WorkerOrder::state && a.activity != b.activity) {
@@ -133,7 +126,7 @@ std::vector<Column> worker_columns_of(const WorkerChoice& choice) {
           {"process"}};
 }
 
-Row worker_row(const WorkerSnapshot& worker) {
+Row worker_row(const RegisteredWorker& worker) {
   const wire::WorkerStatus& status = worker.status;
   return {status.name,
           status.host,
@@ -166,15 +159,8 @@ std::string filter_form(const WorkerChoice& choice) {
 }  // namespace
 
 std::string_view name_of(WorkerOrder order) {
-  switch (order) {
-    case WorkerOrder::name:
-      return "name";
-    case WorkerOrder::state:
-      return "state";
-    case WorkerOrder::throughput:
-      return "throughput";
-  }
-  return "name";
+  constexpr std::array<std::string_view, 3> names{"name", "state", "throughput"};
+  return names.at(static_cast<std::size_t>(order));
 }
 
 WorkerChoice worker_choice(const PageRequest& request) {
@@ -187,23 +173,23 @@ WorkerChoice worker_choice(const PageRequest& request) {
   return choice;
 }
 
-double results_per_h(const WorkerSnapshot& worker) {
+double results_per_h(const RegisteredWorker& worker) {
   if (worker.registered_s <= 0.0) return 0.0;
   return 3600.0 * static_cast<double>(worker.status.num_results) / worker.registered_s;
 }
 
-ChosenWorkers choose_workers(const std::vector<WorkerSnapshot>& workers,
+ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
                              const WorkerChoice& choice) {
-  std::vector<const WorkerSnapshot*> chosen;
+  std::vector<const RegisteredWorker*> chosen;
   chosen.reserve(workers.size());
-  for (const WorkerSnapshot& worker : workers) {
+  for (const RegisteredWorker& worker : workers) {
     const bool is_wanted = choice.filter.empty() ||
                            worker.status.name.find(choice.filter) != std::string::npos ||
                            worker.status.host.find(choice.filter) != std::string::npos;
     if (is_wanted) chosen.push_back(&worker);
   }
   const PageOfList list = page_of_list(choice.page, chosen.size(), rows_per_page);
-  const auto before = [&](const WorkerSnapshot* a, const WorkerSnapshot* b) {
+  const auto before = [&](const RegisteredWorker* a, const RegisteredWorker* b) {
     return comes_before(*a, *b, choice.order);
   };
   // Only those of the page are sorted.
@@ -214,8 +200,9 @@ ChosenWorkers choose_workers(const std::vector<WorkerSnapshot>& workers,
   return {.list = list, .workers = {first, end}};
 }
 
-PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& request, TimePoint now) {
-  const std::vector<CampaignSnapshot>& campaigns = snapshot.service.campaigns;
+PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& request,
+                          TimePoint now) {
+  const std::vector<CampaignRecord>& campaigns = snapshot.campaigns;
   const PageOfList list =
       page_of_list(page_number(request, "page"), campaigns.size(), rows_per_page);
   Table table{.caption = "Campaigns",
@@ -236,22 +223,23 @@ PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& reque
   }
   return {.title = "Campaigns",
           .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +
-                  notes_list(overview_notes(snapshot.service, list)) + table_or_nothing(table) +
+                  notes_list(overview_notes(snapshot, list)) + table_or_nothing(table) +
                   list_navigation(list, "campaigns", "./?page=")};
 }
 
-PageContent workers_page(const PageSnapshot& snapshot, const PageRequest& request, TimePoint now) {
+PageContent workers_page(const ServiceSnapshot& snapshot, const PageRequest& request,
+                         TimePoint now) {
   const WorkerChoice choice = worker_choice(request);
-  const ChosenWorkers chosen = choose_workers(snapshot.service.workers, choice);
+  const ChosenWorkers chosen = choose_workers(snapshot.workers, choice);
   Table table{.caption = "Workers", .columns = worker_columns_of(choice)};
-  for (const WorkerSnapshot* worker : chosen.workers) table.rows.push_back(worker_row(*worker));
+  for (const RegisteredWorker* worker : chosen.workers) table.rows.push_back(worker_row(*worker));
   const std::string address =
       fmt::format("workers?sort={}&amp;filter={}&amp;page=", name_of(choice.order),
                   percent_encoded(choice.filter));
   return {.title = "Workers",
           .form = filter_form(choice),
           .live = summary_line(snapshot) + age_line(snapshot.taken_at, now) +
-                  worker_counts(snapshot.service) + table_or_nothing(table) +
+                  worker_counts(snapshot) + table_or_nothing(table) +
                   list_navigation(chosen.list, "workers", address) +
                   "<p class=\"note\">results/h: since the worker registered with this coordinator"
                   "</p>\n"};

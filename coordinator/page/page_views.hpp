@@ -31,24 +31,24 @@ struct WorkerChoice {
 /// The workers of one page.
 struct ChosenWorkers {
   PageOfList list;
-  std::vector<const WorkerSnapshot*> workers = {};  ///< Of the snapshot.
+  std::vector<const RegisteredWorker*> workers = {};  ///< Of the snapshot.
 };
 
 /// Names come in alphabetical order, the states quarantined, silent, computing, idle, and the
 /// largest throughput first. Takes some milliseconds for 10,000 workers.
-[[nodiscard]] ChosenWorkers choose_workers(const std::vector<WorkerSnapshot>& workers,
+[[nodiscard]] ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
                                            const WorkerChoice& choice);
 
 /// Results per hour since the worker registered.
-[[nodiscard]] double results_per_h(const WorkerSnapshot& worker);
+[[nodiscard]] double results_per_h(const RegisteredWorker& worker);
 
 /// The first page: all campaigns, fifty at a time.
-[[nodiscard]] PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& request,
+[[nodiscard]] PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& request,
                                         TimePoint now);
-[[nodiscard]] PageContent workers_page(const PageSnapshot& snapshot, const PageRequest& request,
+[[nodiscard]] PageContent workers_page(const ServiceSnapshot& snapshot, const PageRequest& request,
                                        TimePoint now);
 /// One campaign: `campaigns/NAME`.
-[[nodiscard]] PageContent campaign_page(const CampaignSnapshot& campaign,
+[[nodiscard]] PageContent campaign_page(const CampaignRecord& campaign,
                                         const CampaignDetails& details, const PageRequest& request,
                                         TimePoint now);
 

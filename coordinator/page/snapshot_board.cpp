@@ -4,7 +4,7 @@
 
 namespace proofmass::coordinator {
 
-std::shared_ptr<const PageSnapshot> SnapshotBoard::want(SnapshotDepth depth, TimePoint now) {
+std::shared_ptr<const ServiceSnapshot> SnapshotBoard::want(SnapshotDepth depth, TimePoint now) {
   const bool needs_workers = depth == SnapshotDepth::with_workers;
   const std::lock_guard lock(mutex_);
   asked_at_ = now;
@@ -15,7 +15,7 @@ std::shared_ptr<const PageSnapshot> SnapshotBoard::want(SnapshotDepth depth, Tim
   return is_there ? newest_ : nullptr;
 }
 
-std::shared_ptr<const PageSnapshot> SnapshotBoard::newest() const {
+std::shared_ptr<const ServiceSnapshot> SnapshotBoard::newest() const {
   const std::lock_guard lock(mutex_);
   return newest_;
 }
@@ -32,8 +32,9 @@ void SnapshotBoard::on_turn(TimePoint now,
   // Workers that are asked for the first time need not wait for the second to end.
   if (!is_due && (!is_urgent_ || depth == newest_depth_)) return;
   lock.unlock();
-  auto snapshot =
-      std::make_shared<const PageSnapshot>(PageSnapshot{.service = take(depth), .taken_at = now});
+  ServiceSnapshot taken = take(depth);
+  taken.taken_at = now;
+  auto snapshot = std::make_shared<const ServiceSnapshot>(std::move(taken));
   lock.lock();
   newest_.swap(snapshot);  // What nobody uses any more is freed without the lock.
   newest_depth_ = depth;

@@ -10,12 +10,6 @@
 
 namespace proofmass::coordinator {
 
-/// A service as it was at one instant.
-struct PageSnapshot {
-  ServiceSnapshot service = {};
-  TimePoint taken_at = {};
-};
-
 /// Where the thread of a service leaves snapshots for the thread of a page. The service makes one a
 /// second at most, and none if nobody has asked for 30 s, so that a page at which nobody looks
 /// costs nothing. Any thread may call the functions. Times are of the steady clock.
@@ -30,10 +24,10 @@ class SnapshotBoard {
   /// Asks for snapshots of this depth.
   /// @return The newest one if it is that deep and not older than `age_max`; else null: a new one
   ///         comes with the next turn of the service.
-  [[nodiscard]] std::shared_ptr<const PageSnapshot> want(SnapshotDepth depth, TimePoint now);
+  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> want(SnapshotDepth depth, TimePoint now);
 
   /// However old it is; null before the first.
-  [[nodiscard]] std::shared_ptr<const PageSnapshot> newest() const;
+  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> newest() const;
 
   /// To be called in each turn of the service's loop.
   /// @param take  Makes a snapshot; called if one is wanted.
@@ -54,7 +48,7 @@ class SnapshotBoard {
   bool is_urgent_ = false;  ///< Somebody waits: the newest is too old or lacks the workers.
   SnapshotDepth newest_depth_ = SnapshotDepth::without_workers;
   /// Shared with answers that are being made of it.
-  std::shared_ptr<const PageSnapshot> newest_;
+  std::shared_ptr<const ServiceSnapshot> newest_;
 };
 
 }  // namespace proofmass::coordinator

@@ -13,13 +13,10 @@
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
-#include "core/statistics/tolerance.hpp"
+#include "core/statistics/requirement.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-// Of a coefficient of correlation only the interval depends on it.
-constexpr double any_confidence = 0.95;
 
 // Values beyond are scaled: fourth powers of what is 2^-53 of them stay in the range of a double.
 constexpr int exponent_max = 128;
@@ -92,18 +89,13 @@ std::optional<double> intercept(const AggregateColumns& columns) {
   return line->intercept;
 }
 
-std::optional<double> coefficient(const std::optional<Correlation>& correlation) {
-  if (!correlation) return std::nullopt;
-  return correlation->coefficient;
-}
-
 std::optional<double> linear(const AggregateColumns& columns) {
   if (!varies(columns.x) || !varies(columns.y)) return std::nullopt;
-  return coefficient(linear_correlation(columns.x, columns.y, any_confidence));
+  return linear_correlation(columns.x, columns.y);
 }
 
 std::optional<double> rank(const AggregateColumns& columns) {
-  return coefficient(rank_correlation(columns.x, columns.y, any_confidence));
+  return rank_correlation(columns.x, columns.y);
 }
 
 // A NULL stands for a run without an estimate, which is no evidence for a bound: it counts as
@@ -111,9 +103,7 @@ std::optional<double> rank(const AggregateColumns& columns) {
 std::optional<double> tolerance_bound(const AggregateColumns& columns) {
   const Tolerance tolerance{.coverage = fraction_of("coverage", columns.parameters[0]),
                             .confidence = fraction_of("confidence", columns.parameters[1])};
-  const auto bound = wilks_upper(columns.x, tolerance, columns.num_unknown);
-  if (!bound) return std::nullopt;
-  return bound->value;
+  return wilks_upper(columns.x, tolerance, columns.num_unknown);
 }
 
 /// Sorts what stands behind the sorted ones, and merges both.

@@ -1,5 +1,3 @@
-#include "coordinator/query/bounded_query.hpp"
-
 #include <fmt/format.h>
 #include <sys/resource.h>
 
@@ -14,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "coordinator/query/query.hpp"
 #include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {

@@ -70,11 +70,7 @@ std::unique_ptr<detail::Database> open_files(const QueryFiles& files) {
     detail::check_presence(file);
     detail::Database other(file, detail::Access::read_only);
     detail::prepare_reader(other, file);
-    if (other.is_private_copy()) {
-      database->attach_copy_of(other, name);
-    } else {
-      database->attach_read_only(other, name);
-    }
+    database->attach(other, name);
   }
   // A private copy has it on: the caller has tables of its own to add before it is turned on again.
   database->execute("PRAGMA query_only = OFF");

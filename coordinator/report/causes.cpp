@@ -1,5 +1,3 @@
-#include "coordinator/report/causes.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +10,6 @@
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/sensitivity.hpp"
-#include "core/statistics/term_search.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -29,10 +26,9 @@ using Correlations = std::vector<std::optional<double>>;  // With the error of e
 
 std::optional<double> coefficient_of(std::span<const double> input,
                                      std::span<const double> errors) {
-  const auto correlation = linear_correlation(input, errors, default_confidence);
+  const std::optional<double> correlation = linear_correlation(input, errors);
   const double least = 4.0 / std::sqrt(static_cast<double>(errors.size()));
-  if (!correlation || std::abs(correlation->coefficient) < least) return std::nullopt;
-  return correlation->coefficient;
+  return correlation && std::abs(*correlation) >= least ? correlation : std::nullopt;
 }
 
 Correlations correlations_of(std::span<const double> input, const DrawnRuns& drawn) {

@@ -41,14 +41,13 @@ std::string objective_sentence(const Review& review, std::size_t index) {
 }
 
 std::string worst_sentence(const Review& review, std::size_t index) {
-  const std::vector<RunError>& worst = review.figures[index].worst;
+  const std::vector<RunValue>& worst = review.figures[index].worst;
   if (worst.empty()) return "No run has an estimate.";
   const Quantity& quantity = quantity_at(index);
   std::string text = "The largest errors are";
   for (std::size_t i = 0; i < worst.size(); ++i) {
-    text +=
-        fmt::format("{} {} in run {}", i == 0 ? "" : ",",
-                    figure_text(worst[i].magnitude / quantity.display_scale), worst[i].run.value);
+    text += fmt::format("{} {} in run {}", i == 0 ? "" : ",",
+                        figure_text(worst[i].value / quantity.display_scale), worst[i].run.value);
   }
   return text + ".";
 }
@@ -61,12 +60,12 @@ std::string below_sentence(const Histogram& histogram) {
 
 /// Marks on the axis.
 Markers worst_markers(const Review& review, std::size_t index, double scale) {
-  const std::vector<RunError>& all = review.figures[index].worst;
+  const std::vector<RunValue>& all = review.figures[index].worst;
   Markers markers{
       .name = all.empty() ? "" : fmt::format("worst runs (the worst: run {})", all[0].run.value),
       .ink = Ink::fourth,
       .shape = Shape::triangle};
-  for (const RunError& worst : all) markers.points.push_back({worst.magnitude / scale, 0.0});
+  for (const RunValue& worst : all) markers.points.push_back({worst.value / scale, 0.0});
   return markers;
 }
 
@@ -206,10 +205,10 @@ ChartGrid magnitude_overview(const Review& review) {
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     const Quantity& quantity = quantity_at(i);
     const double objective = review.objectives[i];
-    const std::vector<RunError>& worst = review.figures[i].worst;
+    const std::vector<RunValue>& worst = review.figures[i].worst;
     double scale = std::isfinite(objective) ? objective : 1.0;
-    if (!std::isfinite(objective) && !worst.empty() && worst[0].magnitude > 0.0) {
-      scale = worst[0].magnitude;
+    if (!std::isfinite(objective) && !worst.empty() && worst[0].value > 0.0) {
+      scale = worst[0].value;
     }
     Chart chart{.text = {.id = fmt::format("errors-{}", quantity.name),
                          .title = std::string(quantity.symbol),

@@ -6,14 +6,96 @@
 namespace proofmass::coordinator {
 namespace {
 
+// Of magnitudes: what is smaller than 1e-120, zeros too, is in the first bin.
+constexpr int bins_a_decade = 10;
+constexpr int first_decade = -120;
+constexpr int last_decade = 92;
+constexpr std::size_t num_magnitude_bins =
+    static_cast<std::size_t>(last_decade - first_decade) * bins_a_decade;
+
+double magnitude_edge(std::size_t bin) {
+  const int tenths = first_decade * bins_a_decade + static_cast<int>(bin);
+  return std::pow(10.0, static_cast<double>(tenths) / bins_a_decade);
+}
+
+// Of errors.
+constexpr std::size_t num_error_bins = 64;
+constexpr std::size_t middle = num_error_bins / 2;
+constexpr int smallest_exponent = -400;
+
+}  // namespace
+
+MagnitudeBins::MagnitudeBins() : counts_(num_magnitude_bins) {}
+
+void MagnitudeBins::add(double value) {
+  ++num_values_;
+  double position = 0.0;
+  if (value > 0.0) position = std::floor((std::log10(value) - first_decade) * bins_a_decade);
+  position = std::clamp(position, 0.0, static_cast<double>(num_magnitude_bins - 1));
+  ++counts_[static_cast<std::size_t>(position)];
+}
+
+Histogram MagnitudeBins::histogram() const {
+  Histogram histogram;
+  if (num_values_ == 0) return histogram;
+  std::size_t first = 0;
+  while (histogram.num_below + counts_[first] <= num_values_ / 100) {
+    histogram.num_below += counts_[first++];
+  }
+  std::size_t last = num_magnitude_bins - 1;
+  while (last > first && counts_[last] == 0) --last;
+  for (std::size_t bin = first; bin <= last; ++bin) {
+    histogram.edges.push_back(magnitude_edge(bin));
+    histogram.counts.push_back(counts_[bin]);
+  }
+  histogram.edges.push_back(magnitude_edge(last + 1));
+  return histogram;
+}
+
+ErrorBins::ErrorBins() : exponent_(smallest_exponent), counts_(num_error_bins) {}
+
+void ErrorBins::double_width() {
+  std::vector<std::uint64_t> merged(num_error_bins);
+  for (std::size_t bin = 0; bin < num_error_bins; ++bin) {
+    // Bins are counted from the middle: [0, 1) and [1, 2) become [0, 2).
+    merged[(bin + middle) / 2] += counts_[bin];
+  }
+  counts_ = std::move(merged);
+  ++exponent_;
+}
+
+void ErrorBins::add(double value) {
+  const auto bin_of = [&] { return std::floor(std::ldexp(value, -exponent_)); };
+  constexpr auto end = static_cast<double>(middle);
+  while (bin_of() < -end || bin_of() >= end) double_width();
+  ++counts_[static_cast<std::size_t>(bin_of() + end)];
+}
+
+Histogram ErrorBins::histogram() const {
+  const auto has_values = [](std::uint64_t count) { return count > 0; };
+  const auto first = std::ranges::find_if(counts_, has_values);
+  if (first == counts_.end()) return {};
+  const auto last = std::find_if(counts_.rbegin(), counts_.rend(), has_values).base();
+  Histogram histogram{.edges = {}, .counts = {first, last}, .num_below = 0};
+  const auto edge = [&](auto place) {
+    return std::ldexp(static_cast<double>(place - counts_.begin()) - static_cast<double>(middle),
+                      exponent_);
+  };
+  for (auto place = first; place != last; ++place) histogram.edges.push_back(edge(place));
+  histogram.edges.push_back(edge(last));
+  return histogram;
+}
+
+namespace {
+
 constexpr std::size_t num_worst_shown = 5;
 constexpr std::size_t num_convergence_points = 40;
 constexpr std::uint64_t first_convergence_count = 5;
 
-void add_if_worst(const RunError& candidate, std::vector<RunError>& worst) {
-  if (worst.size() == num_worst_shown && candidate.magnitude <= worst.back().magnitude) return;
+void add_if_worst(const RunValue& candidate, std::vector<RunValue>& worst) {
+  if (worst.size() == num_worst_shown && candidate.value <= worst.back().value) return;
   const auto place =
-      std::ranges::upper_bound(worst, candidate.magnitude, std::greater<>(), &RunError::magnitude);
+      std::ranges::upper_bound(worst, candidate.value, std::greater<>(), &RunValue::value);
   worst.insert(place, candidate);
   if (worst.size() > num_worst_shown) worst.pop_back();
 }
@@ -34,24 +116,24 @@ std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs) {
   return counts;
 }
 
-FigurePasses::FigurePasses(std::size_t num_quantities, std::uint64_t num_runs)
+ErrorFigures::ErrorFigures(std::size_t num_quantities, std::uint64_t num_runs)
     : counts_(convergence_counts(num_runs)), quantities_(num_quantities) {}
 
-void FigurePasses::add_error(RunIndex run, double error, Growing& quantity) {
+void ErrorFigures::add_error(RunIndex run, double error, Growing& quantity) {
   const double magnitude = std::abs(error);
   quantity.magnitudes.add(magnitude);
   quantity.errors.add(error);
-  add_if_worst({.run = run, .magnitude = magnitude}, quantity.worst);
+  add_if_worst({.run = run, .value = magnitude}, quantity.worst);
   if (!quantity.sums) quantity.sums.emplace(magnitude);
   quantity.sums->add(magnitude);
 }
 
-void FigurePasses::add_convergence() {
+void ErrorFigures::add_convergence() {
   for (Growing& quantity : quantities_) {
     const Moments moments = quantity.sums->moments();
     quantity.convergence.push_back(
         {.num_runs = num_estimated_,
-         .worst = quantity.worst.front().magnitude,
+         .worst = quantity.worst.front().value,
          .mean = moments.mean,
          .mean_interval = mean_interval(moments, default_confidence),
          .standard_deviation = moments.standard_deviation,
@@ -59,7 +141,7 @@ void FigurePasses::add_convergence() {
   }
 }
 
-void FigurePasses::add(const RunResult& result) {
+void ErrorFigures::add(const RunResult& result) {
   if (!result.is_completed()) return;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     add_error(result.run, result.error(i), quantities_[i]);
@@ -77,15 +159,11 @@ void leave_out_intervals(QuantityFigures& figures) {
   }
 }
 
-bool FigurePasses::end_pass() {
+std::vector<QuantityFigures> ErrorFigures::figures() {
   // Where runs have no estimate, the last count is not reached.
   const bool has_last = !quantities_.empty() && !quantities_[0].convergence.empty() &&
                         quantities_[0].convergence.back().num_runs == num_estimated_;
   if (num_estimated_ > 0 && !has_last) add_convergence();
-  return false;
-}
-
-std::vector<QuantityFigures> FigurePasses::figures() const {
   std::vector<QuantityFigures> figures;
   for (const Growing& quantity : quantities_) {
     figures.push_back({.magnitudes = quantity.magnitudes.histogram(),

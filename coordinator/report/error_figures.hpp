@@ -1,21 +1,57 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "coordinator/report/error_bins.hpp"
-#include "coordinator/report/result_passes.hpp"
-#include "core/runs.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 
 namespace proofmass::coordinator {
 
-/// A run and the |error| of a quantity in it, SI.
-struct RunError {
-  RunIndex run;
-  double magnitude = 0.0;
+/// Counts of values between edges: what a histogram shows.
+struct Histogram {
+  std::vector<double> edges;  ///< Ascending; one more than there are counts. None: no value.
+  std::vector<std::uint64_t> counts;  ///< Of the values in [edges[i], edges[i + 1]).
+  std::uint64_t num_below = 0;        ///< Values below the first edge.
+};
+
+/// Counts magnitudes, ten bins a power of ten. Memory is fixed.
+class MagnitudeBins {
+ public:
+  MagnitudeBins();
+
+  /// @param value  ≥ 0, at most 1e91.
+  void add(double value);
+
+  /// From the bin that at most 1 % of the values lie below to that of the largest.
+  [[nodiscard]] Histogram histogram() const;
+
+ private:
+  std::uint64_t num_values_ = 0;
+  std::vector<std::uint64_t> counts_;
+};
+
+/// Counts values of either sign in at most 64 bins of equal width about 0. The width is the
+/// smallest power of two with which all values have a bin: it depends on the largest |value| alone,
+/// not on the order.
+class ErrorBins {
+ public:
+  ErrorBins();
+
+  /// @param value  Between -1e91 and 1e91.
+  void add(double value);
+
+  /// From the first bin with a value to the last.
+  [[nodiscard]] Histogram histogram() const;
+
+ private:
+  void double_width();
+
+  int exponent_;  ///< Bins are 2^exponent wide.
+  std::vector<std::uint64_t> counts_;
 };
 
 /// What the first n runs that have an estimate tell of |error|, SI.
@@ -32,9 +68,9 @@ struct ConvergencePoint {
 
 /// What the charts of one quantity show: binned or thinned, whatever the number of runs.
 struct QuantityFigures {
-  Histogram magnitudes;                       ///< Of |error|, SI.
-  Histogram errors;                           ///< Of the error with its sign, SI.
-  std::vector<RunError> worst;                ///< The five largest; of equal ones the first.
+  Histogram magnitudes;         ///< Of |error|, SI.
+  Histogram errors;             ///< Of the error with its sign, SI.
+  std::vector<RunValue> worst;  ///< The five largest |error|; of equal ones the first.
   std::vector<ConvergencePoint> convergence;  ///< At most 42, the last of all runs.
 };
 
@@ -46,23 +82,22 @@ void leave_out_intervals(QuantityFigures& figures);
 /// @param num_runs  The last one, unless it is 0.
 [[nodiscard]] std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs);
 
-/// Computes them in one pass. Memory is some 100 kB.
-class FigurePasses final : public ResultPasses {
+/// Computes them from results that are seen once, in run order. Memory is some 100 kB.
+class ErrorFigures {
  public:
   /// @param num_runs  Finished runs, with an estimate or without.
-  FigurePasses(std::size_t num_quantities, std::uint64_t num_runs);
+  ErrorFigures(std::size_t num_quantities, std::uint64_t num_runs);
 
-  void add(const RunResult& result) override;
-  [[nodiscard]] bool end_pass() override;
+  void add(const RunResult& result);
 
-  /// Of each quantity. @pre The pass has ended.
-  [[nodiscard]] std::vector<QuantityFigures> figures() const;
+  /// Of each quantity. To be called once, after all results.
+  [[nodiscard]] std::vector<QuantityFigures> figures();
 
  private:
   struct Growing {
     MagnitudeBins magnitudes;
     ErrorBins errors;
-    std::vector<RunError> worst;
+    std::vector<RunValue> worst;
     std::optional<MomentSums> sums;  ///< About the first |error|, which is of their size.
     std::vector<ConvergencePoint> convergence;
   };

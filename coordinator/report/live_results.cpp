@@ -8,7 +8,8 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/review_charts.hpp"
-#include "coordinator/table/html_table.hpp"
+#include "coordinator/table/document_table.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 
 namespace proofmass::coordinator {
@@ -42,7 +43,7 @@ std::string LiveResults::html() const {
         .magnitudes = magnitudes_[i].histogram(), .errors = {}, .worst = {}, .convergence = {}};
     const AccuracyStatistic& accuracy = review.results.statistics.accuracy[i];
     if (review.results.statistics.num_estimated > 0) {
-      figures.worst.push_back({.run = accuracy.worst_run, .magnitude = accuracy.worst});
+      figures.worst.push_back({.run = accuracy.worst_run, .value = accuracy.worst});
     }
     review.figures.push_back(std::move(figures));
   }

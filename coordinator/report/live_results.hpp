@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/report/error_bins.hpp"
+#include "coordinator/report/error_figures.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"

@@ -11,41 +11,37 @@
 namespace proofmass::coordinator {
 namespace {
 
-bool is_joint_row(const MatrixRow& row) {
-  return row.answer.requirement.subject == Requirement::Subject::all_objectives;
-}
-
 Cell count_cell(std::uint64_t count) { return {std::to_string(count), static_cast<double>(count)}; }
 
-Quantity quantity_of(const MatrixRow& row) {
-  return requirement_subject(row.answer.requirement.parameter);
+Quantity quantity_of(const RequirementAnswer& row) {
+  return requirement_subject(row.requirement.parameter);
 }
 
 /// `|error| of a_c12`, or the budget or a term of it.
-std::string subject_of(const MatrixRow& row) {
-  if (is_joint_row(row)) return "all objectives";
+std::string subject_of(const RequirementAnswer& row) {
+  if (row.is_joint()) return "all objectives";
   const std::string symbol(quantity_of(row).symbol);
-  const bool is_error = row.answer.requirement.parameter < model().results().quantities.size();
+  const bool is_error = row.requirement.parameter < model().results().quantities.size();
   return is_error ? "|error| of " + symbol : symbol;
 }
 
 /// In the unit of the tables; a ratio to the objectives without one.
-Cell value_cell(const MatrixRow& row, const std::optional<double>& value) {
+Cell value_cell(const RequirementAnswer& row, const std::optional<double>& value) {
   if (!value) return "none";
-  return {is_joint_row(row) ? figure_text(*value) + " × objective"
-                            : quantity_text(*value, quantity_of(row)),
+  return {row.is_joint() ? figure_text(*value) + " × objective"
+                         : quantity_text(*value, quantity_of(row)),
           *value};
 }
 
-Cell margin_cell(const MatrixRow& row) {
+Cell margin_cell(const RequirementAnswer& row) {
   const std::optional<double> margin = row.relative_margin();
   if (!margin) return "none";
   return {figure_text(100.0 * *margin) + " %", *margin};
 }
 
 /// `|error| of a_c12, for 95 % with 90 %`, after the words of the project.
-std::string statement_of(const MatrixRow& row) {
-  const Tolerance& tolerance = row.answer.requirement.tolerance;
+std::string statement_of(const RequirementAnswer& row) {
+  const Tolerance& tolerance = row.requirement.tolerance;
   const std::string text =
       fmt::format("{}, for {} with {}", subject_of(row), given_percent(tolerance.coverage),
                   given_percent(tolerance.confidence));
@@ -53,8 +49,8 @@ std::string statement_of(const MatrixRow& row) {
                                                     : fmt::format("{} ({})", row.stated.text, text);
 }
 
-Row matrix_cells(const MatrixRow& row) {
-  const RequirementCheck& check = row.answer.check;
+Row matrix_cells(const RequirementAnswer& row) {
+  const RequirementCheck& check = row.check;
   return {requirement_name(row),
           statement_of(row),
           value_cell(row, row.limit),
@@ -84,7 +80,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
       fmt::format("Statistical interpretation in the terms of ECSS-E-ST-60-10C: {}. {}",
                   name_of(review.interpretation), draw_sentence(review.interpretation)),
       "Verdicts: " +
-          (review.matrix.empty() ? std::string("none") : rule_text(review.matrix.front().answer)) +
+          (review.matrix.empty() ? std::string("none") : rule_text(review.matrix.front())) +
           ". With the confidence c of a row a requirement that does not hold is called met with "
           "probability 1 − c at most, the consumer's risk; so is one that holds called not met. "
           "The producer's risk, that one that holds is not called met, is the smaller the better "
@@ -93,7 +89,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
       "so many draws meet the requirement.",
       "Bound: with the confidence of the row, the stated part of all draws stays below it (order "
       "statistics, any law). Margin: (limit − bound) / limit."};
-  if (std::ranges::any_of(review.matrix, is_joint_row)) {
+  if (std::ranges::any_of(review.matrix, &RequirementAnswer::is_joint)) {
     notes.emplace_back(
         "All objectives together: limit and bound are of the largest ratio of an |error| to its "
         "objective in a draw.");
@@ -109,27 +105,13 @@ std::vector<std::string> matrix_notes(const Review& review) {
 
 }  // namespace
 
-bool is_default(const MatrixRow& row) {
+bool is_default(const RequirementAnswer& row) {
   return row.stated.text.starts_with("Objective of ") ||
          row.stated.text == joint_requirement().text;
 }
 
-std::string requirement_name(const MatrixRow& row) {
-  return is_default(row) && !is_joint_row(row) ? std::string(quantity_of(row).symbol)
-                                               : row.stated.id;
-}
-
-std::string shell_word(std::string_view text) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '/' || c == '-' || c == '+';
-  };
-  if (!text.empty() && std::ranges::all_of(text, is_plain) && text[0] != '-') {
-    return std::string(text);
-  }
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  return word + "'";
+std::string requirement_name(const RequirementAnswer& row) {
+  return is_default(row) && !row.is_joint() ? std::string(quantity_of(row).symbol) : row.stated.id;
 }
 
 Table matrix_table(const Review& review) {
@@ -153,7 +135,7 @@ Table matrix_table(const Review& review) {
     table.notes = {fmt::format("No verdicts: {}.", review.why_not_independent)};
     return table;
   }
-  for (const MatrixRow& row : review.matrix) table.rows.push_back(matrix_cells(row));
+  for (const RequirementAnswer& row : review.matrix) table.rows.push_back(matrix_cells(row));
   return table;
 }
 

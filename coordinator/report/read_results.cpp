@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/order.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -35,18 +37,47 @@ bool are_current(const Store& store) {
          summary->num_given_up == num_runs_in(store.given_up_runs());
 }
 
-/// Lets a class with the same functions be one of several ResultPasses.
-template <typename Passes>
-class PassesOf final : public ResultPasses {
+/// Doubles that are kept while results are read, 128 MB.
+constexpr std::size_t num_kept_max = std::size_t{1} << 24;
+
+/// estimate − truth of the first quantities, of all of them while results are few.
+class KeptErrors {
  public:
-  template <typename Argument>
-  explicit PassesOf(Argument&& argument) : passes(std::forward<Argument>(argument)) {}
+  explicit KeptErrors(std::size_t num_quantities) : columns_(num_quantities) {}
 
-  void add(const RunResult& result) override { passes.add(result); }
-  [[nodiscard]] bool end_pass() override { return passes.end_pass(); }
+  void add(const RunResult& result) {
+    if (!result.is_completed()) return;
+    ++num_runs_;
+    while (columns_.size() * num_runs_ > num_kept_max) columns_.pop_back();
+    for (std::size_t i = 0; i < columns_.size(); ++i) columns_[i].push_back(result.error(i));
+  }
 
-  Passes passes;
+  /// To be called once for a quantity. @pre The results were added.
+  [[nodiscard]] std::vector<double> take(const Store& store, std::size_t quantity) {
+    if (quantity < columns_.size()) return std::move(columns_[quantity]);
+    std::vector<double> errors;
+    errors.reserve(num_runs_);
+    store.for_each_error(quantity, num_runs_max, [&](double error) { errors.push_back(error); });
+    return errors;
+  }
+
+ private:
+  std::vector<std::vector<double>> columns_;
+  std::size_t num_runs_ = 0;
 };
+
+void add_total(RunIndex run, double total, std::vector<double>& totals,
+               std::optional<RunTotals>& of_runs) {
+  totals.push_back(total);
+  if (!of_runs || total > of_runs->worst) of_runs = {.worst = total, .worst_run = run};
+}
+
+void end_totals(std::vector<double> totals, std::optional<RunTotals>& of_runs) {
+  if (!of_runs) return;
+  std::ranges::sort(totals);
+  of_runs->median = percentile(totals, 0.5);
+  of_runs->percentile_95 = percentile(totals, 0.95);
+}
 
 }  // namespace
 
@@ -73,29 +104,6 @@ std::string reasons_text(const MissingEstimates& missing) {
     if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
   }
   return text;
-}
-
-RunTotalPasses::RunTotalPasses(ErrorBudget budget)
-    : budget_(std::move(budget)), passes_({.levels = {0.5, 0.95}}) {}
-
-void RunTotalPasses::add(const RunResult& result) {
-  if (!result.is_completed()) return;
-  const double total = budget_.of_run(result).total;
-  passes_.add(total);
-  if (!is_first_ && total <= totals_.worst) return;
-  is_first_ = false;
-  totals_.worst = total;
-  totals_.worst_run = result.run;
-}
-
-bool RunTotalPasses::end_pass() { return passes_.end_pass(); }
-
-std::optional<RunTotals> RunTotalPasses::totals() const {
-  if (passes_.count() == 0) return std::nullopt;
-  RunTotals totals = totals_;
-  totals.median = passes_.percentile(0.5);
-  totals.percentile_95 = passes_.percentile(0.95);
-  return totals;
 }
 
 namespace {
@@ -136,41 +144,42 @@ std::string warnings_text(const CampaignWarnings& warnings) {
 }
 
 ReadResults read_results(const Store& store, const Campaign& campaign,
-                         std::span<ResultPasses* const> further) {
-  PassesOf<StatisticsPasses> statistics(campaign.objectives());
-  std::optional<PassesOf<RunTotalPasses>> totals;
-  std::vector<ResultPasses*> open{&statistics};
-  if (std::optional<ErrorBudget> budget = campaign.error_budget()) {
-    open.push_back(&totals.emplace(*std::move(budget)));
-  }
-  open.insert(open.end(), further.begin(), further.end());
+                         const ResultVisitor& further) {
   ReadResults results{.statistics = {}, .digests = {}, .totals = {}, .warnings = {}};
+  const std::vector<double> objectives = campaign.objectives();
+  RunningStatistics statistics(objectives);
+  KeptErrors kept(objectives.size());
+  std::vector<double> totals;
+  const std::optional<ErrorBudget> budget = campaign.error_budget();
   const Warner warner = campaign.warner();
   store.read_one_state([&] {
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());
-      for (ResultPasses* const passes : open) passes->add(result);
+      statistics.add(result);
+      kept.add(result);
+      if (budget && result.is_completed()) {
+        add_total(result.run, budget->of_run(result).total, totals, results.totals);
+      }
       digest.add(result);
       add_warnings(warner, result, results.warnings);
+      if (further.result) further.result(result);
     });
-    // They may need different numbers of passes.
-    const auto is_done = [](ResultPasses* passes) { return !passes->end_pass(); };
-    while (std::erase_if(open, is_done), !open.empty()) {
-      store.for_each_result([&](const RunResult& result) {
-        for (ResultPasses* const passes : open) passes->add(result);
-      });
-    }
-    results.statistics = statistics.passes.statistics();
-    if (!why_not_independent(campaign).empty()) leave_out_intervals(results.statistics);
+    end_totals(std::move(totals), results.totals);
     results.digests = digest.finish();
-    if (totals) results.totals = totals->passes.totals();
+    results.statistics = statistics.statistics();
+    for (std::size_t i = 0; i < objectives.size() && results.statistics.num_estimated > 0; ++i) {
+      std::vector<double> errors = kept.take(store, i);
+      complete(results.statistics.accuracy[i], errors);
+      if (further.magnitudes) further.magnitudes(i, errors);
+    }
+    if (!why_not_independent(campaign).empty()) leave_out_intervals(results.statistics);
   });
   return results;
 }
 
 CheckedResults read_checked_results(const Store& store, const Campaign& campaign,
-                                    std::span<ResultPasses* const> further) {
+                                    const ResultVisitor& further) {
   CheckedResults checked;
   store.read_one_state([&] {
     checked.results = read_results(store, campaign, further);

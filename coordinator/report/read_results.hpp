@@ -2,18 +2,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/result_passes.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
-#include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
 
@@ -44,25 +43,6 @@ struct RunTotals {
   double percentile_95 = 0.0;
 };
 
-/// Computes them of results that are seen in passes, see ValuePasses.
-class RunTotalPasses {
- public:
-  explicit RunTotalPasses(ErrorBudget budget);
-
-  /// Leaves out a result without an estimate.
-  void add(const RunResult& result);
-  /// @return True if another pass, with the same results, is needed.
-  [[nodiscard]] bool end_pass();
-  /// Empty without a run that has an estimate. @pre No further pass is needed.
-  [[nodiscard]] std::optional<RunTotals> totals() const;
-
- private:
-  ErrorBudget budget_;
-  ValuePasses passes_;
-  RunTotals totals_;
-  bool is_first_ = true;  ///< No total was added in any pass.
-};
-
 /// How often an effect may have moved an estimate.
 struct WarnedQuantity {
   std::string_view effect;
@@ -90,12 +70,20 @@ struct ReadResults {
   CampaignWarnings warnings;
 };
 
-/// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if
-/// they are many. Memory does not grow with them.
-/// @param further  See the same results, in the same passes and in further ones if they need them.
+/// Sees what read_results() reads.
+struct ResultVisitor {
+  /// Called with all results, in run order.
+  std::function<void(const RunResult&)> result;
+  /// Called after that for each quantity, if a run has an estimate, with |error| of the completed
+  /// runs, SI, in ascending order.
+  std::function<void(std::size_t quantity, std::span<const double> magnitudes)> magnitudes;
+};
+
+/// Reads all results, of one state of the file, and then, if they are too many for 128 MB, the
+/// errors of one quantity after the other: 8 bytes a run.
 /// @throws Error if a number is out of range, see require_in_range().
 [[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign,
-                                       std::span<ResultPasses* const> further = {});
+                                       const ResultVisitor& further = {});
 
 /// What a report is made of.
 struct CheckedResults {
@@ -105,10 +93,9 @@ struct CheckedResults {
 };
 
 /// Reads all results, of one state of the file, and holds them against what is stored beside them.
-/// @param further  As for read_results().
 /// @throws StoreError as report_text() does.
 [[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign,
-                                                  std::span<ResultPasses* const> further = {});
+                                                  const ResultVisitor& further = {});
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);

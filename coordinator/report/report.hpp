@@ -4,8 +4,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/requirements.hpp"
+#include "coordinator/report/stated_requirement.hpp"
 #include "coordinator/store/store.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
@@ -34,5 +37,14 @@ namespace proofmass::coordinator {
 /// @param given_up  Ascending.
 [[nodiscard]] std::string given_up_text(std::span<const RunRange> given_up,
                                         Paint paint = Paint::no);
+
+/// What report_text() tells, but for the stop rule, and the answers to requirements, as JSON for
+/// programs, with the verification matrix: in full precision and SI units.
+/// coordinator/cli/README.md lists the keys.
+/// @param stated  Of the matrix; see matrix_requirements().
+/// @throws StoreError as report_text() does; ConfigError as parse_requirement().
+[[nodiscard]] std::string report_json(const Store& store, const Campaign& campaign,
+                                      std::span<const RequirementAnswer> answers,
+                                      std::span<const StatedRequirement> stated);
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,3 @@
-#include "coordinator/report/report_json.hpp"
-
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -137,7 +134,7 @@ Json warnings_of(const CampaignWarnings& warnings) {
 Json json_of(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Requirement& requirement = answer.requirement;
-  Json json{{"requirement", answer.text},
+  Json json{{"requirement", answer.stated.requirement},
             {"answer", name_of(check.verdict)},
             {"rule", check.is_of_fixed_size ? "fixed size" : "sequential"},
             {"parameter", nullptr},
@@ -149,17 +146,17 @@ Json json_of(const RequirementAnswer& answer) {
             {"num_without_estimate", check.num_without_estimate},
             {"num_exceedances_allowed", check.num_allowed},
             {"exceedance_bounds", bounds_of(check.exceedance)},
-            {"tolerance_bound", check.bound ? Json(check.bound->value) : Json(nullptr)},
+            {"tolerance_bound", answer.is_joint() ? Json(nullptr) : or_null(answer.bound)},
             {"num_runs_at_best", or_null(check.num_runs_at_best)},
             {"num_runs_at_this_rate", or_null(check.num_runs_at_this_rate)}};
-  if (requirement.subject == Requirement::Subject::parameter) {
+  if (!answer.is_joint()) {
     json["parameter"] = requirement_subject(requirement.parameter).name;
     json["limit"] = requirement.limit;
   }
   return json;
 }
 
-Json json_of(const MatrixRow& row, Interpretation interpretation) {
+Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
   Json json{{"id", row.stated.id},
             {"text", row.stated.text},
             {"interpretation", name_of(interpretation)},
@@ -167,7 +164,7 @@ Json json_of(const MatrixRow& row, Interpretation interpretation) {
             {"relative_margin", or_null(row.relative_margin())},
             {"worst_run", row.worst ? Json(row.worst->run.value) : Json(nullptr)},
             {"worst_value", row.worst ? Json(row.worst->value) : Json(nullptr)}};
-  json.update(json_of(row.answer));
+  json.update(json_of(row));
   json["limit"] = or_null(row.limit);
   return json;
 }
@@ -177,12 +174,15 @@ Json json_of(const MatrixRow& row, Interpretation interpretation) {
 std::string report_json(const Store& store, const Campaign& campaign,
                         std::span<const RequirementAnswer> answers,
                         std::span<const StatedRequirement> stated) {
-  MatrixPasses matrix(matrix_requirements({stated.begin(), stated.end()}, campaign.objectives()),
-                      campaign.objectives(), num_runs_in(store.given_up_runs()),
-                      store.num_runs_fixed(), campaign.error_budget());
-  const std::array<ResultPasses*, 1> further{&matrix};
-  CheckedResults checked;
-  store.read_one_state([&] { checked = read_checked_results(store, campaign, further); });
+  VerificationMatrix matrix(
+      matrix_requirements({stated.begin(), stated.end()}, campaign.objectives()),
+      campaign.objectives(), num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
+      campaign.error_budget());
+  const CheckedResults checked = read_checked_results(
+      store, campaign,
+      {.result = [&](const RunResult& result) { matrix.add(result); },
+       .magnitudes = [&](std::size_t quantity,
+                         auto magnitudes) { matrix.add_magnitudes(quantity, magnitudes); }});
   const CampaignStatistics& statistics = checked.results.statistics;
   const std::uint64_t num_given_up = num_runs_in(checked.given_up);
   Json json{{"campaign", store.name()},
@@ -210,7 +210,7 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"matrix", Json::array()}};
   json["why_not_independent"] = why_not_independent(campaign);
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
-  for (const MatrixRow& row : matrix.rows()) {
+  for (const RequirementAnswer& row : matrix.answers()) {
     if (!statistics.are_draws_independent) break;
     json["matrix"].push_back(json_of(row, campaign.interpretation()));
   }

@@ -5,11 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "coordinator/report/digest.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model_rules.hpp"
-#include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -40,31 +38,6 @@ std::string short_percent(double fraction) {
   int num_digits = 3;
   while (num_digits < 12 && std::stod(percent(fraction, num_digits)) >= 100.0) ++num_digits;
   return percent(fraction, num_digits);
-}
-
-/// Keeps the errors of one parameter, 8 bytes a run, at a time; none for all objectives.
-void check(const Store& store, std::span<const double> objectives,
-           const std::optional<ErrorBudget>& budget, RequirementAnswer& answer) {
-  const Requirement& requirement = answer.requirement;
-  const bool is_of_errors = requirement.subject == Requirement::Subject::parameter;
-  answer.missing = {.num_given_up = num_runs_in(store.given_up_runs())};
-  std::vector<double> errors;
-  Exceedances exceedances(requirement, objectives, budget);
-  std::uint64_t num_runs = answer.missing.num_given_up;
-  (void)walk_checked(store, [&](const RunResult& result) {
-    require_in_range(result, model().results());
-    ++num_runs;
-    answer.missing.add(result);
-    exceedances.add(result);
-    if (is_of_errors && result.is_completed()) {
-      errors.push_back(required_value(result, requirement.parameter, budget));
-    }
-  });
-  answer.num_fixed = store.num_runs_fixed();
-  answer.check =
-      is_of_errors
-          ? check_requirement(requirement, errors, answer.missing.total(), answer.num_fixed)
-          : check_requirement(requirement, exceedances.of(num_runs), answer.num_fixed);
 }
 
 constexpr std::size_t margin = 13;
@@ -108,32 +81,30 @@ std::string holding_lines(const RequirementAnswer& answer) {
 }
 
 std::string bound_line(const RequirementAnswer& answer) {
-  const RequirementCheck& check = answer.check;
   const Tolerance& tolerance = answer.requirement.tolerance;
-  if (answer.requirement.subject == Requirement::Subject::all_objectives) return "";
-  if (!check.bound) {
+  if (answer.is_joint()) return "";
+  if (!answer.bound) {
     return fmt::format("Bound        none of so few draws, for {} with {}\n",
                        given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
   const Quantity quantity = requirement_subject(answer.requirement.parameter);
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
-                     given_percent(tolerance.coverage), check.bound->value,
+                     given_percent(tolerance.coverage), *answer.bound,
                      quantity.unit == "1" ? "" : " ", quantity.unit == "1" ? "" : quantity.unit,
                      given_percent(tolerance.confidence));
 }
 
 std::string needed_line(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
-  if (check.verdict != Verdict::undecided) return "";
-  const bool is_joint = answer.requirement.subject == Requirement::Subject::all_objectives;
+  if (check.verdict != RequirementVerdict::undecided) return "";
   const auto count = [](const std::optional<std::uint64_t>& num_runs) {
     return num_runs ? std::to_string(*num_runs) : "none";
   };
   return fmt::format(
       "Draws        {} meet the requirement if no further one exceeds {},\n"
       "             {} decide if they go on to exceed {} as often\n",
-      count(check.num_runs_at_best), is_joint ? "an objective" : "the limit",
-      count(check.num_runs_at_this_rate), is_joint ? "one" : "it");
+      count(check.num_runs_at_best), answer.is_joint() ? "an objective" : "the limit",
+      count(check.num_runs_at_this_rate), answer.is_joint() ? "one" : "it");
 }
 
 }  // namespace
@@ -173,6 +144,11 @@ ExceedanceCount Exceedances::of(std::uint64_t num_runs) const {
           .num_without_estimate = num_without_estimate};
 }
 
+std::optional<double> RequirementAnswer::relative_margin() const {
+  if (!limit || !bound) return std::nullopt;
+  return 1.0 - *bound / *limit;
+}
+
 std::string rule_text(const RequirementAnswer& answer) {
   if (answer.check.is_of_fixed_size) {
     return fmt::format("{} draws, a number fixed before the first result", answer.check.num_runs);
@@ -180,13 +156,13 @@ std::string rule_text(const RequirementAnswer& answer) {
   return "sequential: holds however often one looks and goes on";
 }
 
-std::string_view name_of(Verdict verdict) {
+std::string_view name_of(RequirementVerdict verdict) {
   switch (verdict) {
-    case Verdict::met:
+    case RequirementVerdict::met:
       return "met";
-    case Verdict::not_met:
+    case RequirementVerdict::not_met:
       return "not met";
-    case Verdict::undecided:
+    case RequirementVerdict::undecided:
       return "undecided";
   }
   PROOFMASS_EXPECT(false);
@@ -198,53 +174,40 @@ std::string interval_percent(const Interval& interval) {
   return fmt::format("{} to {} %", short_percent(interval.lower), short_percent(interval.upper));
 }
 
-std::string bounds_text(const Interval& bounds, double limit, Verdict verdict) {
+std::string bounds_text(const Interval& bounds, double limit, RequirementVerdict verdict) {
   const std::string confidence = given_percent(bounds.confidence);
   const std::string lower = percent_beside(bounds.lower, limit);
   const std::string upper = percent_beside(bounds.upper, limit);
-  if (verdict == Verdict::met) {
+  if (verdict == RequirementVerdict::met) {
     return fmt::format("at most {} of all draws, with {}", upper, confidence);
   }
-  if (verdict == Verdict::not_met) {
+  if (verdict == RequirementVerdict::not_met) {
     return fmt::format("at least {} of all draws, with {}", lower, confidence);
   }
   return fmt::format("at least {} and at most {} of all draws, each with {}", lower, upper,
                      confidence);
 }
 
-std::string success_text(const Interval& bounds, double required, Verdict verdict) {
+std::string success_text(const Interval& bounds, double required, RequirementVerdict verdict) {
   // What is above the requirement meets it: as what is below the limit does, the other way round.
-  if (verdict == Verdict::met) return bounds_text(bounds, required, Verdict::not_met);
-  if (verdict == Verdict::not_met) return bounds_text(bounds, required, Verdict::met);
+  if (verdict == RequirementVerdict::met)
+    return bounds_text(bounds, required, RequirementVerdict::not_met);
+  if (verdict == RequirementVerdict::not_met)
+    return bounds_text(bounds, required, RequirementVerdict::met);
   return bounds_text(bounds, required, verdict);
 }
 
-std::vector<RequirementAnswer> check_requirements(const Store& store,
-                                                  std::span<const double> objectives,
-                                                  std::span<const std::string> texts,
-                                                  const std::optional<ErrorBudget>& budget) {
-  std::vector<RequirementAnswer> answers;
-  for (const std::string& text : texts) {
-    answers.push_back(
-        {.text = text, .requirement = parse_requirement(text), .check = {}, .missing = {}});
-  }
-  for (RequirementAnswer& answer : answers) {
-    store.read_one_state([&] { check(store, objectives, budget, answer); });
-  }
-  return answers;
-}
-
-Tone tone_of(Verdict verdict) {
-  if (verdict == Verdict::undecided) return Tone::open;
-  return verdict == Verdict::met ? Tone::good : Tone::bad;
+Tone tone_of(RequirementVerdict verdict) {
+  if (verdict == RequirementVerdict::undecided) return Tone::open;
+  return verdict == RequirementVerdict::met ? Tone::good : Tone::bad;
 }
 
 std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
-  const bool is_joint = answer.requirement.subject == Requirement::Subject::all_objectives;
   return fmt::format("Requirement  {}\nAnswer       {}\nRule         {}\n{}{}{}",
-                     wire::visible_text(answer.text),
+                     wire::visible_text(answer.stated.requirement),
                      in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
-                     rule_text(answer), is_joint ? holding_lines(answer) : exceedance_lines(answer),
+                     rule_text(answer),
+                     answer.is_joint() ? holding_lines(answer) : exceedance_lines(answer),
                      bound_line(answer), needed_line(answer));
 }
 

@@ -9,17 +9,18 @@
 #include <vector>
 
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/store/store.hpp"
+#include "coordinator/report/stated_requirement.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/requirement.hpp"
 
 namespace proofmass::coordinator {
 
 /// `met`, `not met` or `undecided`.
-[[nodiscard]] std::string_view name_of(Verdict verdict);
+[[nodiscard]] std::string_view name_of(RequirementVerdict verdict);
 
 /// A fraction as it was asked for: 0.999999 is `99.9999 %`, not 100 %.
 [[nodiscard]] std::string given_percent(double fraction);
@@ -33,10 +34,12 @@ namespace proofmass::coordinator {
 /// limit it lies.
 /// @param bounds  Each one-sided, of the probability of an exceedance.
 /// @param limit   The probability that is allowed.
-[[nodiscard]] std::string bounds_text(const Interval& bounds, double limit, Verdict verdict);
+[[nodiscard]] std::string bounds_text(const Interval& bounds, double limit,
+                                      RequirementVerdict verdict);
 
 /// bounds_text() of the probability that a requirement holds, beside what is required.
-[[nodiscard]] std::string success_text(const Interval& bounds, double required, Verdict verdict);
+[[nodiscard]] std::string success_text(const Interval& bounds, double required,
+                                       RequirementVerdict verdict);
 
 /// What a requirement of the subject at a position compares with its limit, see
 /// requirement_subjects(): an |error|, the total of the budget or a term of it.
@@ -70,37 +73,44 @@ class Exceedances {
   std::uint64_t num_exceeding_ = 0;
 };
 
-/// A requirement as somebody wrote it, and what the results of a campaign say about it.
+/// A run, and how far it is off.
+struct RunValue {
+  RunIndex run;
+  double value = 0.0;
+};
+
+/// A requirement as somebody stated it, and what the results of a campaign say about it: a row of
+/// the verification matrix.
 struct RequirementAnswer {
-  std::string text;
+  StatedRequirement stated;
   Requirement requirement;
   RequirementCheck check;
-  MissingEstimates missing;                     ///< The exceedances for want of an estimate.
-  std::optional<std::uint64_t> num_fixed = {};  ///< See decide().
+  MissingEstimates missing;  ///< The exceedances for want of an estimate.
+  /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest
+  /// ratio of an |error| to its objective. Empty if they are infinite, all of them.
+  std::optional<double> limit;
+  /// Upper tolerance bound of the |error| or of that ratio by order statistics: with the confidence
+  /// of the requirement, `coverage` of all draws stay below. Empty if draws are too few.
+  std::optional<double> bound;
+  std::optional<RunValue> worst;  ///< In the unit of the limit; empty if no run has an estimate.
+
+  [[nodiscard]] bool is_joint() const {
+    return requirement.subject == Requirement::Subject::all_objectives;
+  }
+  /// 1 − bound / limit.
+  [[nodiscard]] std::optional<double> relative_margin() const;
 };
 
 /// What the verdict rests on: `299 draws, a number fixed before the first result` or `sequential:
 /// holds however often one looks and goes on`.
 [[nodiscard]] std::string rule_text(const RequirementAnswer& answer);
 
-/// Holds requirements against the results in a campaign database; runs without an estimate, and
-/// those that were given up, count as exceedances.
-///
-/// @param objectives  Those of the campaign's scenario.
-/// @param texts       See parse_requirement().
-/// @param budget      The same of the campaign's budget, for requirements about it.
-/// @throws ConfigError if one cannot be read.
-[[nodiscard]] std::vector<RequirementAnswer> check_requirements(
-    const Store& store, std::span<const double> objectives, std::span<const std::string> texts,
-    const std::optional<ErrorBudget>& budget = std::nullopt);
-
 /// Answer, what it rests on, the bound by which it was decided, the tolerance bound, and the draws
-/// it takes; lines of
-/// at most 80 characters unless the requirement is longer.
+/// it takes; lines of at most 80 characters unless the requirement is longer.
 [[nodiscard]] std::string requirement_text(const RequirementAnswer& answer,
                                            Paint paint = Paint::no);
 
 /// What a verdict is painted for.
-[[nodiscard]] Tone tone_of(Verdict verdict);
+[[nodiscard]] Tone tone_of(RequirementVerdict verdict);
 
 }  // namespace proofmass::coordinator

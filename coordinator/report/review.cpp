@@ -1,9 +1,9 @@
 #include "coordinator/report/review.hpp"
 
-#include <array>
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
@@ -46,16 +46,23 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                 .execution = {},
                 .stop = {}};
   review.num_given_up = num_runs_in(store.given_up_runs());
-  FigurePasses figures(review.objectives.size(), num_runs_in(store.finished_runs()));
-  MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up,
-                      store.num_runs_fixed(), review.budget);
-  const std::array<ResultPasses*, 2> further{&figures, &matrix};
-  CheckedResults checked = read_checked_results(store, campaign, further);
+  ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()));
+  VerificationMatrix matrix(std::move(stated), review.objectives, review.num_given_up,
+                            store.num_runs_fixed(), review.budget);
+  CheckedResults checked = read_checked_results(
+      store, campaign,
+      {.result =
+           [&](const RunResult& result) {
+             figures.add(result);
+             matrix.add(result);
+           },
+       .magnitudes = [&](std::size_t quantity,
+                         auto magnitudes) { matrix.add_magnitudes(quantity, magnitudes); }});
   review.results = std::move(checked.results);
   review.digest_check = checked.check;
   review.missing = missing_of(review.results.statistics, review.num_given_up);
   review.figures = figures.figures();
-  review.matrix = matrix.rows();
+  review.matrix = matrix.answers();
   review.why_not_independent = why_not_independent(campaign);
   if (!review.why_not_independent.empty()) {
     for (QuantityFigures& quantity : review.figures) leave_out_intervals(quantity);
@@ -66,9 +73,8 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
 }  // namespace
 
 std::optional<RunIndex> worst_run_of(const Review& review) {
-  for (const MatrixRow& row : review.matrix) {
-    if (row.answer.requirement.subject != Requirement::Subject::all_objectives) continue;
-    if (row.worst) return row.worst->run;
+  for (const RequirementAnswer& row : review.matrix) {
+    if (row.is_joint() && row.worst) return row.worst->run;
   }
   return std::nullopt;
 }

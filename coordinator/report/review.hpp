@@ -5,12 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/report/causes.hpp"
 #include "coordinator/report/error_figures.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/run_spectra.hpp"
+#include "coordinator/report/sensitivity.hpp"
 #include "coordinator/report/verification_matrix.hpp"
-#include "coordinator/store/execution.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
@@ -40,8 +39,8 @@ struct Review {
   std::vector<double> objectives;  ///< Of each quantity, SI.
   Interpretation interpretation = Interpretation::mixed;
   std::optional<ErrorBudget> budget;
-  std::vector<QuantityFigures> figures;  ///< Of each quantity.
-  std::vector<MatrixRow> matrix;         ///< The row of all objectives together is the last one.
+  std::vector<QuantityFigures> figures;   ///< Of each quantity.
+  std::vector<RequirementAnswer> matrix;  ///< The row of all objectives together is the last one.
   /// See why_not_independent(); then the matrix has no verdicts to be shown.
   std::string why_not_independent;
   std::optional<Causes> causes;       ///< Empty if runs are too few, or not asked for.

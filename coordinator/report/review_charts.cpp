@@ -4,8 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/review_tables.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/model.hpp"
 #include "core/statistics/distribution.hpp"
@@ -30,9 +35,9 @@ bool is_same(const Tolerance& a, const Tolerance& b) {
 /// The axis ends where nearly every campaign fails, and at what was seen at the farthest.
 double largest_shown(const Review& review, const Tolerance& tolerance) {
   double end = std::min(4.0 * (1.0 - tolerance.coverage), 1.0);
-  for (const MatrixRow& row : review.matrix) {
-    const RequirementCheck& check = row.answer.check;
-    if (!is_same(row.answer.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
+  for (const RequirementAnswer& row : review.matrix) {
+    const RequirementCheck& check = row.check;
+    if (!is_same(row.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
     end = std::max(end, 1.1 * static_cast<double>(check.num_exceedances) /
                             static_cast<double>(check.num_runs));
   }
@@ -41,9 +46,9 @@ double largest_shown(const Review& review, const Tolerance& tolerance) {
 
 Markers observed_fractions(const Review& review, const Tolerance& tolerance) {
   Markers markers{.name = "seen in this campaign", .ink = Ink::fourth, .shape = Shape::diamond};
-  for (const MatrixRow& row : review.matrix) {
-    const RequirementCheck& check = row.answer.check;
-    if (!is_same(row.answer.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
+  for (const RequirementAnswer& row : review.matrix) {
+    const RequirementCheck& check = row.check;
+    if (!is_same(row.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
     const double seen =
         static_cast<double>(check.num_exceedances) / static_cast<double>(check.num_runs);
     markers.points.push_back({100.0 * seen, 100.0 * probability_to_meet(check, seen)});
@@ -51,9 +56,10 @@ Markers observed_fractions(const Review& review, const Tolerance& tolerance) {
   return markers;
 }
 
-Chart characteristic_chart(const Review& review, const MatrixRow& first, std::size_t number) {
-  const Tolerance& tolerance = first.answer.requirement.tolerance;
-  const RequirementCheck& check = first.answer.check;
+Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
+                           std::size_t number) {
+  const Tolerance& tolerance = first.requirement.tolerance;
+  const RequirementCheck& check = first.check;
   const double end = largest_shown(review, tolerance);
   constexpr int num_points = 120;
   Line line{.name = fmt::format("{} draws", check.num_runs)};
@@ -109,11 +115,11 @@ std::vector<Chart> characteristic_charts(const Review& review) {
   if (!review.why_not_independent.empty()) return {};
   std::vector<Chart> charts;
   std::vector<Tolerance> shown;
-  for (const MatrixRow& row : review.matrix) {
-    const Tolerance& tolerance = row.answer.requirement.tolerance;
+  for (const RequirementAnswer& row : review.matrix) {
+    const Tolerance& tolerance = row.requirement.tolerance;
     const bool is_shown =
         std::ranges::any_of(shown, [&](const Tolerance& one) { return is_same(one, tolerance); });
-    if (is_shown || row.answer.check.num_runs == 0) continue;
+    if (is_shown || row.check.num_runs == 0) continue;
     shown.push_back(tolerance);
     charts.push_back(characteristic_chart(review, row, charts.size() + 1));
   }
@@ -191,5 +197,102 @@ std::vector<NamedPicture> review_pictures(const Review& review) {
 }
 
 bool needs_causes(std::string_view name) { return name == "causes"; }
+
+namespace {
+
+std::string ratio_text(const NoiseRatio& ratio) {
+  return fmt::format("{:.2f} ± {:.2f}", ratio.value, ratio.standard_error);
+}
+
+Line line_of(const SessionSpectrum& spectrum, std::string name, double SpectrumPoint::*density,
+             Ink ink, Dash dash) {
+  Line line{.name = std::move(name), .points = {}, .ink = ink, .dash = dash};
+  for (const SpectrumPoint& point : spectrum.points) {
+    line.points.push_back({point.frequency_hz, point.*density});
+  }
+  return line;
+}
+
+Markers line_markers(const SessionSpectrum& spectrum, bool is_used, std::string name, Ink ink,
+                     Shape shape) {
+  Markers markers{.name = {}, .points = {}, .ink = ink, .shape = shape};
+  for (const SpectrumLine& line : spectrum.lines) {
+    if (line.is_used == is_used) markers.points.push_back({line.frequency_hz, line.height});
+  }
+  if (!markers.points.empty()) markers.name = std::move(name);
+  return markers;
+}
+
+std::string spectrum_description(const SessionSpectrum& spectrum, RunIndex run) {
+  std::string text = fmt::format("Amplitude spectral density of {} in run {}, one-sided.",
+                                 spectrum.meaning, run.value);
+  for (const SpectrumLine& line : spectrum.lines) {
+    if (!line.is_used) continue;
+    text += fmt::format(" The line at {} Hz that the estimate uses has an amplitude of {} {}.",
+                        figure_text(line.frequency_hz), figure_text(line.amplitude), spectrum.unit);
+  }
+  if (spectrum.noise_ratio) {
+    text += fmt::format(" Near these lines the power of the noise is {} times that of its model.",
+                        ratio_text(*spectrum.noise_ratio));
+  }
+  return text;
+}
+
+Chart spectrum_chart(const SessionSpectrum& spectrum, RunIndex run) {
+  return {
+      .text = {.id = "spectrum-" + spectrum.session,
+               .title = fmt::format("{}: {}", name_in_symbols(spectrum.session), spectrum.meaning),
+               .description = spectrum_description(spectrum, run)},
+      .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
+      .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
+      .layers = {
+          line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
+          line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
+                  Dash::solid),
+          line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed),
+          line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
+          line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
+}
+
+/// A line of the estimate, and the noise about it.
+Row line_cells(const SessionSpectrum& spectrum, const SpectrumLine& line) {
+  const auto& ratio = spectrum.noise_ratio;
+  return {name_in_symbols(spectrum.session),
+          {figure_text(1e3 * line.frequency_hz), line.frequency_hz},
+          {figure_text(line.amplitude), line.amplitude},
+          spectrum.unit,
+          ratio ? Cell(ratio_text(*ratio), ratio->value) : Cell("–")};
+}
+
+}  // namespace
+
+std::vector<Chart> spectrum_charts(const RunSpectra& spectra) {
+  std::vector<Chart> charts;
+  for (const SessionSpectrum& spectrum : spectra.sessions) {
+    charts.push_back(spectrum_chart(spectrum, spectra.run));
+  }
+  return charts;
+}
+
+std::string spectrum_name(std::string_view session) { return fmt::format("spectrum:{}", session); }
+
+Table spectrum_table(const RunSpectra& spectra) {
+  Table table{.id = "spectra",
+              .caption = fmt::format("Lines that the estimates of run {} use", spectra.run.value),
+              .columns = {{"session", true},
+                          {"frequency, mHz"},
+                          {"amplitude"},
+                          {"unit", true},
+                          {"noise power ÷ model"}},
+              .notes = {"Noise power: from the median of all frequencies up to a factor of three "
+                        "from these lines, without what is within two bins of a fitted line, ± its "
+                        "standard error."}};
+  for (const SessionSpectrum& spectrum : spectra.sessions) {
+    for (const SpectrumLine& line : spectrum.lines) {
+      if (line.is_used) table.rows.push_back(line_cells(spectrum, line));
+    }
+  }
+  return table;
+}
 
 }  // namespace proofmass::coordinator

@@ -1,5 +1,3 @@
-#include "coordinator/report/review_summary.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -31,7 +29,7 @@ std::string question(const Review& review) {
     return "No requirement was given and no parameter has an objective: nothing was asked.";
   }
   std::vector<std::string> names;
-  for (const MatrixRow& row : review.matrix) {
+  for (const RequirementAnswer& row : review.matrix) {
     if (!is_default(row)) names.push_back(requirement_name(row));
   }
   if (names.empty()) {
@@ -69,14 +67,15 @@ std::string verdicts(const Review& review) {
   }
   if (review.matrix.empty()) return "There is no verdict.";
   std::vector<std::string> parts;
-  for (const Verdict verdict : {Verdict::met, Verdict::not_met, Verdict::undecided}) {
+  for (const RequirementVerdict verdict :
+       {RequirementVerdict::met, RequirementVerdict::not_met, RequirementVerdict::undecided}) {
     std::vector<std::string> names;
-    for (const MatrixRow& row : review.matrix) {
-      if (row.answer.check.verdict == verdict) names.push_back(requirement_name(row));
+    for (const RequirementAnswer& row : review.matrix) {
+      if (row.check.verdict == verdict) names.push_back(requirement_name(row));
     }
     if (names.empty()) continue;
     parts.push_back(fmt::format("{} {} {}", names.size(), be(names.size()), name_of(verdict)));
-    if (verdict != Verdict::met) parts.back() += fmt::format(" ({})", list_of(names));
+    if (verdict != RequirementVerdict::met) parts.back() += fmt::format(" ({})", list_of(names));
   }
   return fmt::format("Of {} {}, {}.", review.matrix.size(),
                      review.matrix.size() == 1 ? "requirement" : "requirements",

@@ -17,10 +17,10 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string name_in_symbols(std::string_view name);
 
 /// True of a requirement that nobody stated: an objective of the campaign, or all together.
-[[nodiscard]] bool is_default(const MatrixRow& row);
+[[nodiscard]] bool is_default(const RequirementAnswer& row);
 
 /// The id of a requirement; of an objective of the campaign, the symbol of its parameter.
-[[nodiscard]] std::string requirement_name(const MatrixRow& row);
+[[nodiscard]] std::string requirement_name(const RequirementAnswer& row);
 
 [[nodiscard]] Table matrix_table(const Review& review);
 
@@ -43,5 +43,15 @@ namespace proofmass::coordinator {
 /// The commands that repeat or check what the report shows, each with what it does.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> reproducing_commands(
     const Review& review);
+
+/// A sentence that may be quoted, and what it follows from.
+struct SummarySentence {
+  std::string text;
+  std::string section;  ///< Title of the section of the report that has the figures.
+};
+
+/// Five sentences: what was asked, how many draws there are, the verdicts, what drives the worst
+/// error, and what the errors leave of the budget.
+[[nodiscard]] std::vector<SummarySentence> review_summary(const Review& review);
 
 }  // namespace proofmass::coordinator

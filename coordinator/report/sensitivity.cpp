@@ -15,7 +15,6 @@
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/sensitivity.hpp"
-#include "core/statistics/term_search.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -101,7 +100,7 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
       cells.emplace_back(fmt::format("{:.3g}", value));
       cells.emplace_back(fmt::format("{:.1f}", percentile_of(values, value)));
     } else {
-      cells.emplace_back(fmt::format("{:+.2f}", row.rank.coefficient));
+      cells.emplace_back(fmt::format("{:+.2f}", row.rank_correlation));
       cells.emplace_back(p_value_cell(row.adjusted_p_value));
     }
   }
@@ -194,7 +193,7 @@ Json json_of(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
     Json entry{{"quantity", drawn.names[row.input]},
                {"fraction_of_variance", index.index},
                {"interval", {index.interval.lower, index.interval.upper}},
-               {"rank_correlation", row.rank.coefficient},
+               {"rank_correlation", row.rank_correlation},
                {"p_value", row.adjusted_p_value},
                {"run_value", nullptr},
                {"run_percentile", nullptr}};

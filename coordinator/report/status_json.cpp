@@ -31,19 +31,14 @@ StatusJson factory_object(const wire::FactoryStatus& factory) {
 StatusJson campaign_object(const wire::CampaignStatus& campaign) {
   StatusJson json{{"name", campaign.name},
                   {"phase", wire::phase_name(campaign)},
-                  {"priority", campaign.priority},
-                  {"num_runs", campaign.num_runs},
-                  {"num_done", campaign.num_done},
-                  {"num_without_estimate", campaign.num_without_estimate},
-                  {"num_given_up", campaign.num_given_up},
-                  {"num_lent", campaign.num_lent},
-                  {"num_duplicates", campaign.num_duplicates},
-                  {"num_audited", campaign.num_audited},
-                  {"num_mismatches", campaign.num_mismatches},
-                  {"rate_hz", campaign.rate_hz},
-                  {"remaining_s", nullptr},
-                  {"storage_failure", nullptr},
-                  {"owner", nullptr}};
+                  {"priority", campaign.priority}};
+  for (const wire::CampaignCounter& counter : wire::campaign_counters) {
+    json[std::string(counter.name)] = campaign.*counter.count;
+  }
+  json.update({{"rate_hz", campaign.rate_hz},
+               {"remaining_s", nullptr},
+               {"storage_failure", nullptr},
+               {"owner", nullptr}});
   if (campaign.remaining_s) json["remaining_s"] = *campaign.remaining_s;
   if (!campaign.storage_failure.empty()) json["storage_failure"] = campaign.storage_failure;
   if (!campaign.owner.empty()) json["owner"] = campaign.owner;

@@ -14,6 +14,10 @@ std::string counted(std::uint64_t count, std::string_view thing) {
   return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
 }
 
+std::uint64_t percent_done(const wire::CampaignStatus& campaign) {
+  return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
+}
+
 std::string further_note(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
   if (count <= num_shown) return {};
   return fmt::format("and {}", counted(count - num_shown, thing));

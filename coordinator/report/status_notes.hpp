@@ -20,6 +20,9 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string further_note(std::uint64_t count, std::size_t num_shown,
                                        std::string_view thing);
 
+/// Of the campaign's runs.
+[[nodiscard]] std::uint64_t percent_done(const wire::CampaignStatus& campaign);
+
 /// About a campaign.
 [[nodiscard]] std::vector<Remark> notes_about(const wire::CampaignStatus& campaign);
 

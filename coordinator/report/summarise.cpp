@@ -11,7 +11,6 @@
 #include "coordinator/report/requirements.hpp"
 #include "core/model.hpp"
 #include "core/model_rules.hpp"
-#include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -29,20 +28,20 @@ StopCheck check_exceedances(const StopRule& rule, const Store& store,
 StopCheck check_with(const StopRule& rule, const Store& store, std::span<const double> objectives,
                      std::uint64_t num_runs) {
   if (is_about_exceedances(rule)) return check_exceedances(rule, store, objectives, num_runs);
-  ValuePasses errors(wanted_by(rule));
-  do {
-    ResultReader reader = store.results({RunIndex{0}, num_runs});
-    while (const std::optional<RunResult> result = reader.next()) {
-      if (result->is_completed()) errors.add(std::abs(result->error(rule.parameter)));
-    }
-  } while (errors.end_pass());
+  std::vector<double> errors;
+  store.for_each_error(rule.parameter, num_runs,
+                       [&](double error) { errors.push_back(std::abs(error)); });
   return check_stop_rule(rule, errors);
 }
 
 /// The one with the most runs; empty without a rule.
-std::optional<StoredStopCheck> last_check(const Store& store, const StopPlan& plan) {
-  if (plan.stop_rule.empty()) return std::nullopt;
-  return store.last_stop_check(statistic_of(plan.stop_rule));
+std::optional<StopCheckRow> last_check(const Store& store, const StopPlan& plan) {
+  std::optional<StopCheckRow> last;
+  if (plan.stop_rule.empty()) return last;
+  for (const StopCheckRow& row : store.stop_checks()) {
+    if (row.statistic == statistic_of(plan.stop_rule)) last = row;
+  }
+  return last;
 }
 
 }  // namespace
@@ -162,30 +161,32 @@ void check_stop_checks(const Store& store, std::span<const double> objectives) {
 
 namespace {
 
-Verdict verdict_of(const StopRule& rule, const StoredStopCheck& check) {
-  if (!check.is_reached) return Verdict::undecided;
+RequirementVerdict verdict_of(const StopRule& rule, const StopCheck& check) {
+  if (!check.is_reached) return RequirementVerdict::undecided;
   const double allowed_rate = 1.0 - rule.requirement.tolerance.coverage;
-  return check.estimate < allowed_rate ? Verdict::met : Verdict::not_met;
+  return check.estimate < allowed_rate ? RequirementVerdict::met : RequirementVerdict::not_met;
 }
 
-std::string verdict_text(const StopRule& rule, const StoredStopCheck& check) {
+std::string verdict_text(const StopRule& rule, const StopCheckRow& row) {
+  const StopCheck& check = row.check;
   const Tolerance& tolerance = rule.requirement.tolerance;
   Interval bounds = check.interval.value_or(Interval{.lower = 0.0, .upper = 1.0});
   bounds.confidence = tolerance.confidence;  // Stored with the rule and not with the bounds.
-  const Verdict verdict = verdict_of(rule, check);
+  const RequirementVerdict verdict = verdict_of(rule, check);
   // As report --requirement has it: runs in which all objectives hold, or those beyond the limit.
   const bool is_joint = rule.requirement.subject == Requirement::Subject::all_objectives;
   const double fraction = is_joint ? 1.0 - check.estimate : check.estimate;
   const Interval holding{
       .lower = 1.0 - bounds.upper, .upper = 1.0 - bounds.lower, .confidence = bounds.confidence};
   return fmt::format("          {} after {} runs; {}: {:.0f}\n          {}\n", name_of(verdict),
-                     check.num_runs, is_joint ? "holding" : "exceeding",
-                     fraction * static_cast<double>(check.num_runs),
+                     row.num_runs, is_joint ? "holding" : "exceeding",
+                     fraction * static_cast<double>(row.num_runs),
                      is_joint ? success_text(holding, tolerance.coverage, verdict)
                               : bounds_text(bounds, 1.0 - tolerance.coverage, verdict));
 }
 
-std::string width_text(const StopRule& rule, const StoredStopCheck& check) {
+std::string width_text(const StopRule& rule, const StopCheckRow& row) {
+  const StopCheck& check = row.check;
   std::string text = check.relative_half_width
                          ? fmt::format("within {:.3g} %, half its 95 % interval",
                                        100.0 * *check.relative_half_width)
@@ -193,7 +194,7 @@ std::string width_text(const StopRule& rule, const StoredStopCheck& check) {
   if (rule.statistic != StopRule::Statistic::success || !check.interval) return text + "\n";
   return text +
          fmt::format("\n          in {:.0f} of {} runs, {} of all draws",
-                     check.estimate * static_cast<double>(check.num_runs), check.num_runs,
+                     check.estimate * static_cast<double>(row.num_runs), row.num_runs,
                      interval_percent(*check.interval)) +
          "\n";
 }
@@ -213,8 +214,8 @@ bool is_rule_missed(const Store& store) {
   const auto check = last_check(store, plan);
   if (!check) return false;
   const StopRule rule = parse_stop_rule(plan.stop_rule);
-  if (rule.statistic != StopRule::Statistic::verdict) return !check->is_reached;
-  return verdict_of(rule, *check) != Verdict::met;
+  if (rule.statistic != StopRule::Statistic::verdict) return !check->check.is_reached;
+  return verdict_of(rule, check->check) != RequirementVerdict::met;
 }
 
 std::string stop_text(const Store& store) {
@@ -227,7 +228,7 @@ std::string stop_text(const Store& store) {
   }
   return fmt::format("Stopping  {} {}          after {} runs; {}: {}\n",
                      statistic_of(plan.stop_rule), width_text(rule, *check), check->num_runs,
-                     plan.stop_rule, check->is_reached ? "reached" : "not reached");
+                     plan.stop_rule, check->check.is_reached ? "reached" : "not reached");
 }
 
 }  // namespace proofmass::coordinator

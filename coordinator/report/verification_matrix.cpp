@@ -7,7 +7,9 @@
 #include <functional>
 #include <limits>
 #include <set>
+#include <utility>
 
+#include "coordinator/report/digest.hpp"
 #include "core/model.hpp"
 #include "core/model_rules.hpp"
 
@@ -28,6 +30,10 @@ bool has_finite(std::span<const double> objectives) {
 
 bool is_joint(const StatedRequirement& stated) {
   return parse_requirement(stated.requirement).subject == Requirement::Subject::all_objectives;
+}
+
+std::size_t key_of(const RequirementAnswer& answer) {
+  return answer.is_joint() ? key_of_joint : answer.requirement.parameter;
 }
 
 }  // namespace
@@ -72,40 +78,29 @@ std::vector<StatedRequirement> matrix_requirements(std::vector<StatedRequirement
   return stated;
 }
 
-std::optional<double> MatrixRow::relative_margin() const {
-  if (!limit || !bound) return std::nullopt;
-  return 1.0 - *bound / *limit;
-}
-
-MatrixPasses::MatrixPasses(std::vector<StatedRequirement> stated,
-                           std::span<const double> objectives, std::uint64_t num_given_up,
-                           std::optional<std::uint64_t> num_fixed,
-                           const std::optional<ErrorBudget>& budget)
+VerificationMatrix::VerificationMatrix(std::vector<StatedRequirement> stated,
+                                       std::span<const double> objectives,
+                                       std::uint64_t num_given_up,
+                                       std::optional<std::uint64_t> num_fixed,
+                                       const std::optional<ErrorBudget>& budget)
     : objectives_(objectives.begin(), objectives.end()),
+      num_fixed_(num_fixed),
       budget_(budget),
       missing_{.num_given_up = num_given_up},
       num_runs_(num_given_up) {
   for (StatedRequirement& each : stated) {
-    MatrixRow row{.stated = std::move(each), .answer = {}, .limit = {}, .bound = {}, .worst = {}};
-    const Requirement requirement = parse_requirement(row.stated.requirement);
-    row.answer.text = row.stated.requirement;
-    row.answer.requirement = requirement;
-    row.answer.num_fixed = num_fixed;
-    const bool is_joint = requirement.subject == Requirement::Subject::all_objectives;
-    if (!is_joint) row.limit = requirement.limit;
-    if (is_joint && has_finite(objectives)) row.limit = 1.0;
-    exceedances_.emplace_back(requirement, objectives, budget);
-    values_.try_emplace(key_of(requirement));
-    rows_.push_back(std::move(row));
+    RequirementAnswer answer;
+    answer.stated = std::move(each);
+    answer.requirement = parse_requirement(answer.stated.requirement);
+    if (!answer.is_joint()) answer.limit = answer.requirement.limit;
+    if (answer.is_joint() && has_finite(objectives)) answer.limit = 1.0;
+    exceedances_.emplace_back(answer.requirement, objectives, budget);
+    subjects_.try_emplace(key_of(answer));
+    answers_.push_back(std::move(answer));
   }
 }
 
-std::size_t MatrixPasses::key_of(const Requirement& requirement) const {
-  const bool is_joint = requirement.subject == Requirement::Subject::all_objectives;
-  return is_joint ? key_of_joint : requirement.parameter;
-}
-
-double MatrixPasses::value_of(std::size_t key, const RunResult& result) const {
+double VerificationMatrix::value_of(std::size_t key, const RunResult& result) const {
   if (key != key_of_joint) return required_value(result, key, budget_);
   double largest = 0.0;
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
@@ -114,72 +109,83 @@ double MatrixPasses::value_of(std::size_t key, const RunResult& result) const {
   return largest;
 }
 
-void MatrixPasses::add(const RunResult& result) {
-  if (is_first_pass_) {
-    ++num_runs_;
-    missing_.add(result);
-    for (Exceedances& exceedances : exceedances_) exceedances.add(result);
-  }
+void VerificationMatrix::add(const RunResult& result) {
+  ++num_runs_;
+  missing_.add(result);
+  for (Exceedances& exceedances : exceedances_) exceedances.add(result);
   if (!result.is_completed()) return;
-  if (is_first_pass_) ++num_estimated_;
-  for (auto& [key, values] : values_) {
-    if (values.is_done) continue;
+  for (auto& [key, subject] : subjects_) {
     const double value = value_of(key, result);
-    values.selection.add(value);
-    const bool is_worse = !values.worst || value > values.worst->value;
-    if (is_first_pass_ && is_worse) values.worst = {.run = result.run, .value = value};
+    if (key >= objectives_.size()) subject.values.push_back(value);
+    const bool is_worse = !subject.worst || value > subject.worst->value;
+    if (is_worse) subject.worst = {.run = result.run, .value = value};
   }
 }
 
-std::optional<std::size_t> MatrixPasses::place_of_bound(const MatrixRow& row) const {
-  const std::uint64_t order = row.answer.check.bound_order;
-  // Runs without an estimate are the largest errors.
-  const std::uint64_t num_missing = num_runs_ - num_estimated_;
-  if (!row.limit || order <= num_missing) return std::nullopt;
-  return static_cast<std::size_t>(num_estimated_ - (order - num_missing));
-}
-
-void MatrixPasses::end_first_pass() {
-  std::map<std::size_t, std::set<std::size_t>> places;
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    RequirementAnswer& answer = rows_[i].answer;
+void VerificationMatrix::end_results() {
+  if (have_results_ended_) return;
+  have_results_ended_ = true;
+  for (std::size_t i = 0; i < answers_.size(); ++i) {
+    RequirementAnswer& answer = answers_[i];
     answer.missing = missing_;
-    answer.check =
-        check_requirement(answer.requirement, exceedances_[i].of(num_runs_), answer.num_fixed);
-    const std::size_t key = key_of(answer.requirement);
-    rows_[i].worst = values_.at(key).worst;
-    if (const auto place = place_of_bound(rows_[i])) places[key].insert(*place);
+    answer.check = check_requirement(answer.requirement, exceedances_[i].of(num_runs_), num_fixed_);
+    answer.worst = subjects_.at(key_of(answer)).worst;
   }
-  for (auto& [key, values] : values_) {
-    values.is_done = !values.selection.end_first_pass(places[key]);
+  for (auto& [key, subject] : subjects_) {
+    std::ranges::sort(subject.values);
+    set_bounds(key, std::exchange(subject.values, {}));
   }
 }
 
-bool MatrixPasses::end_pass() {
-  if (is_first_pass_) {
-    is_first_pass_ = false;
-    end_first_pass();
-  } else {
-    for (auto& [key, values] : values_) {
-      if (!values.is_done) values.is_done = !values.selection.end_pass();
+void VerificationMatrix::set_bounds(std::size_t key, std::span<const double> ascending) {
+  // Runs without an estimate are the largest errors.
+  const std::uint64_t num_missing = missing_.total();
+  for (RequirementAnswer& answer : answers_) {
+    const std::uint64_t order = answer.check.bound_order;
+    if (key_of(answer) != key || ascending.empty() || !answer.limit || order <= num_missing) {
+      continue;
     }
+    answer.bound = ascending[static_cast<std::size_t>(ascending.size() - (order - num_missing))];
   }
-  const bool are_all_done =
-      std::ranges::all_of(values_, [](const auto& entry) { return entry.second.is_done; });
-  if (are_all_done) fill_bounds();
-  return !are_all_done;
 }
 
-void MatrixPasses::fill_bounds() {
-  for (MatrixRow& row : rows_) {
-    const std::optional<std::size_t> place = place_of_bound(row);
-    if (!place) continue;
-    const Requirement& requirement = row.answer.requirement;
-    row.bound = values_.at(key_of(requirement)).selection.value_at(*place);
-    if (requirement.subject == Requirement::Subject::all_objectives) continue;
-    row.answer.check.bound =
-        ToleranceBound{.value = *row.bound, .order = row.answer.check.bound_order, .index = 0};
-  }
+void VerificationMatrix::add_magnitudes(std::size_t parameter, std::span<const double> magnitudes) {
+  end_results();
+  set_bounds(parameter, magnitudes);
+}
+
+const std::vector<RequirementAnswer>& VerificationMatrix::answers() {
+  end_results();
+  return answers_;
+}
+
+std::vector<RequirementAnswer> check_requirements(const Store& store,
+                                                  std::span<const double> objectives,
+                                                  std::vector<StatedRequirement> stated,
+                                                  const std::optional<ErrorBudget>& budget) {
+  if (stated.empty()) return {};
+  std::vector<RequirementAnswer> answers;
+  store.read_one_state([&] {
+    VerificationMatrix matrix(std::move(stated), objectives, num_runs_in(store.given_up_runs()),
+                              store.num_runs_fixed(), budget);
+    (void)walk_checked(store, [&](const RunResult& result) {
+      require_in_range(result, model().results());
+      matrix.add(result);
+    });
+    std::set<std::size_t> parameters;
+    for (const RequirementAnswer& answer : matrix.answers()) {
+      if (key_of(answer) < objectives.size()) parameters.insert(key_of(answer));
+    }
+    for (const std::size_t parameter : parameters) {
+      std::vector<double> magnitudes;
+      store.for_each_error(parameter, num_runs_max,
+                           [&](double error) { magnitudes.push_back(std::abs(error)); });
+      std::ranges::sort(magnitudes);
+      matrix.add_magnitudes(parameter, magnitudes);
+    }
+    answers = matrix.answers();
+  });
+  return answers;
 }
 
 }  // namespace proofmass::coordinator

@@ -8,11 +8,8 @@
 #include <vector>
 
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/result_passes.hpp"
-#include "coordinator/report/stated_requirement.hpp"
-#include "core/runs.hpp"
+#include "coordinator/store/store.hpp"
 #include "core/statistics/requirement.hpp"
-#include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
 
@@ -36,70 +33,58 @@ inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.9
 [[nodiscard]] std::vector<StatedRequirement> matrix_requirements(
     std::vector<StatedRequirement> stated, std::span<const double> objectives);
 
-/// The run that is the farthest off.
-struct WorstRun {
-  RunIndex run;
-  double value = 0.0;  ///< In the unit of MatrixRow::limit.
-};
-
-/// A row of the verification matrix.
-struct MatrixRow {
-  StatedRequirement stated;
-  RequirementAnswer answer;
-  /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest
-  /// ratio of an |error| to its objective. Empty if they are infinite, all of them.
-  std::optional<double> limit;
-  /// Upper tolerance bound of the |error| or of that ratio by order statistics: with the confidence
-  /// of the requirement, `coverage` of all draws stay below. Empty if draws are too few.
-  std::optional<double> bound;
-  std::optional<WorstRun> worst;  ///< Empty if no run has an estimate.
-
-  /// 1 − bound / limit.
-  [[nodiscard]] std::optional<double> relative_margin() const;
-};
-
-/// Computes the rows. Memory is some 4 MB for each quantity that a requirement is about.
-class MatrixPasses final : public ResultPasses {
+/// Answers requirements from results that are seen once, and then from the errors of one parameter
+/// after the other. Memory is 8 bytes a run for each requirement about the budget, and for all
+/// objectives together.
+class VerificationMatrix {
  public:
-  /// @param stated      Their order is that of the rows.
-  /// @param objectives  Of the campaign, SI.
-  /// @param given_up    Runs that have no result, and count as exceedances.
-  /// @param num_fixed   As for decide().
-  /// @param budget      Of the campaign, for requirements about it.
+  /// @param stated        Their order is that of the answers.
+  /// @param objectives    Of the campaign, SI.
+  /// @param num_given_up  Runs that have no result, and count as exceedances.
+  /// @param num_fixed     As for decide().
+  /// @param budget        Of the campaign, for requirements about it.
   /// @throws ConfigError as parse_requirement().
-  MatrixPasses(std::vector<StatedRequirement> stated, std::span<const double> objectives,
-               std::uint64_t num_given_up, std::optional<std::uint64_t> num_fixed,
-               const std::optional<ErrorBudget>& budget = std::nullopt);
+  VerificationMatrix(std::vector<StatedRequirement> stated, std::span<const double> objectives,
+                     std::uint64_t num_given_up, std::optional<std::uint64_t> num_fixed,
+                     const std::optional<ErrorBudget>& budget = std::nullopt);
 
-  void add(const RunResult& result) override;
-  [[nodiscard]] bool end_pass() override;
+  /// @param result  Its numbers are in range.
+  void add(const RunResult& result);
+  /// To be called after all results, for each parameter that a requirement is about.
+  /// @param magnitudes  |error| of all completed runs, SI, ascending; at least one.
+  void add_magnitudes(std::size_t parameter, std::span<const double> magnitudes);
 
-  /// @pre No further pass is needed.
-  [[nodiscard]] const std::vector<MatrixRow>& rows() const { return rows_; }
+  [[nodiscard]] const std::vector<RequirementAnswer>& answers();
 
  private:
-  /// Values that a bound is taken from, of all runs that have an estimate.
-  struct Values {
-    OrderSelection selection;
-    bool is_done = false;
-    std::optional<WorstRun> worst;
+  /// What a requirement compares with its limit, in the runs that have an estimate.
+  struct Subject {
+    std::vector<double> values;  ///< Unless it is a parameter.
+    std::optional<RunValue> worst;
   };
 
-  [[nodiscard]] std::size_t key_of(const Requirement& requirement) const;
   [[nodiscard]] double value_of(std::size_t key, const RunResult& result) const;
-  [[nodiscard]] std::optional<std::size_t> place_of_bound(const MatrixRow& row) const;
-  void end_first_pass();
-  void fill_bounds();
+  void end_results();
+  void set_bounds(std::size_t key, std::span<const double> ascending);
 
   std::vector<double> objectives_;
+  std::optional<std::uint64_t> num_fixed_;
   std::optional<ErrorBudget> budget_;
-  std::vector<MatrixRow> rows_;
-  std::vector<Exceedances> exceedances_;  ///< Of each row.
-  std::map<std::size_t, Values> values_;  ///< By subject; those of the largest ratio are last.
+  std::vector<RequirementAnswer> answers_;
+  std::vector<Exceedances> exceedances_;     ///< Of each answer.
+  std::map<std::size_t, Subject> subjects_;  ///< By position; all objectives together are last.
   MissingEstimates missing_;
   std::uint64_t num_runs_ = 0;
-  std::uint64_t num_estimated_ = 0;
-  bool is_first_pass_ = true;
+  bool have_results_ended_ = false;
 };
+
+/// Holds requirements against the results in a campaign database; runs without an estimate, and
+/// those that were given up, count as exceedances.
+/// @param objectives  Those of the campaign's scenario.
+/// @param budget      Of the campaign, for requirements about it.
+/// @throws ConfigError as parse_requirement(); StoreError as walk_checked().
+[[nodiscard]] std::vector<RequirementAnswer> check_requirements(
+    const Store& store, std::span<const double> objectives, std::vector<StatedRequirement> stated,
+    const std::optional<ErrorBudget>& budget = std::nullopt);
 
 }  // namespace proofmass::coordinator

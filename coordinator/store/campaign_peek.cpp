@@ -1,14 +1,11 @@
 #include "coordinator/store/campaign_peek.hpp"
 
-#include <fmt/format.h>
-
 #include <system_error>
 
-#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/schema.hpp"
-#include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,16 +36,14 @@ bool has_journal(const std::filesystem::path& path) {
 
 CampaignPeek peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) {
-    throw StoreError(fmt::format("campaign database = {} (is no file)", path.string()));
-  }
+  if (!std::filesystem::is_regular_file(path, ignored)) detail::refuse_file(path, "is no file");
   Database database(path, detail::Access::immutable);
   database.execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
   if (depth == PeekDepth::pages) {
-    detail::check_campaign_file(database, path);
+    detail::check_campaign_file(database);
     (void)detail::check_all_pages(database);
   } else {
-    detail::check_kind(database, path);
+    detail::check_kind(database);
   }
   const CampaignControl control = detail::read_control(database);
   CampaignPeek peek{.id = {database.count("SELECT campaign_uid FROM campaign")},

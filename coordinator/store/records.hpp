@@ -32,7 +32,7 @@ struct SecondDelivery {
 };
 
 /// Runs that came back without a result.
-struct LostRuns {
+struct ReturnedRuns {
   RunRange runs;
   wire::Attempt attempt;
   wire::SessionId worker;
@@ -83,8 +83,8 @@ struct CampaignControl {
 struct RetriedRuns {};
 
 /// One thing to be written to a campaign database.
-using Entry = std::variant<Delivery, SecondDelivery, LostRuns, GivenUpRun, RetriedRuns, EventEntry,
-                           WorkerJoined, WorkerEnded, CampaignControl>;
+using Entry = std::variant<Delivery, SecondDelivery, ReturnedRuns, GivenUpRun, RetriedRuns,
+                           EventEntry, WorkerJoined, WorkerEnded, CampaignControl>;
 
 /// A coordinator process that begins to serve a campaign.
 struct CoordinatorStart {
@@ -112,6 +112,37 @@ struct Comparison {
   bool operator==(const Comparison&) const = default;
 };
 
+/// Workers of one machine that computed runs of a campaign.
+struct HostShare {
+  std::string host;  ///< As it named itself.
+  std::uint64_t num_workers = 0;
+  std::uint64_t num_results = 0;
+  double compute_s = 0.0;  ///< Time of processor cores.
+};
+
+/// Runs that came back without a result, for one reason.
+struct LossShare {
+  std::string reason;
+  std::uint64_t num_losses = 0;  ///< Ranges of runs.
+  std::uint64_t num_runs = 0;
+  bool is_blamed = false;  ///< They count against these runs.
+};
+
+/// How a campaign was computed, as far as its database keeps it.
+struct Execution {
+  std::uint64_t num_coordinators = 0;  ///< Starts of one.
+  std::uint64_t num_workers = 0;
+  std::uint64_t num_hosts = 0;
+  double compute_s = 0.0;        ///< Of the results that were kept; time of processor cores.
+  std::vector<HostShare> hosts;  ///< At most 20, those with the most results first.
+  std::vector<LossShare> losses;
+  std::uint64_t num_retried = 0;  ///< Results that were kept of a later attempt than the first.
+  std::uint64_t num_audited = 0;  ///< Results that were compared with a second one.
+  std::uint64_t num_contradicting = 0;  ///< Second results that differed.
+  std::optional<std::string> first_result_utc;
+  std::optional<std::string> last_result_utc;
+};
+
 /// When a campaign ends before all of its runs are finished.
 struct StopPlan {
   std::string stop_rule;                      ///< `std(gain) within 5%`; empty: none.
@@ -122,15 +153,6 @@ struct StopPlan {
 };
 
 /// A stop rule against the runs [0, num_runs), as it was stored.
-struct StoredStopCheck {
-  std::uint64_t num_runs = 0;
-  bool is_reached = false;
-  std::optional<double> relative_half_width;  ///< Empty if runs were too few for an interval.
-  double estimate = 0.0;                      ///< As in StopCheck; so is the interval.
-  std::optional<Interval> interval;
-};
-
-/// A row of `stop_check`.
 struct StopCheckRow {
   std::string statistic;  ///< `std(gain)`.
   std::uint64_t num_runs = 0;

@@ -11,13 +11,10 @@
 #include <variant>
 
 #include "coordinator/store/detail/campaign_rows.hpp"
-#include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/merge_rows.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
@@ -39,16 +36,14 @@ void check_that_name_is_the_only_one(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::uintmax_t num_names = std::filesystem::hard_link_count(path, ignored);
   if (num_names == 1) return;
-  throw StoreError(
-      fmt::format("campaign database = {} (has {} names (hard links), must have one; make copies "
-                  "instead)",
-                  path.string(), num_names));
+  detail::refuse_file(path, fmt::format("has {} names (hard links), must have one; make copies "
+                                        "instead",
+                                        num_names));
 }
 
 // Lock and draft are named after the file, and would be made in a directory without it.
 void check_name(const std::filesystem::path& path) {
-  if (path.has_filename()) return;
-  throw StoreError(fmt::format("campaign database = {} (names no file)", path.string()));
+  if (!path.has_filename()) detail::refuse_file(path, "names no file");
 }
 
 /// @param fill  Writes what a new campaign does not have.
@@ -91,25 +86,12 @@ Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
   return create_filled(path, campaign, definition, [](Database&) {});
 }
 
-Store Store::merge(const std::filesystem::path& path, const Campaign& campaign,
-                   std::string_view definition, std::span<const std::filesystem::path> parts,
-                   const std::function<void(const MergedPart&)>& on_part) {
-  return create_filled(path, campaign, definition, [&](Database& whole) {
-    detail::MergeRows rows(whole);
-    for (const std::filesystem::path& file : parts) {
-      const Store part = open_read_only(file);
-      part.read_one_state([&] { on_part(rows.add(part.impl_->database)); });
-    }
-    rows.finish();
-  });
-}
-
 Store Store::open(const std::filesystem::path& path) {
   detail::check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
   Store store(std::make_unique<Impl>(path, std::make_unique<detail::StoreLock>(path)));
-  if (store.has_lost_its_log()) {
+  if (store.impl_->is_log_lost) {
     store.record_event("log_lost", "results that were not in the file itself are missing");
   }
   return store;
@@ -144,10 +126,6 @@ std::uint64_t Store::num_runs() const {
 
 std::string Store::definition() const {
   return impl_->database.text("SELECT definition FROM campaign");
-}
-
-std::optional<std::uint64_t> Store::num_runs_fixed() const {
-  return detail::read_num_runs_fixed(impl_->database);
 }
 
 std::string Store::model_version() const {
@@ -199,79 +177,6 @@ void Store::extend(const Campaign& campaign, std::string_view definition) {
       [&](Database& database) { detail::extend_campaign(database, campaign, definition); });
 }
 
-CampaignControl Store::control() const { return detail::read_control(impl_->database); }
-
-StopPlan Store::stop_plan() const { return detail::read_stop_plan(impl_->database); }
-
-void Store::set_stop_plan(const StopPlan& plan) {
-  impl_->commit([&](Database& database) { detail::write_stop_plan(database, plan); });
-}
-
-void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic,
-                              const StopCheck& check) {
-  impl_->commit([&](Database& database) {
-    detail::replace_stop_check(database, num_runs, statistic, check);
-  });
-}
-
-std::optional<StoredStopCheck> Store::last_stop_check(std::string_view statistic) const {
-  return detail::read_last_stop_check(impl_->database, statistic);
-}
-
-std::vector<StopCheckRow> Store::stop_checks() const {
-  return detail::read_stop_checks(impl_->database);
-}
-
-std::uint64_t Store::num_without_estimate() const {
-  return impl_->database.count("SELECT count(*) FROM run_result WHERE status <> 1");
-}
-
-std::vector<RunRange> Store::finished_runs() const {
-  return detail::read_runs(impl_->database, "SELECT run_index FROM delivery ORDER BY 1");
-}
-
-std::vector<RunRange> Store::compared_runs() const {
-  return detail::read_runs(impl_->database, "SELECT DISTINCT run_index FROM audit ORDER BY 1");
-}
-
-std::vector<RunRange> Store::given_up_runs() const {
-  if (impl_->database.integer("SELECT EXISTS (SELECT 1 FROM run_failure"
-                              " WHERE run_index IN (SELECT run_index FROM delivery))") != 0) {
-    impl_->database.refuse_as_damaged("a run is given up and has a result");
-  }
-  return detail::read_runs(impl_->database, "SELECT run_index FROM run_failure ORDER BY 1");
-}
-
-std::vector<BlamedRun> Store::blamed_runs() const {
-  return detail::read_blamed_runs(impl_->database);
-}
-
-std::uint64_t Store::num_before_blame() const {
-  return impl_->database.count(
-      "SELECT coalesce((SELECT min(first_run) FROM attempt WHERE is_blamed), num_runs)"
-      " FROM campaign");
-}
-
-std::uint64_t Store::num_compared() const {
-  return impl_->database.count("SELECT count(*) FROM audit");
-}
-
-std::vector<Contradiction> Store::contradictions() const {
-  return detail::read_contradictions(impl_->database);
-}
-
-std::vector<wire::SessionId> Store::attached_sessions() const {
-  return detail::read_attached_sessions(impl_->database);
-}
-
-void Store::begin_coordinator(const CoordinatorStart& start) {
-  impl_->commit([&](Database& database) { detail::insert_start(database, start); });
-}
-
-void Store::end_coordinator(wire::Epoch epoch) {
-  impl_->commit([&](Database& database) { detail::end_start(database, epoch); });
-}
-
 CommitSummary Store::write(std::span<const Entry> entries) {
   const std::uint64_t num_runs_wanted = num_runs();
   for (const Entry& entry : entries) {
@@ -292,10 +197,6 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   return summary;
 }
 
-bool Store::is_of_older_version() const { return impl_->database.is_private_copy(); }
-
-bool Store::has_lost_its_log() const { return impl_->is_log_lost; }
-
 std::optional<std::string> Store::rest() {
   impl_->check_place();
   return impl_->rest();
@@ -315,6 +216,13 @@ CommitSummary Store::commit(std::span<const Delivery> deliveries) {
 void Store::for_each_result(const std::function<void(const RunResult&)>& visit) const {
   ResultReader reader = results();
   while (const std::optional<RunResult> result = reader.next()) visit(*result);
+}
+
+void Store::for_each_error(std::size_t quantity, std::uint64_t num_runs,
+                           const std::function<void(double)>& visit) const {
+  detail::Statement row = detail::select_errors(impl_->database, quantity);
+  row.bind_all(num_runs);
+  while (row.step()) visit(row.real(0));
 }
 
 ResultReader Store::results() const { return ResultReader(impl_->database); }
@@ -343,11 +251,7 @@ void Store::check_integrity() const {
 
 void Store::write_plain(const std::filesystem::path& draft) const {
   Database plain(draft, Access::create);
-  if (impl_->database.is_private_copy()) {
-    plain.attach_copy_of(impl_->database, "source");
-  } else {
-    plain.attach_read_only(impl_->database, "source");
-  }
+  plain.attach(impl_->database, "source");
   plain.execute("PRAGMA synchronous = OFF");  // It is made durable before it gets its name.
   Transaction transaction(plain);
   detail::Statement object = impl_->database.prepare(

@@ -4,7 +4,6 @@
 #include <span>
 
 #include "coordinator/store/detail/campaign_rows.hpp"
-#include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"

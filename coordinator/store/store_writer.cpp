@@ -17,7 +17,6 @@
 namespace proofmass::coordinator {
 
 using detail::Attempted;
-using detail::CommitTimes;
 using detail::OpenFile;
 using detail::TimePoint;
 
@@ -46,20 +45,11 @@ void note_worker(OpenFile& file, const Entry& entry) {
   if (const auto* ended = std::get_if<WorkerEnded>(&entry)) file.known.erase(ended->session);
 }
 
-CommitTimes times_of(const WriterConfig& config) {
-  return {.commit_runs_max = config.commit_runs_max,
-          .commit_after = config.commit_after,
-          .record_after = config.record_after};
-}
-
 }  // namespace
 
 struct StoreWriter::Impl {
   Impl(std::function<void()> wake_caller, const WriterConfig& writer_config)
-      : config(writer_config),
-        times(times_of(config)),
-        wake(std::move(wake_caller)),
-        thread([this] { run(); }) {}
+      : config(writer_config), wake(std::move(wake_caller)), thread([this] { run(); }) {}
 
   // Called by the service.
   OpenFile& file(wire::CampaignId campaign);
@@ -83,7 +73,6 @@ struct StoreWriter::Impl {
   [[nodiscard]] std::vector<wire::CampaignId> ids() const;
 
   const WriterConfig config;
-  const CommitTimes times;
   const std::function<void()> wake;
 
   std::mutex mutex;  // Guards all that follows; see OpenFile for what it does not.
@@ -129,12 +118,12 @@ void StoreWriter::Impl::add_where(const Entry& entry,
 /// True if the file is to be written to sooner than before. @pre The lock is held.
 bool StoreWriter::Impl::add(OpenFile& open_file, Entry entry) {
   const TimePoint now = std::chrono::steady_clock::now();
-  const std::optional<TimePoint> due_before = due_time(open_file, times);
+  const std::optional<TimePoint> due_before = due_time(open_file, config);
   note_worker(open_file, entry);
   if (detail::is_result(entry)) open_file.is_rest_wanted = false;
   open_file.waiting.add(std::move(entry), now);
   open_file.rest_at = open_file.is_rest_wanted ? std::optional(now) : std::nullopt;
-  return due_time(open_file, times) != due_before;
+  return due_time(open_file, config) != due_before;
 }
 
 void StoreWriter::Impl::wait_for(wire::CampaignId campaign, std::function<void()> action) {
@@ -188,7 +177,7 @@ void StoreWriter::Impl::serve_request(Lock& lock) {
 void StoreWriter::Impl::write_due(Lock& lock) {
   const TimePoint now = std::chrono::steady_clock::now();
   for (const wire::CampaignId campaign : ids()) {
-    const std::optional<TimePoint> due = due_time(file(campaign), times);
+    const std::optional<TimePoint> due = due_time(file(campaign), config);
     if (!due || *due > now) continue;
     if (!file(campaign).retry_at && is_written_out(file(campaign))) {
       fold(campaign, lock);
@@ -303,7 +292,7 @@ std::optional<TimePoint> StoreWriter::Impl::next_due_time() const {
   std::optional<TimePoint> next;
   if (!files.empty()) next = look_at;
   for (const auto& [campaign, file] : files) {
-    const std::optional<TimePoint> due = due_time(file, times);
+    const std::optional<TimePoint> due = due_time(file, config);
     if (due && (!next || *due < *next)) next = due;
   }
   return next;
@@ -372,7 +361,7 @@ void StoreWriter::compare(wire::CampaignId campaign, Delivery delivery) {
   impl_->add(campaign, SecondDelivery{.delivery = std::move(delivery)});
 }
 
-void StoreWriter::record_loss(wire::CampaignId campaign, const LostRuns& lost) {
+void StoreWriter::record_loss(wire::CampaignId campaign, const ReturnedRuns& lost) {
   impl_->add(campaign, lost);
 }
 

@@ -119,7 +119,7 @@ class StoreWriter {
   /// @pre A result of this run is stored, or was handed to deliver().
   void compare(wire::CampaignId campaign, Delivery delivery);
 
-  void record_loss(wire::CampaignId campaign, const LostRuns& lost);
+  void record_loss(wire::CampaignId campaign, const ReturnedRuns& lost);
   void give_up(wire::CampaignId campaign, RunIndex run);
   /// @param campaign  0 for all that are open and not at rest.
   void record_event(wire::CampaignId campaign, EventEntry event);

@@ -10,7 +10,16 @@
 namespace proofmass {
 namespace {
 
-/// What follows from moments and extremes; without percentiles.
+ErrorStatistic error_statistic(const Moments& about) {
+  return {.bias = about.mean,
+          .bias_interval = mean_interval(about, default_confidence),
+          .rms = about.rms,
+          .standard_deviation = about.standard_deviation,
+          .deviation_interval = deviation_interval(about, default_confidence),
+          .skewness = about.skewness};
+}
+
+/// Without percentiles.
 AccuracyStatistic accuracy_of(const ErrorExtremes& extremes, const Moments& magnitudes,
                               const Moments& errors) {
   return {.worst = extremes.worst.value_or(0.0),
@@ -48,27 +57,6 @@ void leave_out_intervals(CampaignStatistics& statistics) {
   }
 }
 
-ErrorStatistic error_statistic(const Moments& about) {
-  return {.bias = about.mean,
-          .bias_interval = mean_interval(about, default_confidence),
-          .rms = about.rms,
-          .standard_deviation = about.standard_deviation,
-          .deviation_interval = deviation_interval(about, default_confidence),
-          .skewness = about.skewness};
-}
-
-std::vector<double> CampaignStatistics::worst_errors() const {
-  std::vector<double> errors;
-  for (const AccuracyStatistic& of_quantity : accuracy) errors.push_back(of_quantity.worst);
-  return errors;
-}
-
-std::vector<double> CampaignStatistics::mean_errors() const {
-  std::vector<double> errors;
-  for (const AccuracyStatistic& of_quantity : accuracy) errors.push_back(of_quantity.mean);
-  return errors;
-}
-
 void CampaignStatistics::count(const RunResult& result) {
   ++num_runs;
   if (result.status == RunStatus::not_converged) ++num_not_converged;
@@ -82,10 +70,14 @@ BudgetColumns budget_columns(const ErrorBudget& budget, const CampaignStatistics
   HealthStatistic level;
   if (!statistics.health.empty()) level = statistics.health.at(budget.level);
   BudgetColumns columns{.before = budget.before(level.mean), .after_worst = {}, .after_mean = {}};
-  if (statistics.num_estimated > 0) {
-    columns.after_worst = budget.after(statistics.worst_errors(), level.worst);
-    columns.after_mean = budget.after(statistics.mean_errors(), level.mean);
+  if (statistics.num_estimated == 0) return columns;
+  std::vector<double> worst, mean;
+  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
+    worst.push_back(accuracy.worst);
+    mean.push_back(accuracy.mean);
   }
+  columns.after_worst = budget.after(worst, level.worst);
+  columns.after_mean = budget.after(mean, level.mean);
   return columns;
 }
 
@@ -105,6 +97,14 @@ RunningStatistics::RunningStatistics(std::vector<double> objectives)
 void RunningStatistics::add(const RunResult& result) {
   counts_.count(result);
   if (!result.is_completed()) return;
+  if (!result.health.empty()) {
+    ++num_with_health_;
+    health_.resize(result.health.size());
+    for (std::size_t i = 0; i < health_.size(); ++i) {
+      health_[i].first = std::max(health_[i].first, result.health[i]);
+      health_[i].second.add(result.health[i]);
+    }
+  }
   bool is_within = true;
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     const double error = result.error(i);
@@ -122,6 +122,9 @@ void RunningStatistics::add(const RunResult& result) {
 
 CampaignStatistics RunningStatistics::statistics() const {
   CampaignStatistics statistics = counts_;
+  for (const auto& [worst, sum] : health_) {
+    statistics.health.push_back({worst, sum.value() / static_cast<double>(num_with_health_)});
+  }
   statistics.accuracy.resize(objectives_.size());
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     const Quantity& quantity = quantities_[i];
@@ -131,79 +134,21 @@ CampaignStatistics RunningStatistics::statistics() const {
   return statistics;
 }
 
-StatisticsPasses::StatisticsPasses(std::vector<double> objectives, std::size_t num_kept_max)
-    : objectives_(std::move(objectives)) {
-  const ValuePasses::Wanted of_magnitudes{
-      .levels = {percentile_levels.begin(), percentile_levels.end()},
-      .has_deviation_interval = true};
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    quantities_.push_back({.errors = ValuePasses({}, num_kept_max),
-                           .magnitudes = ValuePasses(of_magnitudes, num_kept_max),
-                           .extremes = {}});
-  }
-}
-
-void StatisticsPasses::add(const RunResult& result) {
-  PROOFMASS_EXPECT(!last_run_ || *last_run_ < result.run);
-  last_run_ = result.run;
-  if (is_first_pass_) counts_.count(result);
-  if (!result.is_completed()) return;
-  if (is_first_pass_ && !result.health.empty()) {
-    ++num_with_health_;
-    health_.resize(result.health.size());
-    for (std::size_t i = 0; i < health_.size(); ++i) {
-      health_[i].first = std::max(health_[i].first, result.health[i]);
-      health_[i].second.add(result.health[i]);
-    }
-  }
-  bool is_within = true;
-  for (std::size_t i = 0; i < quantities_.size(); ++i) {
-    QuantityPasses& quantity = quantities_[i];
-    const double error = result.error(i);
-    const double magnitude = std::abs(error);
-    quantity.errors.add(error);
-    quantity.magnitudes.add(magnitude);
-    if (!is_first_pass_) continue;
-    if (!quantity.extremes.add(result.run, magnitude, objectives_[i])) is_within = false;
-  }
-  if (is_first_pass_ && is_within) ++counts_.num_within_objectives;
-}
-
-bool StatisticsPasses::end_pass() {
-  is_first_pass_ = false;
-  last_run_.reset();
-  bool is_another_needed = false;
-  for (QuantityPasses& quantity : quantities_) {
-    if (quantity.errors.end_pass()) is_another_needed = true;
-    if (quantity.magnitudes.end_pass()) is_another_needed = true;
-  }
-  return is_another_needed;
-}
-
-CampaignStatistics StatisticsPasses::statistics() const {
-  CampaignStatistics statistics = counts_;
-  for (const auto& [worst, sum] : health_) {
-    statistics.health.push_back({worst, sum.value() / static_cast<double>(num_with_health_)});
-  }
-  statistics.accuracy.resize(quantities_.size());
-  if (counts_.num_estimated == 0) return statistics;
-  for (std::size_t i = 0; i < quantities_.size(); ++i) {
-    statistics.accuracy[i] = accuracy(quantities_[i]);
-  }
-  return statistics;
-}
-
-AccuracyStatistic StatisticsPasses::accuracy(const QuantityPasses& quantity) const {
-  AccuracyStatistic accuracy =
-      accuracy_of(quantity.extremes, quantity.magnitudes.moments(), quantity.errors.moments());
-  accuracy.deviation_interval = quantity.magnitudes.deviation_interval();
+void complete(AccuracyStatistic& accuracy, std::vector<double>& errors) {
+  accuracy.error = error_statistic(moments(errors));
+  for (double& error : errors) error = std::abs(error);
+  const Moments about = moments(errors);
+  accuracy.mean = about.mean;
+  accuracy.standard_deviation = about.standard_deviation;
+  accuracy.mean_interval = mean_interval(about, default_confidence);
+  accuracy.deviation_interval = bootstrap_deviation_interval(errors, default_confidence);
+  std::ranges::sort(errors);
   for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
     const double level = percentile_levels[i];
     accuracy.percentiles[i] = {.level = level,
-                               .value = quantity.magnitudes.percentile(level),
-                               .interval = quantity.magnitudes.percentile_interval(level)};
+                               .value = percentile(errors, level),
+                               .interval = percentile_interval(errors, level, default_confidence)};
   }
-  return accuracy;
 }
 
 }  // namespace proofmass

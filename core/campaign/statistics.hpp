@@ -12,7 +12,6 @@
 #include "core/runs.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
-#include "core/statistics/value_passes.hpp"
 
 namespace proofmass {
 
@@ -35,9 +34,6 @@ struct ErrorStatistic {
   std::optional<Interval> deviation_interval;  ///< By the errors' kurtosis.
   double skewness = 0.0;                       ///< Adjusted, see Moments.
 };
-
-/// Of the moments of these errors.
-[[nodiscard]] ErrorStatistic error_statistic(const Moments& about);
 
 /// |estimate − truth| of one quantity over the completed runs. Intervals are of 95 %.
 struct AccuracyStatistic {
@@ -79,10 +75,6 @@ struct CampaignStatistics {
   /// @param num_given_up  Runs that have no result, beside num_runs; they count as beyond.
   /// @return Nothing if there is no run, or if draws are not independent.
   [[nodiscard]] std::optional<Interval> within_objectives(std::uint64_t num_given_up) const;
-  /// The worst |error| of each quantity, SI.
-  [[nodiscard]] std::vector<double> worst_errors() const;
-  /// The mean |error| of each quantity, SI.
-  [[nodiscard]] std::vector<double> mean_errors() const;
 
   /// Counts a finished run by its status.
   void count(const RunResult& result);
@@ -114,15 +106,16 @@ struct ErrorExtremes {
 
 /// Statistics of results that are seen once, in any order, and added while others are yet to come:
 /// what CampaignStatistics has, but for the percentiles and the interval of the standard deviation
-/// by the bootstrap, which need all results at once. Memory is fixed; a copy costs little.
+/// by the bootstrap, which need all results at once; see complete(). Memory is fixed; a copy costs
+/// little.
 ///
 /// Moments are corrected sums about the first value instead of the mean: they agree with those of
-/// StatisticsPasses to 1e-11 of the worst |error|. A standard deviation s loses ε D²/s, D being the
+/// complete() to 1e-11 of the worst |error|. A standard deviation s loses ε D²/s, D being the
 /// distance of the first value from the mean; as it is one of the n values, D < √n s, so that no
 /// more than ε √n D is lost.
 class RunningStatistics {
  public:
-  /// @param objectives  As for StatisticsPasses.
+  /// @param objectives  Largest acceptable |error| of each quantity, SI.
   explicit RunningStatistics(std::vector<double> objectives);
 
   /// @pre The run was not added before.
@@ -139,43 +132,17 @@ class RunningStatistics {
   std::vector<double> objectives_;
   CampaignStatistics counts_;
   std::vector<Quantity> quantities_;  ///< Empty before the first run with an estimate.
-};
-
-/// Computes the statistics of a campaign's results in one pass over them, or in several if they are
-/// too many to be kept: the bits are the same. Results come in run order, so that statistics do not
-/// depend on the order in which they arrived at the store. Memory does not grow with the runs: it
-/// is some 130 MB at most.
-class StatisticsPasses {
- public:
-  /// @param objectives    Largest acceptable |error| of each quantity, SI.
-  /// @param num_kept_max  Runs that are kept, and up to which one pass is enough; for tests.
-  explicit StatisticsPasses(std::vector<double> objectives,
-                            std::size_t num_kept_max = num_passed_values_kept);
-
-  /// @pre Runs of a pass are added in strictly ascending order.
-  void add(const RunResult& result);
-  /// @return True if another pass, with the same results, is needed.
-  [[nodiscard]] bool end_pass();
-  /// @pre No further pass is needed.
-  [[nodiscard]] CampaignStatistics statistics() const;
-
- private:
-  /// What is computed of one quantity.
-  struct QuantityPasses {
-    ValuePasses errors;      ///< estimate − truth.
-    ValuePasses magnitudes;  ///< |estimate − truth|.
-    ErrorExtremes extremes;
-  };
-
-  [[nodiscard]] AccuracyStatistic accuracy(const QuantityPasses& quantity) const;
-
-  std::vector<double> objectives_;
-  CampaignStatistics counts_;
-  bool is_first_pass_ = true;
-  std::optional<RunIndex> last_run_;  ///< Of this pass.
-  std::vector<QuantityPasses> quantities_;
   std::vector<std::pair<double, CompensatedSum>> health_;  ///< Worst and sum of each.
   std::uint64_t num_with_health_ = 0;
 };
+
+/// Adds to RunningStatistics what needs all errors of a quantity at once, and computes its moments
+/// about their mean. Errors in run order make statistics that do not depend on the order in which
+/// results arrived.
+/// @param accuracy  Of the same errors.
+/// @param errors    estimate − truth of all completed runs, SI, at least one; afterwards |estimate
+/// −
+///                  truth| in ascending order.
+void complete(AccuracyStatistic& accuracy, std::vector<double>& errors);
 
 }  // namespace proofmass

@@ -5,22 +5,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/math/elementary.hpp"
-#include "core/random/normal.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 
 namespace proofmass {
 namespace {
-
-double inverse_tanh(double r) { return 0.5 * logarithm((1.0 + r) / (1.0 - r)); }
-
-double hyperbolic_tangent(double z) {
-  if (std::abs(z) > 20.0) return std::copysign(1.0, z);  // Closer to 1 than a double resolves.
-  const double power = exponential(2.0 * z);
-  return (power - 1.0) / (power + 1.0);
-}
 
 // Central sums with d = x − c, each corrected for what the rounded mean c lacks (see moments.hpp).
 std::optional<double> coefficient_of(std::span<const double> x, std::span<const double> y) {
@@ -44,17 +34,7 @@ std::optional<double> coefficient_of(std::span<const double> x, std::span<const 
   return std::clamp(xy / std::sqrt(xx) / std::sqrt(yy), -1.0, 1.0);
 }
 
-Correlation with_interval(double r, double standard_error, double confidence) {
-  if (std::abs(r) == 1.0) return {r, {r, r, confidence}};
-  const double half_width = inverse_normal(0.5 + 0.5 * confidence) * standard_error;
-  const double z = inverse_tanh(r);
-  return {.coefficient = r,
-          .interval = {hyperbolic_tangent(z - half_width), hyperbolic_tangent(z + half_width),
-                       confidence}};
-}
-
-void check_columns(std::span<const double> x, std::span<const double> y, double confidence) {
-  detail::check_fraction("confidence", confidence);
+void check_columns(std::span<const double> x, std::span<const double> y) {
   detail::check_same_size("y", y, x);
   detail::check_values("x", x, 0);
   detail::check_values("y", y, 0);
@@ -62,37 +42,18 @@ void check_columns(std::span<const double> x, std::span<const double> y, double 
 
 }  // namespace
 
-std::optional<Correlation> linear_correlation(std::span<const double> x, std::span<const double> y,
-                                              double confidence) {
-  check_columns(x, y, confidence);
-  if (x.size() < 4) return std::nullopt;
-  const std::optional<double> r = coefficient_of(x, y);
-  if (!r) return std::nullopt;
-  return with_interval(*r, 1.0 / std::sqrt(static_cast<double>(x.size()) - 3.0), confidence);
+std::optional<double> linear_correlation(std::span<const double> x, std::span<const double> y) {
+  check_columns(x, y);
+  return x.size() < 4 ? std::nullopt : coefficient_of(x, y);
 }
 
-std::optional<Correlation> rank_correlation(std::span<const double> x, std::span<const double> y,
-                                            double confidence) {
-  check_columns(x, y, confidence);
-  if (x.size() < 4) return std::nullopt;
-  return correlation_of_ranks(average_ranks(x), average_ranks(y), confidence);
-}
-
-std::optional<Correlation> correlation_of_ranks(std::span<const double> x_ranks,
-                                                std::span<const double> y_ranks,
-                                                double confidence) {
-  check_columns(x_ranks, y_ranks, confidence);
-  if (x_ranks.size() < 4) return std::nullopt;
-  const std::optional<double> r = coefficient_of(x_ranks, y_ranks);
-  if (!r) return std::nullopt;
-  const double variance = (1.0 + 0.5 * *r * *r) / (static_cast<double>(x_ranks.size()) - 3.0);
-  return with_interval(*r, std::sqrt(variance), confidence);
+std::optional<double> rank_correlation(std::span<const double> x, std::span<const double> y) {
+  check_columns(x, y);
+  return x.size() < 4 ? std::nullopt : coefficient_of(average_ranks(x), average_ranks(y));
 }
 
 std::optional<RegressionLine> fit_line(std::span<const double> x, std::span<const double> y) {
-  detail::check_same_size("y", y, x);
-  detail::check_values("x", x, 0);
-  detail::check_values("y", y, 0);
+  check_columns(x, y);
   if (x.size() < 2) return std::nullopt;
   if (std::ranges::all_of(x, [&](double value) { return value == x[0]; })) return std::nullopt;
   const auto n = static_cast<double>(x.size());

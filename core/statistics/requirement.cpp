@@ -2,14 +2,112 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
 #include "core/statistics/distribution.hpp"
-#include "core/statistics/sequential.hpp"
 
 namespace proofmass {
+namespace {
+
+// With probability P(Bin(n, coverage) ≤ n − order) at least `order` values lie above the
+// percentile, so that the value of this order is a bound.
+bool is_bound(const Tolerance& tolerance, std::uint64_t num_runs, std::uint64_t order) {
+  const double doubt = binomial_at_most(static_cast<double>(order) - 1.0,
+                                        static_cast<double>(num_runs), 1.0 - tolerance.coverage);
+  return order <= num_runs && tolerance.is_shown(doubt);
+}
+
+}  // namespace
+
+void Tolerance::validate() const {
+  detail::check_fraction("coverage", coverage);
+  detail::check_fraction("confidence", confidence);
+}
+
+std::uint64_t wilks_order(const Tolerance& tolerance, std::uint64_t num_runs) {
+  tolerance.validate();
+  std::uint64_t holds = 0;
+  std::uint64_t fails = num_runs + 1;
+  while (fails - holds > 1) {
+    const std::uint64_t middle = holds + (fails - holds) / 2;
+    (is_bound(tolerance, num_runs, middle) ? holds : fails) = middle;
+  }
+  return holds;
+}
+
+std::optional<double> wilks_upper(std::span<const double> values, const Tolerance& tolerance,
+                                  std::uint64_t num_unknown) {
+  const std::uint64_t order = wilks_order(tolerance, values.size() + num_unknown);
+  detail::check_values("values", values, 0);
+  if (order <= num_unknown) return std::nullopt;
+  std::vector<double> descending(values.begin(), values.end());
+  const auto place = descending.begin() + static_cast<std::ptrdiff_t>(order - num_unknown - 1);
+  std::nth_element(descending.begin(), place, descending.end(), std::greater<>());
+  return *place;
+}
+
+namespace {
+
+// Bisections of an interval in [0, 1]: it ends below the spacing of doubles near 1e-3.
+constexpr int num_bisections = 64;
+
+/// tail·factor/power. A power of 0 is below the range of doubles: the hits are far from their
+/// expectation, on the side where the tail is 1 or on the one where it is 0.
+double ratio(double tail, double factor, double power) {
+  if (tail <= 0.0) return 0.0;
+  if (power <= 0.0) return tail > 0.5 ? std::numeric_limits<double>::infinity() : 0.0;
+  return tail * factor / power;
+}
+
+}  // namespace
+
+double evidence_of_less(double num_hits, double num_runs, double probability) {
+  PROOFMASS_EXPECT(num_hits >= 0.0 && num_hits <= num_runs);
+  PROOFMASS_EXPECT(probability > 0.0 && probability < 1.0);
+  const double a = num_hits + 0.5;
+  const double b = num_runs - num_hits + 1.0;
+  return ratio(beta_at_most(probability, a, b), 0.5 * (1.0 - probability),
+               beta_power(probability, a, b));
+}
+
+double evidence_of_more(double num_hits, double num_runs, double probability) {
+  PROOFMASS_EXPECT(num_hits >= 0.0 && num_hits <= num_runs);
+  PROOFMASS_EXPECT(probability > 0.0 && probability < 1.0);
+  if (num_hits < 1.0) return 0.0;
+  const double a = num_hits - 0.5;
+  const double b = num_runs - num_hits + 1.0;
+  // (1 − p)/(1 − √p) = 1 + √p.
+  return ratio(beta_above(probability, a, b), 0.5 * (1.0 + std::sqrt(probability)),
+               beta_power(probability, a, b));
+}
+
+Interval sequential_bounds(double num_hits, double num_runs, double confidence) {
+  detail::check_fraction("confidence", confidence);
+  PROOFMASS_EXPECT(num_hits >= 0.0 && num_hits <= num_runs && num_runs > 0.0);
+  const double enough = 1.0 / (1.0 - confidence);
+  const double rate = num_hits / num_runs;
+  double excluded_low = 0.0;
+  double excluded_high = 1.0;
+  double lower = rate;
+  double upper = rate;
+  // The evidence grows with the distance from the rate, on either side.
+  for (int i = 0; i < num_bisections; ++i) {
+    const double high = 0.5 * (upper + excluded_high);
+    const double low = 0.5 * (lower + excluded_low);
+    const bool is_high = high < 1.0 && evidence_of_less(num_hits, num_runs, high) >= enough;
+    const bool is_low = low > 0.0 && evidence_of_more(num_hits, num_runs, low) >= enough;
+    (is_high ? excluded_high : upper) = high;
+    (is_low ? excluded_low : lower) = low;
+  }
+  return {.lower = excluded_low, .upper = excluded_high, .confidence = confidence};
+}
+
 namespace {
 
 /// The largest count in [0, num_runs] for which `holds`, plus one; 0 if it never does. What holds
@@ -67,10 +165,11 @@ class VerdictRule {
     return decision;
   }
 
-  [[nodiscard]] Verdict verdict(double num_exceedances, std::uint64_t num_runs) const {
+  [[nodiscard]] RequirementVerdict verdict(double num_exceedances, std::uint64_t num_runs) const {
     if (is_fixed(num_runs)) return fixed_verdict(num_exceedances, static_cast<double>(num_runs));
-    if (shows_less(num_exceedances, num_runs)) return Verdict::met;
-    return shows_more(num_exceedances, num_runs) ? Verdict::not_met : Verdict::undecided;
+    if (shows_less(num_exceedances, num_runs)) return RequirementVerdict::met;
+    return shows_more(num_exceedances, num_runs) ? RequirementVerdict::not_met
+                                                 : RequirementVerdict::undecided;
   }
 
   /// One more than the exceedances with which so many runs meet it; 0 if none do.
@@ -83,7 +182,8 @@ class VerdictRule {
   [[nodiscard]] std::optional<std::uint64_t> runs_to_meet(const ExceedanceCount& count) const {
     const auto k = static_cast<double>(count.num_exceedances);
     const bool is_fixed_ahead = num_fixed_ && *num_fixed_ > count.num_runs;
-    if (is_fixed_ahead && fixed_verdict(k, static_cast<double>(*num_fixed_)) == Verdict::met) {
+    if (is_fixed_ahead &&
+        fixed_verdict(k, static_cast<double>(*num_fixed_)) == RequirementVerdict::met) {
       return num_fixed_;
     }
     std::uint64_t too_few = count.num_runs;
@@ -101,10 +201,11 @@ class VerdictRule {
   }
 
  private:
-  [[nodiscard]] Verdict fixed_verdict(double k, double n) const {
-    if (tolerance_.is_shown(binomial_at_most(k, n, allowed_rate_))) return Verdict::met;
-    if (tolerance_.is_shown(binomial_at_least(k, n, allowed_rate_))) return Verdict::not_met;
-    return Verdict::undecided;
+  [[nodiscard]] RequirementVerdict fixed_verdict(double k, double n) const {
+    if (tolerance_.is_shown(binomial_at_most(k, n, allowed_rate_))) return RequirementVerdict::met;
+    if (tolerance_.is_shown(binomial_at_least(k, n, allowed_rate_)))
+      return RequirementVerdict::not_met;
+    return RequirementVerdict::undecided;
   }
 
   [[nodiscard]] bool shows_less(double k, std::uint64_t num_runs) const {
@@ -145,7 +246,7 @@ std::optional<std::uint64_t> runs_to_decide(const VerdictRule& rule,
                                             const RequirementCheck& check) {
   const auto decides = [&](std::uint64_t num_exceedances) {
     return rule.verdict(static_cast<double>(num_exceedances), runs_with(num_exceedances, check)) !=
-           Verdict::undecided;
+           RequirementVerdict::undecided;
   };
   std::uint64_t too_few = check.num_exceedances;
   std::uint64_t enough = check.num_exceedances;
@@ -202,22 +303,6 @@ bool exceeds(const Requirement& requirement, std::span<const double> errors,
   return false;
 }
 
-RequirementCheck check_requirement(const Requirement& requirement, std::span<const double> errors,
-                                   std::uint64_t num_without_estimate,
-                                   std::optional<std::uint64_t> num_fixed) {
-  PROOFMASS_EXPECT(requirement.subject == Requirement::Subject::parameter);
-  const auto num_above =
-      std::ranges::count_if(errors, [&](double error) { return error >= requirement.limit; });
-  RequirementCheck check = check_requirement(
-      requirement,
-      {.num_runs = errors.size() + num_without_estimate,
-       .num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate,
-       .num_without_estimate = num_without_estimate},
-      num_fixed);
-  check.bound = upper_bound_of_order(errors, check.bound_order, num_without_estimate);
-  return check;
-}
-
 RequirementCheck check_requirement(const Requirement& requirement, const ExceedanceCount& count,
                                    std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
@@ -230,16 +315,20 @@ RequirementCheck check_requirement(const Requirement& requirement, const Exceeda
                          .num_without_estimate = count.num_without_estimate,
                          .num_allowed = 0,
                          .bound_order = rule.bound_order(count.num_runs),
-                         .bound = {},
                          .exceedance = decision.exceedance,
                          .num_runs_at_best = {},
                          .num_runs_at_this_rate = {}};
   if (check.bound_order > 0) check.num_allowed = check.bound_order - 1;
-  if (check.verdict != Verdict::undecided) return check;
+  if (check.verdict != RequirementVerdict::undecided) return check;
   check.num_runs_at_best = rule.runs_to_meet(count);
   check.num_runs_at_this_rate =
       check.num_exceedances == 0 ? check.num_runs_at_best : runs_to_decide(rule, check);
   return check;
+}
+
+std::optional<std::uint64_t> runs_to_meet(const Tolerance& tolerance, const ExceedanceCount& count,
+                                          std::optional<std::uint64_t> num_fixed) {
+  return VerdictRule(tolerance, num_fixed).runs_to_meet(count);
 }
 
 Decision decide(const Tolerance& tolerance, const ExceedanceCount& count,
@@ -247,11 +336,6 @@ Decision decide(const Tolerance& tolerance, const ExceedanceCount& count,
   PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
   return VerdictRule(tolerance, num_fixed)
       .decide(static_cast<double>(count.num_exceedances), count.num_runs);
-}
-
-std::optional<std::uint64_t> runs_to_meet(const Tolerance& tolerance, const ExceedanceCount& count,
-                                          std::optional<std::uint64_t> num_fixed) {
-  return VerdictRule(tolerance, num_fixed).runs_to_meet(count);
 }
 
 }  // namespace proofmass

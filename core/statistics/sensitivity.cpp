@@ -6,6 +6,7 @@
 
 #include "core/math/elementary.hpp"
 #include "core/statistics/comparison.hpp"
+#include "core/statistics/correlation.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/moments.hpp"
@@ -185,12 +186,10 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
     const std::vector<double> ranks = average_ranks(inputs[i]);
     for (std::size_t j = 0; j < outputs.size(); ++j) {
       if (output_ranks[j].values.empty()) continue;
-      const auto linear = linear_correlation(inputs[i], outputs[j], confidence);
-      const auto of_ranks = correlation_of_ranks(ranks, output_ranks[j].values, confidence);
-      if (!linear || !of_ranks) continue;
+      const auto of_ranks = linear_correlation(ranks, output_ranks[j].values);
+      if (!of_ranks) continue;
       all[j].push_back({.input = i,
-                        .linear = *linear,
-                        .rank = *of_ranks,
+                        .rank_correlation = *of_ranks,
                         .first_order = index_of(order, outputs[j], output_ranks[j], confidence)});
     }
   }

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "core/statistics/correlation.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass {
@@ -31,9 +30,8 @@ inline constexpr std::size_t sensitivity_values_min = 16;
 
 /// How one output depends on one input.
 struct Sensitivity {
-  std::size_t input = 0;  ///< Index of the column.
-  Correlation linear;
-  Correlation rank;
+  std::size_t input = 0;          ///< Index of the column.
+  double rank_correlation = 0.0;  ///< Of input and output.
   FirstOrderIndex first_order;
   /// p_value of the index, corrected by holm_adjusted() for all inputs that vary.
   double adjusted_p_value = 1.0;
@@ -53,5 +51,44 @@ using Column = std::span<const double>;
 [[nodiscard]] std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inputs,
                                                                   std::span<const Column> outputs,
                                                                   double confidence);
+
+/// One input, or the product of two, as a term of a sum that explains an output.
+struct ExplanatoryTerm {
+  std::size_t first = 0;              ///< Index of the column.
+  std::optional<std::size_t> second;  ///< Of the other factor, which may be `first`; empty for one.
+  double slope = 0.0;                 ///< Its coefficient in the sum of all terms found.
+  double share = 0.0;                 ///< Of the output's variance, beyond the terms before it.
+  double p_value = 1.0;               ///< That chance alone explains as much, corrected.
+};
+
+/// Searches a sum of few terms that explains an output, a term at a time:
+///
+/// 1. Of all inputs and all products of two inputs, squares among them, the one with the largest
+///    linear correlation with what is left of the output is the candidate.
+/// 2. It is kept if its p-value times the number of all inputs and products is below
+///    1 − confidence, and it explains at least `term_share_min` of the output's variance. A product
+///    must explain more than its factors do: both are fitted linearly and taken from product and
+///    output first, as in x y the factor y ≈ 1 would else make a driver of any x. If it is not
+///    kept, the next one by correlation is asked, of num_term_candidates at most.
+/// 3. The output is fitted again by all terms, least squares with a constant, and what is left goes
+///    on to 1.
+///
+/// The test is that of Σab/√Σa²b² with the normal law, a and b being the centred ranks of candidate
+/// and output: it holds whatever the laws, also if the scatter of the output goes with the
+/// candidate, as it does if both have a factor in common.
+///
+/// Takes some 2 s for 100,000 values of 70 inputs.
+///
+/// @throws InvalidArgument if columns differ in size, have below sensitivity_values_min values or
+///         one is not finite; confidence must be in (0, 1).
+[[nodiscard]] std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs,
+                                                             Column output, std::size_t num_max,
+                                                             double confidence);
+
+/// Smallest share of the variance that a term must explain.
+inline constexpr double term_share_min = 0.01;
+
+/// Candidates that are asked for each term at most.
+inline constexpr std::size_t num_term_candidates = 30;
 
 }  // namespace proofmass

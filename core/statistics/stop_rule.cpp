@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/statistics/detail/phrase.hpp"
@@ -37,21 +38,25 @@ void read_statistic(detail::Phrase& phrase, StopRule& rule) {
   }
 }
 
-StopCheck estimated(const StopRule& rule, const ValuePasses& errors) {
+StopCheck estimated(const StopRule& rule, std::span<const double> errors) {
   StopCheck check;
   switch (rule.statistic) {
-    case StopRule::Statistic::mean:
-      check.estimate = errors.moments().mean;
-      check.interval = mean_interval(errors.moments(), default_confidence);
+    case StopRule::Statistic::mean: {
+      const Moments about = moments(errors);
+      check.estimate = about.mean;
+      check.interval = mean_interval(about, default_confidence);
       break;
+    }
     case StopRule::Statistic::standard_deviation:
-      check.estimate = errors.moments().standard_deviation;
-      check.interval = errors.deviation_interval();
+      check.estimate = moments(errors).standard_deviation;
+      check.interval = bootstrap_deviation_interval(errors, default_confidence);
       break;
-    case StopRule::Statistic::percentile:
-      check.estimate = errors.percentile(rule.level);
-      check.interval = errors.percentile_interval(rule.level);
+    case StopRule::Statistic::percentile: {
+      const std::vector<double> ascending = sorted(errors);
+      check.estimate = percentile(ascending, rule.level);
+      check.interval = percentile_interval(ascending, rule.level, default_confidence);
       break;
+    }
     case StopRule::Statistic::success:
     case StopRule::Statistic::verdict:
       PROOFMASS_EXPECT(false);
@@ -124,15 +129,8 @@ std::uint64_t next_stop_check(std::uint64_t num_runs) {
   return count;
 }
 
-ValuePasses::Wanted wanted_by(const StopRule& rule) {
-  ValuePasses::Wanted wanted;
-  if (rule.statistic == StopRule::Statistic::percentile) wanted.levels = {rule.level};
-  wanted.has_deviation_interval = rule.statistic == StopRule::Statistic::standard_deviation;
-  return wanted;
-}
-
-StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors) {
-  if (errors.count() == 0) return {};
+StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors) {
+  if (errors.empty()) return {};
   StopCheck check = estimated(rule, errors);
   check_width(rule, check);
   return check;
@@ -148,7 +146,7 @@ StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count,
     const Decision decision = decide(rule.requirement.tolerance, count, num_fixed);
     check.estimate = static_cast<double>(count.num_exceedances) / num_runs;
     check.interval = decision.exceedance;
-    check.is_reached = decision.verdict != Verdict::undecided;
+    check.is_reached = decision.verdict != RequirementVerdict::undecided;
     return check;
   }
   const auto num_successes = static_cast<double>(count.num_runs - count.num_exceedances);

@@ -8,7 +8,6 @@
 
 #include "core/statistics/interval.hpp"
 #include "core/statistics/requirement.hpp"
-#include "core/statistics/value_passes.hpp"
 
 namespace proofmass {
 
@@ -65,9 +64,9 @@ struct StopCheck {
 /// A pure function of its arguments. The intervals are mean_interval(), the bootstrap's and the
 /// percentile's. A statistic that is exactly 0 with an interval of no width is known.
 /// @param errors  |estimate − truth| of the rule's parameter, SI, in run order, of the runs among
-/// those that have an estimate. Made for wanted_by(rule); no further pass is needed.
-[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors);
-[[nodiscard]] ValuePasses::Wanted wanted_by(const StopRule& rule);
+///                those that have an estimate.
+/// @pre Not is_about_exceedances(rule).
+[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors);
 
 /// Checks a stop rule about exceedances. The estimate of `success` is the fraction of the runs
 /// that meet all objectives, with its Clopper-Pearson interval. That of `verdict` is the fraction

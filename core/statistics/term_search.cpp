@@ -1,5 +1,3 @@
-#include "core/statistics/term_search.hpp"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -10,6 +8,7 @@
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
+#include "core/statistics/sensitivity.hpp"
 
 namespace proofmass {
 namespace {

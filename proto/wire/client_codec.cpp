@@ -7,62 +7,12 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "proto/client.pb.h"
+#include "proto/wire/checks.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::wire {
 namespace {
-
-void write(const SubmitRequest& submit, proto::RequestEnvelope& envelope) {
-  proto::SubmitRequest& message = *envelope.mutable_submit();
-  detail::write_definition(submit.definition, *message.mutable_definition());
-  if (submit.priority) message.set_priority(*submit.priority);
-  if (submit.audit_fraction) message.set_audit_fraction(*submit.audit_fraction);
-  message.set_stop_rule(submit.stop_rule);
-  if (submit.failures_max) message.set_failures_max(*submit.failures_max);
-}
-
-void write(const StatusRequest& status, proto::RequestEnvelope& envelope) {
-  envelope.mutable_status()->set_first_campaign(status.first_campaign);
-}
-
-void write(const WorkersRequest& workers, proto::RequestEnvelope& envelope) {
-  envelope.mutable_workers()->set_after_worker_id(workers.after_worker_id);
-}
-
-void write(const ReleaseHostRequest& release, proto::RequestEnvelope& envelope) {
-  envelope.mutable_release_host()->set_host(release.host);
-}
-
-void write(const RequestPart& part, proto::RequestEnvelope& envelope) {
-  proto::RequestPart& message = *envelope.mutable_part();
-  message.set_total_size(part.total_size);
-  message.set_offset(part.offset);
-  message.set_slice(part.slice);
-}
-
-void write(const ControlRequest& control, proto::RequestEnvelope& envelope) {
-  proto::ControlRequest& message = *envelope.mutable_control();
-  message.set_action(static_cast<proto::ControlAction>(control.action));
-  message.set_campaign(control.campaign);
-  message.set_priority(control.priority);
-}
-
-void write(const AnswerRequest& answer, proto::RequestEnvelope& envelope) {
-  proto::AnswerRequest& message = *envelope.mutable_answer();
-  message.set_campaign(answer.campaign);
-  message.set_question(static_cast<proto::Question>(answer.question));
-  for (const std::string& option : answer.options) message.add_options(option);
-  message.set_statement(answer.statement);
-  message.set_known_size(answer.known_size);
-  message.set_known_sha256(answer.known_sha256);
-}
-
-void write(const AnswerPartRequest& part, proto::RequestEnvelope& envelope) {
-  envelope.mutable_answer_part()->set_answer_id(part.answer_id);
-  envelope.mutable_answer_part()->set_offset(part.offset);
-}
 
 /// The text, cut to what may be sent, with `?` for what may not.
 std::string sendable(std::string_view text) {
@@ -77,7 +27,9 @@ double sendable(double magnitude) {
   return std::isfinite(magnitude) && magnitude > 0.0 ? magnitude : 0.0;
 }
 
-void write_report(const FactoryReport& report, proto::FactoryReport& message) {
+}  // namespace
+
+void write(const FactoryReport& report, proto::FactoryReport& message) {
   message.set_name(name_from(report.name));
   message.set_batch_system(name_from(report.batch_system));
   message.set_phase(static_cast<proto::FactoryPhase>(report.phase));
@@ -89,12 +41,10 @@ void write_report(const FactoryReport& report, proto::FactoryReport& message) {
   message.set_interval_s(report.interval_s);
 }
 
-void write(const FactoryReport& report, proto::RequestEnvelope& envelope) {
-  write_report(report, *envelope.mutable_factory_report());
-}
+namespace {
 
 void write_factory(const FactoryStatus& factory, proto::FactoryStatus& message) {
-  write_report(factory.report, *message.mutable_report());
+  write(factory.report, *message.mutable_report());
   if (!factory.owner.empty()) message.set_owner(name_from(factory.owner));
   message.set_silent_s(sendable(factory.silent_s));
 }
@@ -103,24 +53,25 @@ void write_campaign(const CampaignStatus& campaign, proto::CampaignStatus& messa
   message.set_name(name_from(campaign.name));
   message.set_phase(static_cast<proto::CampaignPhase>(campaign.phase));
   message.set_priority(std::clamp(campaign.priority, -priority_max, priority_max));
+  for (const CampaignCounter& counter : campaign_counters) {
+    message.GetReflection()->SetUInt64(
+        &message, detail::field_of(proto::CampaignStatus::descriptor(), counter.name),
+        campaign.*counter.count);
+  }
   const std::uint64_t num_runs = std::clamp<std::uint64_t>(campaign.num_runs, 1, num_runs_max);
   const std::uint64_t num_given_up = std::min(campaign.num_given_up, num_runs);
   message.set_num_runs(num_runs);
-  message.set_num_done(std::min(campaign.num_done, num_runs - num_given_up));
-  message.set_num_without_estimate(campaign.num_without_estimate);
   message.set_num_given_up(num_given_up);
-  message.set_num_lent(campaign.num_lent);
-  message.set_num_duplicates(campaign.num_duplicates);
-  message.set_num_audited(campaign.num_audited);
-  message.set_num_mismatches(campaign.num_mismatches);
+  message.set_num_done(std::min(campaign.num_done, num_runs - num_given_up));
   message.set_rate_hz(sendable(campaign.rate_hz));
   if (campaign.remaining_s) message.set_remaining_s(sendable(*campaign.remaining_s));
   message.set_storage_failure(sendable(campaign.storage_failure));
   if (!campaign.owner.empty()) message.set_owner(name_from(campaign.owner));
 }
 
-void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
-  proto::StatusReply& message = *envelope.mutable_status();
+}  // namespace
+
+void write(const StatusReply& status, proto::StatusReply& message) {
   message.set_version(status.version);
   message.set_model_version(status.model_version);
   message.set_uptime_s(sendable(status.uptime_s));
@@ -145,6 +96,8 @@ void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
   }
 }
 
+namespace {
+
 void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
   message.set_worker_id(worker.id.value);
   message.set_name(name_from(worker.name));
@@ -157,48 +110,27 @@ void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
   message.set_is_quarantined(worker.is_quarantined);
 }
 
-void write(const WorkersReply& reply, proto::ReplyEnvelope& envelope) {
-  proto::WorkersReply& message = *envelope.mutable_workers();
+}  // namespace
+
+void write(const WorkersReply& reply, proto::WorkersReply& message) {
   for (const WorkerStatus& worker : reply.workers) write_worker(worker, *message.add_workers());
   message.set_num_workers(reply.num_workers);
 }
 
-void write(const DoneReply& done, proto::ReplyEnvelope& envelope) {
-  envelope.mutable_done()->set_text(sendable(done.text));
-}
+namespace {
 
-void write(const ErrorReply& error, proto::ReplyEnvelope& envelope) {
-  envelope.mutable_error()->set_text(sendable(error.text));
-}
+void make_sendable(std::string& text) { text = sendable(std::string_view(text)); }
 
-void write(const PartReply& part, proto::ReplyEnvelope& envelope) {
-  envelope.mutable_part()->set_next_offset(part.next_offset);
-}
-
-void write(const WaitReply&, proto::ReplyEnvelope& envelope) { envelope.mutable_wait(); }
-
-void write(const AnswerReply& answer, proto::ReplyEnvelope& envelope) {
-  proto::AnswerReply& message = *envelope.mutable_answer();
-  message.set_answer_id(answer.answer_id);
-  message.set_size(answer.size);
-  message.set_sha256(answer.sha256);
-  message.set_offset(answer.offset);
-  message.set_exit_code(static_cast<std::uint32_t>(answer.exit_code));
-  message.set_error_text(sendable(answer.error_text));
-}
-
-void write(const AnswerPartReply& part, proto::ReplyEnvelope& envelope) {
-  envelope.mutable_answer_part()->set_content(part.content);
-}
-
-std::size_t size_max_of(const ClientRequest& request) {
-  if (std::holds_alternative<SubmitRequest>(request)) return submit_size_max;
-  if (std::holds_alternative<RequestPart>(request)) return request_message_size_max;
-  return request_size_max;
+/// Texts of the messages that are not written by write().
+void make_sendable(proto::ReplyEnvelope& reply) {
+  if (reply.has_done()) make_sendable(*reply.mutable_done()->mutable_text());
+  if (reply.has_error()) make_sendable(*reply.mutable_error()->mutable_text());
+  if (reply.has_answer()) make_sendable(*reply.mutable_answer()->mutable_error_text());
 }
 
 template <typename Envelope>
-std::string bytes_of(const Envelope& envelope, std::string_view what, std::size_t size_max) {
+std::string bytes_of(Envelope& envelope, std::string_view what, std::size_t size_max) {
+  envelope.set_protocol_version(protocol_version);
   const std::size_t size = envelope.ByteSizeLong();
   if (size > size_max) {
     throw InvalidArgument(
@@ -209,20 +141,35 @@ std::string bytes_of(const Envelope& envelope, std::string_view what, std::size_
 
 }  // namespace
 
-std::string encode(const RequestPacket& packet) {
-  proto::RequestEnvelope envelope;
-  envelope.set_protocol_version(protocol_version);
-  envelope.set_request_id(packet.id);
-  std::visit([&](const auto& content) { write(content, envelope); }, packet.request);
-  return bytes_of(envelope, "request", size_max_of(packet.request));
+std::string encode(proto::RequestEnvelope request) {
+  return bytes_of(request, "request", size_max_of(request));
 }
 
-std::string encode(const ReplyPacket& packet) {
-  proto::ReplyEnvelope envelope;
-  envelope.set_protocol_version(protocol_version);
-  envelope.set_request_id(packet.id);
-  std::visit([&](const auto& content) { write(content, envelope); }, packet.reply);
-  return bytes_of(envelope, "reply", reply_size_max);
+std::string encode(proto::ReplyEnvelope reply) {
+  make_sendable(reply);
+  return bytes_of(reply, "reply", reply_size_max);
+}
+
+void set_definition(const Definition& definition, proto::SubmitRequest& request) {
+  detail::write_definition(definition, *request.mutable_definition());
+}
+
+Definition take_definition(proto::SubmitRequest& request) {
+  Definition definition = detail::read_definition(request.definition());
+  request.clear_definition();
+  return definition;
+}
+
+proto::ReplyEnvelope done_reply(std::string text) {
+  proto::ReplyEnvelope reply;
+  reply.mutable_done()->set_text(std::move(text));
+  return reply;
+}
+
+proto::ReplyEnvelope error_reply(std::string text) {
+  proto::ReplyEnvelope reply;
+  reply.mutable_error()->set_text(std::move(text));
+  return reply;
 }
 
 }  // namespace proofmass::wire

@@ -6,13 +6,16 @@
 #include <string_view>
 #include <variant>
 
+#include "core/campaign/definition.hpp"
+#include "proto/client.pb.h"
 #include "proto/wire/client_messages.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace proofmass::wire {
 
-// What clients and coordinator exchange, as bytes. An envelope holds protocol_version, the number
-// of a request and its content; the reply repeats the number.
+// What clients and coordinator exchange: the envelopes of client.proto, and their bytes. What a
+// peer may send is told here and by the checks of client_message_reader.cpp; the comments of
+// client.proto name these limits.
 
 /// Size limits, bytes. A SubmitRequest may be as large as the first, any other as the second.
 inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;
@@ -36,29 +39,43 @@ inline constexpr std::size_t answer_option_size_max = 4096;               ///< B
 inline constexpr std::size_t statement_size_max = std::size_t{32} << 10;  ///< Bytes.
 inline constexpr std::size_t answer_part_size_max = std::size_t{1} << 20;
 
-/// A request as it travels.
-struct RequestPacket {
-  std::uint64_t id = 0;  ///< Chosen by the client; not 0.
-  ClientRequest request;
-};
+/// Of a request with this content, bytes.
+[[nodiscard]] std::size_t size_max_of(const proto::RequestEnvelope& request);
 
-/// A reply as it travels.
-struct ReplyPacket {
-  std::uint64_t id = 0;  ///< Of the request; 0 if that could not be decoded.
-  ClientReply reply;
-};
-
-/// The bytes of a request or reply. Texts of a reply or report are cut to reply_text_size_max; what
-/// is not printable ASCII or the end of a line becomes `?` in them, since they go to terminals.
+/// The bytes of a request or reply; they say this program's protocol_version. Texts of a reply are
+/// cut to reply_text_size_max; what is not printable ASCII or the end of a line becomes `?` in
+/// them, since they go to terminals.
 /// @throws InvalidArgument if they are more than the message may have.
-[[nodiscard]] std::string encode(const RequestPacket& packet);
-[[nodiscard]] std::string encode(const ReplyPacket& packet);
+[[nodiscard]] std::string encode(proto::RequestEnvelope request);
+[[nodiscard]] std::string encode(proto::ReplyEnvelope reply);
 
-/// Checks everything, like decode(): what they return needs no further check of form. What the
-/// definition of a SubmitRequest says is not looked at.
+/// Checks everything, like decode(): what they return needs no further check of form. What the text
+/// of the definition of a SubmitRequest says is not looked at.
 ///
 /// @param bytes  Anything at all, from anybody.
-[[nodiscard]] std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes);
-[[nodiscard]] std::variant<ReplyPacket, DecodeError> decode_reply(std::string_view bytes);
+[[nodiscard]] std::variant<proto::RequestEnvelope, DecodeError> decode_request(
+    std::string_view bytes);
+[[nodiscard]] std::variant<proto::ReplyEnvelope, DecodeError> decode_reply(std::string_view bytes);
+
+/// `request` has no definition before.
+void set_definition(const Definition& definition, proto::SubmitRequest& request);
+/// The definition, which the request does not have any more. @pre The request has been checked.
+[[nodiscard]] Definition take_definition(proto::SubmitRequest& request);
+
+/// The request was carried out; for people: `campaign mine: 100 runs, 0 of them done`.
+[[nodiscard]] proto::ReplyEnvelope done_reply(std::string text);
+/// The request was refused: `field = value (rule)`.
+[[nodiscard]] proto::ReplyEnvelope error_reply(std::string text);
+
+// The messages about a coordinator, its campaigns, workers and factories, in the form in which they
+// are computed and shown. Texts and numbers that may not be sent are changed as encode() does.
+
+void write(const FactoryReport& report, proto::FactoryReport& message);
+void write(const StatusReply& status, proto::StatusReply& message);
+void write(const WorkersReply& reply, proto::WorkersReply& message);
+/// @throws ConfigError if a value is forbidden, which none is of a message that has been decoded.
+[[nodiscard]] FactoryReport read(const proto::FactoryReport& message);
+[[nodiscard]] StatusReply read(const proto::StatusReply& message);
+[[nodiscard]] WorkersReply read(const proto::WorkersReply& message);
 
 }  // namespace proofmass::wire

@@ -6,7 +6,6 @@
 
 #include "core/error.hpp"
 #include "core/model_rules.hpp"
-#include "proto/client.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/definition_codec.hpp"
@@ -30,86 +29,63 @@ int checked_priority(int priority) {
   return priority;
 }
 
-std::string checked_stop_rule(const std::string& rule) {
-  require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
-          fmt::format("must be at most {}", stop_rule_size_max));
-  if (!rule.empty()) (void)parse_stop_rule(rule);
-  return rule;
+/// @param maximum  The largest enumerator; 0 says that there is none.
+template <typename Sent>
+Sent checked_enumerator(Sent sent, Sent maximum, std::string_view field) {
+  require(sent >= 1 && sent <= maximum, field, fmt::format("{}", static_cast<int>(sent)),
+          fmt::format("must be in [1, {}]", static_cast<int>(maximum)));
+  return sent;
 }
 
-template <typename Core, typename Sent>
-Core enumerator(Sent sent, std::uint64_t maximum, std::string_view field) {
-  const int value = static_cast<int>(sent);
-  require(value >= 1 && static_cast<std::uint64_t>(value) <= maximum, field,
-          fmt::format("{}", value), fmt::format("must be in [1, {}]", maximum));
-  return static_cast<Core>(value);
-}
-
-ClientRequest read(const proto::SubmitRequest& message) {
+void check(const proto::SubmitRequest& message) {
   const double fraction = message.audit_fraction();
   require(fraction >= 0.0 && fraction <= 1.0, "audit", fmt::format("{}", fraction),
           "must be in [0, 1]");
-  SubmitRequest submit{.definition = detail::read_definition(message.definition()),
-                       .stop_rule = checked_stop_rule(message.stop_rule())};
-  if (message.has_priority()) submit.priority = checked_priority(message.priority());
-  if (message.has_audit_fraction()) submit.audit_fraction = fraction;
-  if (message.has_failures_max()) {
-    require_in(message.failures_max(), 0, num_runs_max, "failures");
-    submit.failures_max = message.failures_max();
-  }
-  return submit;
+  (void)detail::read_definition(message.definition());
+  const std::string& rule = message.stop_rule();
+  require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
+          fmt::format("must be at most {}", stop_rule_size_max));
+  if (!rule.empty()) (void)parse_stop_rule(rule);
+  (void)checked_priority(message.priority());
+  require_in(message.failures_max(), 0, num_runs_max, "failures");
 }
 
-ClientRequest read(const proto::ControlRequest& message) {
-  return ControlRequest{.action = enumerator<ControlAction>(message.action(), 6, "action"),
-                        .campaign = checked_name(message.campaign(), "campaign"),
-                        .priority = checked_priority(message.priority())};
+void check(const proto::ControlRequest& message) {
+  (void)checked_enumerator(message.action(), proto::ControlAction_MAX, "action");
+  (void)checked_name(message.campaign(), "campaign");
+  (void)checked_priority(message.priority());
 }
 
-ClientRequest read(const proto::RequestPart& message) {
+void check(const proto::RequestPart& message) {
   require_in(message.total_size(), 1, submit_size_max, "total_size");
   require_in(message.slice().size(), 1, request_part_size_max, "slice size");
   require_in(message.offset(), 0, message.total_size() - 1, "offset");
   require_in(message.slice().size(), 1, message.total_size() - message.offset(), "slice size");
-  return RequestPart{
-      .total_size = message.total_size(), .offset = message.offset(), .slice = message.slice()};
 }
 
-std::string checked_sha256(const std::string& text, std::string_view field) {
+void check_sha256(const std::string& text, std::string_view field) {
   const bool is_one = text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
   require(is_one, field, fmt::format("{} bytes", text.size()), "must be 64 hexadecimal digits");
-  return text;
 }
 
 /// It becomes an argument of a program, which ends at a zero byte.
-std::string checked_argument(const std::string& text, std::size_t size_max,
-                             std::string_view field) {
+void check_argument(const std::string& text, std::size_t size_max, std::string_view field) {
   require_in(text.size(), 1, size_max, field);
   require(text.find('\0') == text.npos, field, fmt::format("{} bytes", text.size()),
           "must not have a zero byte");
-  return text;
 }
 
-ClientRequest read(const proto::AnswerRequest& message) {
-  AnswerRequest answer{.campaign = checked_name(message.campaign(), "campaign"),
-                       .question = enumerator<Question>(message.question(), 4, "question"),
-                       .known_size = message.known_size()};
+void check(const proto::AnswerRequest& message) {
+  (void)checked_name(message.campaign(), "campaign");
+  (void)checked_enumerator(message.question(), proto::Question_MAX, "question");
   require_count(message.options_size(), 0, answer_options_max, "options");
   for (const std::string& option : message.options()) {
-    answer.options.push_back(checked_argument(option, answer_option_size_max, "option size"));
+    check_argument(option, answer_option_size_max, "option size");
   }
-  if (answer.question == Question::query) {
-    answer.statement = checked_argument(message.statement(), statement_size_max, "statement size");
+  if (message.question() == proto::QUESTION_QUERY) {
+    check_argument(message.statement(), statement_size_max, "statement size");
   }
-  if (answer.known_size > 0) {
-    answer.known_sha256 = checked_sha256(message.known_sha256(), "known_sha256");
-  }
-  return answer;
-}
-
-ClientRequest read(const proto::AnswerPartRequest& message) {
-  return AnswerPartRequest{.answer_id = detail::checked_id(message.answer_id(), "answer_id"),
-                           .offset = message.offset()};
+  if (message.known_size() > 0) check_sha256(message.known_sha256(), "known_sha256");
 }
 
 bool may_be_in_text(char c) { return c == '\n' || (c >= ' ' && c <= '~'); }
@@ -127,11 +103,14 @@ std::string checked_owner(const std::string& owner) {
   return owner.empty() ? "" : checked_name(owner, "owner");
 }
 
-FactoryReport read_report(const proto::FactoryReport& message) {
+}  // namespace
+
+FactoryReport read(const proto::FactoryReport& message) {
   require_in(message.interval_s(), 1, factory_interval_s_max, "interval_s");
   return {.name = checked_name(message.name(), "name"),
           .batch_system = checked_name(message.batch_system(), "batch_system"),
-          .phase = enumerator<FactoryPhase>(message.phase(), 3, "phase"),
+          .phase = static_cast<FactoryPhase>(
+              checked_enumerator(message.phase(), proto::FactoryPhase_MAX, "phase")),
           .num_wanted = message.num_wanted(),
           .num_registered = message.num_registered(),
           .num_queued = message.num_queued(),
@@ -140,8 +119,10 @@ FactoryReport read_report(const proto::FactoryReport& message) {
           .interval_s = message.interval_s()};
 }
 
+namespace {
+
 FactoryStatus read_factory(const proto::FactoryStatus& message) {
-  return {.report = read_report(message.report()),
+  return {.report = read(message.report()),
           .owner = checked_owner(message.owner()),
           .silent_s = checked_magnitude(message.silent_s(), "silent_s")};
 }
@@ -155,21 +136,20 @@ CampaignStatus read_campaign(const proto::CampaignStatus& message) {
   require_in(message.num_runs(), 1, num_runs_max, "num_runs");
   require_in(message.num_given_up(), 0, message.num_runs(), "num_given_up");
   require_in(message.num_done(), 0, message.num_runs() - message.num_given_up(), "num_done");
-  return {.name = checked_name(message.name(), "name"),
-          .phase = enumerator<CampaignPhase>(message.phase(), 4, "phase"),
-          .priority = checked_priority(message.priority()),
-          .num_runs = message.num_runs(),
-          .num_done = message.num_done(),
-          .num_without_estimate = message.num_without_estimate(),
-          .num_given_up = message.num_given_up(),
-          .num_lent = message.num_lent(),
-          .num_duplicates = message.num_duplicates(),
-          .num_audited = message.num_audited(),
-          .num_mismatches = message.num_mismatches(),
-          .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
-          .remaining_s = remaining_time(message),
-          .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
-          .owner = checked_owner(message.owner())};
+  CampaignStatus campaign{
+      .name = checked_name(message.name(), "name"),
+      .phase = static_cast<CampaignPhase>(
+          checked_enumerator(message.phase(), proto::CampaignPhase_MAX, "phase")),
+      .priority = checked_priority(message.priority()),
+      .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
+      .remaining_s = remaining_time(message),
+      .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
+      .owner = checked_owner(message.owner())};
+  for (const CampaignCounter& counter : campaign_counters) {
+    campaign.*counter.count = message.GetReflection()->GetUInt64(
+        message, detail::field_of(proto::CampaignStatus::descriptor(), counter.name));
+  }
+  return campaign;
 }
 
 void read_lists(const proto::StatusReply& message, StatusReply& status) {
@@ -189,7 +169,9 @@ void read_lists(const proto::StatusReply& message, StatusReply& status) {
   }
 }
 
-ClientReply read(const proto::StatusReply& message) {
+}  // namespace
+
+StatusReply read(const proto::StatusReply& message) {
   require_count(message.campaigns_size(), 0, campaigns_per_reply_max, "campaigns");
   StatusReply status{.version = checked_name(message.version(), "version"),
                      .model_version = checked_name(message.model_version(), "model_version"),
@@ -207,6 +189,8 @@ ClientReply read(const proto::StatusReply& message) {
   return status;
 }
 
+namespace {
+
 WorkerStatus read_worker(const proto::WorkerStatus& message) {
   return {.id = {detail::checked_id(message.worker_id(), "worker_id")},
           .name = checked_name(message.name(), "name"),
@@ -219,73 +203,69 @@ WorkerStatus read_worker(const proto::WorkerStatus& message) {
           .is_quarantined = message.is_quarantined()};
 }
 
-ClientReply read(const proto::WorkersReply& message) {
+}  // namespace
+
+WorkersReply read(const proto::WorkersReply& message) {
   require_count(message.workers_size(), 0, workers_per_reply_max, "workers");
   WorkersReply reply{.workers = {}, .num_workers = message.num_workers()};
   for (const auto& worker : message.workers()) reply.workers.push_back(read_worker(worker));
   return reply;
 }
 
-ClientReply read(const proto::AnswerReply& message) {
+namespace {
+
+void check(const proto::AnswerReply& message) {
   require_in(message.offset(), 0, message.size(), "offset");
   require_in(message.exit_code(), 0, 255, "exit_code");
-  return AnswerReply{.answer_id = detail::checked_id(message.answer_id(), "answer_id"),
-                     .size = message.size(),
-                     .sha256 = checked_sha256(message.sha256(), "sha256"),
-                     .offset = message.offset(),
-                     .exit_code = static_cast<int>(message.exit_code()),
-                     .error_text = checked_text(message.error_text(), "error_text")};
+  (void)detail::checked_id(message.answer_id(), "answer_id");
+  check_sha256(message.sha256(), "sha256");
+  (void)checked_text(message.error_text(), "error_text");
 }
 
-ClientReply read(const proto::AnswerPartReply& message) {
-  require_in(message.content().size(), 0, answer_part_size_max, "content size");
-  return AnswerPartReply{.content = message.content()};
-}
-
-ClientRequest read_content(const proto::RequestEnvelope& envelope) {
+void check(const proto::RequestEnvelope& envelope) {
+  (void)detail::checked_id(envelope.request_id(), "request_id");
   switch (envelope.request_case()) {
     case proto::RequestEnvelope::kSubmit:
-      return read(envelope.submit());
+      return check(envelope.submit());
     case proto::RequestEnvelope::kStatus:
-      return StatusRequest{envelope.status().first_campaign()};
     case proto::RequestEnvelope::kWorkers:
-      return WorkersRequest{envelope.workers().after_worker_id()};
+      return;
     case proto::RequestEnvelope::kControl:
-      return read(envelope.control());
+      return check(envelope.control());
     case proto::RequestEnvelope::kPart:
-      return read(envelope.part());
+      return check(envelope.part());
     case proto::RequestEnvelope::kReleaseHost:
-      return ReleaseHostRequest{checked_name(envelope.release_host().host(), "host")};
+      return (void)checked_name(envelope.release_host().host(), "host");
     case proto::RequestEnvelope::kAnswer:
-      return read(envelope.answer());
+      return check(envelope.answer());
     case proto::RequestEnvelope::kAnswerPart:
-      return read(envelope.answer_part());
+      return (void)detail::checked_id(envelope.answer_part().answer_id(), "answer_id");
     case proto::RequestEnvelope::kFactoryReport:
-      return read_report(envelope.factory_report());
+      return (void)read(envelope.factory_report());
     case proto::RequestEnvelope::REQUEST_NOT_SET:
       break;
   }
   PROOFMASS_EXPECT(false);
 }
 
-ClientReply read_content(const proto::ReplyEnvelope& envelope) {
+void check(const proto::ReplyEnvelope& envelope) {
   switch (envelope.reply_case()) {
     case proto::ReplyEnvelope::kStatus:
-      return read(envelope.status());
+      return (void)read(envelope.status());
     case proto::ReplyEnvelope::kWorkers:
-      return read(envelope.workers());
+      return (void)read(envelope.workers());
     case proto::ReplyEnvelope::kDone:
-      return DoneReply{checked_text(envelope.done().text(), "text")};
+      return (void)checked_text(envelope.done().text(), "text");
     case proto::ReplyEnvelope::kError:
-      return ErrorReply{checked_text(envelope.error().text(), "text")};
+      return (void)checked_text(envelope.error().text(), "text");
     case proto::ReplyEnvelope::kPart:
-      return PartReply{envelope.part().next_offset()};
     case proto::ReplyEnvelope::kWait:
-      return WaitReply{};
+      return;
     case proto::ReplyEnvelope::kAnswer:
-      return read(envelope.answer());
+      return check(envelope.answer());
     case proto::ReplyEnvelope::kAnswerPart:
-      return read(envelope.answer_part());
+      return require_in(envelope.answer_part().content().size(), 0, answer_part_size_max,
+                        "content size");
     case proto::ReplyEnvelope::REPLY_NOT_SET:
       break;
   }
@@ -321,9 +301,15 @@ std::optional<DecodeError> parse(std::string_view bytes, std::string_view what,
   return std::nullopt;
 }
 
-std::size_t size_max_of(const proto::RequestEnvelope& envelope) {
-  if (envelope.has_submit()) return submit_size_max;
-  return envelope.has_part() ? request_message_size_max : request_size_max;
+/// What follows of it if it parses and has content.
+template <typename Envelope>
+std::variant<Envelope, DecodeError> checked(Envelope envelope) {
+  try {
+    check(envelope);
+    return envelope;
+  } catch (const Error& error) {
+    return fault(DecodeFault::invalid, detail::printable(error.what()));
+  }
 }
 
 DecodeError empty(std::string_view what) {
@@ -332,29 +318,25 @@ DecodeError empty(std::string_view what) {
 
 }  // namespace
 
-std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes) {
+std::size_t size_max_of(const proto::RequestEnvelope& envelope) {
+  if (envelope.has_submit()) return submit_size_max;
+  return envelope.has_part() ? request_message_size_max : request_size_max;
+}
+
+std::variant<proto::RequestEnvelope, DecodeError> decode_request(std::string_view bytes) {
   proto::RequestEnvelope envelope;
   if (const auto error = parse(bytes, "request", submit_size_max, envelope)) return *error;
   if (envelope.request_case() == proto::RequestEnvelope::REQUEST_NOT_SET) return empty("request");
   const std::size_t size_max = size_max_of(envelope);
   if (bytes.size() > size_max) return too_large("request", bytes.size(), size_max);
-  try {
-    return RequestPacket{.id = detail::checked_id(envelope.request_id(), "request_id"),
-                         .request = read_content(envelope)};
-  } catch (const Error& error) {
-    return fault(DecodeFault::invalid, detail::printable(error.what()));
-  }
+  return checked(std::move(envelope));
 }
 
-std::variant<ReplyPacket, DecodeError> decode_reply(std::string_view bytes) {
+std::variant<proto::ReplyEnvelope, DecodeError> decode_reply(std::string_view bytes) {
   proto::ReplyEnvelope envelope;
   if (const auto error = parse(bytes, "reply", reply_size_max, envelope)) return *error;
   if (envelope.reply_case() == proto::ReplyEnvelope::REPLY_NOT_SET) return empty("reply");
-  try {
-    return ReplyPacket{.id = envelope.request_id(), .reply = read_content(envelope)};
-  } catch (const Error& error) {
-    return fault(DecodeFault::invalid, detail::printable(error.what()));
-  }
+  return checked(std::move(envelope));
 }
 
 }  // namespace proofmass::wire

@@ -1,37 +1,15 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <variant>
+#include <string_view>
 #include <vector>
 
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::wire {
-
-// What people's programs say to a coordinator, at another port and with other keys than workers.
-// One request, one reply.
-
-/// Asks for a campaign to be computed: a new one, or more runs of one that is there.
-struct SubmitRequest {
-  Definition definition;  ///< With its columns; what it says has not been looked at.
-  /// -100 to 100; runs of a higher one are lent first. Unset: as it is, 0 for a new campaign.
-  std::optional<int> priority = {};
-  std::optional<double> audit_fraction = {};  ///< 0 to 1. Unset: as it is.
-  /// See parse_stop_rule(): the campaign's runs are as many as it may take. Empty: all of them.
-  std::string stop_rule = {};
-  /// Runs without an estimate and given up; with more, the campaign is cancelled.
-  std::optional<std::uint64_t> failures_max = {};
-};
-
-struct StatusRequest {
-  std::uint64_t first_campaign = 0;  ///< Index in the list of all; those before are left out.
-};
-
-struct WorkersRequest {
-  std::uint64_t after_worker_id = 0;  ///< Workers up to this number are left out.
-};
 
 /// What a client does with a campaign. The values are sent: never renumber.
 enum class ControlAction : std::uint8_t {
@@ -41,50 +19,6 @@ enum class ControlAction : std::uint8_t {
   set_priority = 4,
   retry = 5,    ///< The runs that were given up are lent again.
   archive = 6,  ///< It is no longer served; its file moves to `archived`.
-};
-
-struct ControlRequest {
-  ControlAction action = ControlAction::pause;
-  std::string campaign;  ///< Name; is_name() holds.
-  int priority = 0;      ///< For set_priority; -100 to 100.
-};
-
-/// Runs are lent to workers of this host again, though too many of them crashed.
-struct ReleaseHostRequest {
-  std::string host;  ///< is_name() holds.
-};
-
-/// A slice of the bytes of a request that is too large for one message.
-struct RequestPart {
-  std::uint64_t total_size = 0;  ///< Of the whole request, bytes; 1 to submit_size_max.
-  std::uint64_t offset = 0;      ///< Of the first byte.
-  std::string slice;             ///< 1 byte to request_part_size_max; ends at most at total_size.
-};
-
-/// What a client asks about a campaign's results. The values are sent: never renumber.
-enum class Question : std::uint8_t {
-  report = 1,
-  sensitivity = 2,
-  query = 3,
-  database = 4,  ///< A copy of the campaign database.
-};
-
-/// A question that the coordinator answers with the command of that name.
-struct AnswerRequest {
-  std::string campaign;  ///< Name; is_name() holds.
-  Question question = Question::report;
-  std::vector<std::string> options = {};  ///< Of the command: `--json`, `--run=13`.
-  std::string statement = {};             ///< SQL of a query; else empty.
-  /// Bytes that the client has of an earlier copy of the database, and their SHA-256 (64
-  /// hexadecimal digits). If the new copy begins with them, only the rest is sent.
-  std::uint64_t known_size = 0;
-  std::string known_sha256 = {};
-};
-
-/// Asks for the bytes of an answer from here on; at its end, the coordinator drops the answer.
-struct AnswerPartRequest {
-  std::uint64_t answer_id = 0;  ///< Not 0.
-  std::uint64_t offset = 0;
 };
 
 /// Whether a factory submits. The values are sent: never renumber.
@@ -108,10 +42,6 @@ struct FactoryReport {
   std::uint64_t interval_s = 1;      ///< Between two reports; 1 to factory_interval_s_max.
 };
 
-using ClientRequest =
-    std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest, ReleaseHostRequest,
-                 RequestPart, AnswerRequest, AnswerPartRequest, FactoryReport>;
-
 /// Whether a campaign's runs are lent. The values are sent: never renumber.
 enum class CampaignPhase : std::uint8_t {
   active = 1,
@@ -132,11 +62,43 @@ struct CampaignStatus {
   std::uint64_t num_lent = 0;
   std::uint64_t num_duplicates = 0;  ///< Results that were there already.
   std::uint64_t num_audited = 0;
-  std::uint64_t num_mismatches = 0;   ///< Of the audited and duplicate ones; must be 0.
-  double rate_hz = 0.0;               ///< Runs stored per second, recently.
-  std::optional<double> remaining_s;  ///< At that rate.
-  std::string storage_failure;        ///< Why nothing can be stored; empty if all is well.
-  std::string owner = {};             ///< Name of the key that submitted it; empty if not known.
+  std::uint64_t num_mismatches = 0;        ///< Of the audited and duplicate ones; must be 0.
+  double rate_hz = 0.0;                    ///< Runs stored per second, recently.
+  std::optional<double> remaining_s = {};  ///< At that rate.
+  std::string storage_failure = {};        ///< Why nothing can be stored; empty if all is well.
+  std::string owner = {};  ///< Name of the key that submitted it; empty if not known.
+};
+
+/// A number of runs or results in CampaignStatus.
+struct CampaignCounter {
+  std::string_view name;  ///< Of the field of the message, and of the key in JSON.
+  std::uint64_t CampaignStatus::*count;
+  std::string_view metric;  ///< Name in `/metrics`: a counter if it ends in `_total`.
+  std::string_view help;    ///< What `/metrics` says of it.
+};
+
+/// All of them: messages, JSON and metrics have what stands here. A new one needs its field in
+/// client.proto and above, a row here, its count in CampaignState, and
+/// CampaignService::record_of().
+inline constexpr std::array campaign_counters{
+    CampaignCounter{"num_runs", &CampaignStatus::num_runs, "proofmass_runs_wanted",
+                    "Runs that the campaign is to have."},
+    CampaignCounter{"num_done", &CampaignStatus::num_done, "proofmass_runs_finished_total",
+                    "Runs whose results are on disk."},
+    CampaignCounter{"num_without_estimate", &CampaignStatus::num_without_estimate,
+                    "proofmass_runs_without_estimate_total",
+                    "Runs that ended without an estimate since the coordinator started."},
+    CampaignCounter{"num_given_up", &CampaignStatus::num_given_up, "proofmass_runs_given_up",
+                    "Runs that crashed too many workers."},
+    CampaignCounter{"num_lent", &CampaignStatus::num_lent, "proofmass_runs_lent",
+                    "Runs that workers hold."},
+    CampaignCounter{"num_duplicates", &CampaignStatus::num_duplicates,
+                    "proofmass_results_duplicate_total", "Results that were there already."},
+    CampaignCounter{"num_audited", &CampaignStatus::num_audited, "proofmass_results_compared_total",
+                    "Results that were compared with a second computation."},
+    CampaignCounter{"num_mismatches", &CampaignStatus::num_mismatches,
+                    "proofmass_results_different_total",
+                    "Compared results that differ; must be 0."},
 };
 
 /// A file that should be served and cannot be for now. It is tried again every few seconds.
@@ -185,42 +147,5 @@ struct WorkersReply {
   std::vector<WorkerStatus> workers;  ///< Ascending, after WorkersRequest::after_worker_id.
   std::uint64_t num_workers = 0;      ///< Of all, in this reply or not.
 };
-
-/// The request was carried out.
-struct DoneReply {
-  std::string text;  ///< For people: `campaign mine: 100 runs, 0 of them done`.
-};
-
-/// The request was refused.
-struct ErrorReply {
-  std::string text;  ///< `field = value (rule)`.
-};
-
-/// The coordinator wants the bytes of the request from here on; 0: all of them.
-struct PartReply {
-  std::uint64_t next_offset = 0;
-};
-
-/// The request is being carried out, and its reply will follow.
-struct WaitReply {};
-
-/// The answer to an AnswerRequest is ready to be read. It is kept for a minute after it was last
-/// read; for ten seconds once it was read to its end, or less if others need the room.
-struct AnswerReply {
-  std::uint64_t answer_id = 0;  ///< Not 0.
-  std::uint64_t size = 0;       ///< Bytes.
-  std::string sha256;           ///< Of all of them; 64 hexadecimal digits.
-  std::uint64_t offset = 0;     ///< Where to begin: AnswerRequest::known_size or 0.
-  int exit_code = 0;            ///< Of the command; 0 to 255.
-  std::string error_text;       ///< What it wrote to standard error.
-};
-
-/// Bytes of an answer, at most answer_part_size_max; none at its end.
-struct AnswerPartReply {
-  std::string content;
-};
-
-using ClientReply = std::variant<StatusReply, WorkersReply, DoneReply, ErrorReply, PartReply,
-                                 WaitReply, AnswerReply, AnswerPartReply>;
 
 }  // namespace proofmass::wire

@@ -3,32 +3,23 @@
 #include <fmt/format.h>
 #include <google/protobuf/arena.h>
 
-#include <array>
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <initializer_list>
+#include <optional>
+#include <utility>
 
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
-#include "proto/wire/message_reader.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::wire {
 namespace {
 
 /// The largest batch of results has 40,000.
 constexpr std::size_t fields_max = 65536;
-
-/// An envelope in an arena. The parts of a message, of which a batch of results has hundreds, are
-/// freed at once; those of a short message need no memory but this object.
-class EnvelopeArena {
- public:
-  [[nodiscard]] proto::Envelope& envelope() { return envelope_; }
-
- private:
-  alignas(std::max_align_t) std::array<char, 2048> first_block_;
-  google::protobuf::Arena arena_{first_block_.data(), first_block_.size()};
-  proto::Envelope& envelope_ = *google::protobuf::Arena::CreateMessage<proto::Envelope>(&arena_);
-};
 
 bool has_few_fields(std::string_view bytes) {
   // A field takes two bytes or more, so that a short message cannot have too many. Counting takes
@@ -37,175 +28,290 @@ bool has_few_fields(std::string_view bytes) {
          detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max);
 }
 
-DecodeError too_large(std::size_t size, std::size_t size_max) {
-  return {DecodeFault::too_large,
-          fmt::format("message size = {} bytes (must be at most {})", size, size_max)};
+std::string too_large(std::size_t size) {
+  return fmt::format("message size = {} bytes (must be at most {})", size, message_size_max);
 }
 
-DecodeError wrong_version(std::uint32_t version) {
-  return {DecodeFault::wrong_version,
-          fmt::format("protocol_version = {} (must be {})", version, protocol_version)};
+using detail::checked_id;
+using detail::checked_magnitude;
+using detail::checked_name;
+using detail::require;
+using detail::require_count;
+using detail::require_in;
+
+void check_campaign(std::uint64_t id) { (void)checked_id(id, "campaign"); }
+void check_attempt(std::uint32_t attempt) { (void)checked_id(attempt, "attempt"); }
+void check_run(std::uint64_t run) { require_in(run, 0, num_runs_max - 1, "run"); }
+void check_name(const std::string& name, std::string_view field) {
+  (void)checked_name(name, field);
 }
 
-Packet read_packet(const proto::Envelope& envelope) {
-  return {.header = {.session = {detail::checked_id(envelope.session(), "session")},
-                     .epoch = {envelope.epoch()},
-                     .sequence = envelope.sequence()},
-          .message = detail::read_message(envelope)};
-}
-
-template <typename Ranges>
-void write_ranges(const std::vector<RunRange>& ranges, Ranges& messages) {
-  for (const RunRange& range : ranges) {
-    proto::Range& message = *messages.Add();
-    message.set_first(range.first.value);
-    message.set_count(range.count);
+void check_ranges(const Ranges& ranges) {
+  require_count(ranges.size(), 1, ranges_per_message_max, "ranges");
+  for (const proto::Range& range : ranges) {
+    require_in(range.count(), 1, num_runs_max, "range count");
+    require_in(range.first(), 0, num_runs_max - range.count(), "range first");
   }
 }
 
-void write_held(const HeldRuns& held, proto::HeldRuns& message) {
-  message.set_campaign(held.campaign.value);
-  message.set_attempt(held.attempt.value);
-  write_ranges(held.ranges, *message.mutable_ranges());
+/// @param num_ranges  Of the message so far; grows.
+void check_held(const proto::HeldRuns& held, int& num_ranges) {
+  check_campaign(held.campaign());
+  check_attempt(held.attempt());
+  check_ranges(held.ranges());
+  num_ranges += held.ranges_size();
+  require_in(static_cast<std::uint64_t>(num_ranges), 0, ranges_per_message_max, "number of ranges");
 }
 
-void write(const Hello& hello, proto::Envelope& envelope) {
-  proto::Hello& message = *envelope.mutable_hello();
-  message.set_worker_name(hello.worker_name);
-  message.set_host(hello.host);
-  message.set_process_id(hello.process_id);
-  message.set_num_slots(hello.num_slots);
-  message.set_model_version(hello.model_version);
-  message.set_build(hello.build);
-  message.set_reference_digest(hello.reference_digest);
-  if (!hello.former) return;
-  message.mutable_former()->set_session(hello.former->session.value);
-  message.mutable_former()->set_reason(static_cast<proto::LossReason>(hello.former->reason));
-  message.mutable_former()->set_signal(hello.former->signal);
+void check_reason(proto::LossReason value, std::initializer_list<LossReason> allowed) {
+  require(std::ranges::find(allowed, loss_reason(value)) != allowed.end(), "reason",
+          fmt::format("{}", static_cast<int>(value)), "must be one that this message may give");
 }
 
-void write(const Welcome& welcome, proto::Envelope& envelope) {
-  proto::Welcome& message = *envelope.mutable_welcome();
-  message.set_worker_id(welcome.worker.value);
-  message.set_heartbeat_interval_s(welcome.heartbeat_interval_s);
+void check(const proto::Hello& hello) {
+  require_in(hello.num_slots(), 1, slots_max, "num_slots");
+  check_name(hello.worker_name(), "worker_name");
+  check_name(hello.host(), "host");
+  check_name(hello.model_version(), "model_version");
+  check_name(hello.build(), "build");
+  if (!hello.has_former()) return;
+  require_in(hello.former().signal(), 0, signal_max, "former signal");
+  (void)checked_id(hello.former().session(), "former session");
+  check_reason(hello.former().reason(), {LossReason::crashed, LossReason::out_of_memory});
 }
 
-void write(const Reject& reject, proto::Envelope& envelope) {
-  envelope.mutable_reject()->set_reason(static_cast<proto::RejectReason>(reject.reason));
-  envelope.mutable_reject()->set_text(reject.text);
+void check(const proto::Welcome& welcome) {
+  const double interval_s = welcome.heartbeat_interval_s();
+  require(interval_s > 0.0 && interval_s <= heartbeat_interval_s_max, "heartbeat_interval_s",
+          fmt::format("{}", interval_s),
+          fmt::format("must be in (0, {}]", heartbeat_interval_s_max));
+  (void)checked_id(welcome.worker_id(), "worker_id");
 }
 
-void write(const CampaignRequest& request, proto::Envelope& envelope) {
-  envelope.mutable_campaign_request()->set_campaign(request.campaign.value);
-  envelope.mutable_campaign_request()->set_offset(request.offset);
+void check(const proto::Reject& reject) {
+  require(proto::RejectReason_IsValid(reject.reason()) &&
+              reject.reason() != proto::REJECT_REASON_UNSPECIFIED,
+          "reason", fmt::format("{}", static_cast<int>(reject.reason())),
+          fmt::format("must be in [1, {}]", static_cast<int>(proto::RejectReason_MAX)));
+  require(reject.text().size() <= reject_text_size_max, "text",
+          fmt::format("{} bytes", reject.text().size()),
+          fmt::format("must be at most {}", reject_text_size_max));
 }
 
-void write(const DefinitionPart& part, proto::Envelope& envelope) {
-  proto::DefinitionPart& message = *envelope.mutable_definition_part();
-  message.set_campaign(part.campaign.value);
-  message.set_offset(part.offset);
-  message.set_total_size(part.total_size);
-  message.set_checksum(part.checksum);
-  message.set_content(part.content);
+void check(const proto::CampaignRequest& request) {
+  require_in(request.offset(), 0, definition_size_max - 1, "offset");
+  check_campaign(request.campaign());
 }
 
-void write(const Forget& forget, proto::Envelope& envelope) {
-  envelope.mutable_forget()->set_campaign(forget.campaign.value);
-  envelope.mutable_forget()->set_num_runs(forget.num_runs);
+void check(const proto::DefinitionPart& part) {
+  require_in(part.total_size(), 1, definition_size_max, "total_size");
+  require_in(part.content().size(), 1,
+             std::min<std::uint64_t>(definition_part_size_max, part.total_size()), "content size");
+  require_in(part.offset(), 0, part.total_size() - part.content().size(), "offset");
+  check_campaign(part.campaign());
 }
 
-void write(const NotServed& not_served, proto::Envelope& envelope) {
-  envelope.mutable_not_served()->set_campaign(not_served.campaign.value);
-  write_ranges(not_served.ranges, *envelope.mutable_not_served()->mutable_ranges());
+void check(const proto::Forget& forget) {
+  require_in(forget.num_runs(), 1, num_runs_max, "num_runs");
+  check_campaign(forget.campaign());
 }
 
-void write(const RunLease& lease, proto::Envelope& envelope) {
-  proto::RunLease& message = *envelope.mutable_run_lease();
-  message.set_campaign(lease.campaign.value);
-  message.set_first_run(lease.runs.first.value);
-  message.set_num_runs(static_cast<std::uint32_t>(lease.runs.count));
-  message.set_attempt(lease.attempt.value);
-  message.set_is_alone(lease.is_alone);
-  message.set_batch_runs_max(lease.batch_runs_max);
-  message.mutable_table_values()->Assign(lease.table_values.begin(), lease.table_values.end());
+void check(const proto::NotServed& not_served) {
+  check_campaign(not_served.campaign());
+  if (not_served.ranges_size() > 0) check_ranges(not_served.ranges());
 }
 
-void write(const Retract& retract, proto::Envelope& envelope) {
-  envelope.mutable_retract()->set_campaign(retract.campaign.value);
-  write_ranges(retract.ranges, *envelope.mutable_retract()->mutable_ranges());
+void check(const proto::RunLease& lease) {
+  require_in(lease.num_runs(), 1, runs_per_lease_max, "num_runs");
+  require_in(lease.first_run(), 0, num_runs_max - lease.num_runs(), "first_run");
+  const auto& values = lease.table_values();
+  const auto num_runs = static_cast<int>(lease.num_runs());
+  const std::size_t num_drawn = model().drawn().size();
+  require(values.size() % num_runs == 0 &&
+              static_cast<std::size_t>(values.size() / num_runs) <= num_drawn,
+          "table_values", fmt::format("{} entries", values.size()),
+          fmt::format("must be the same number for each run, at most {}", num_drawn));
+  const bool all_finite =
+      std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  require(all_finite, "table_values", "not finite", "must be finite");
+  check_campaign(lease.campaign());
+  check_attempt(lease.attempt());
 }
 
-void write(const GiveBack& give_back, proto::Envelope& envelope) {
-  proto::GiveBack& message = *envelope.mutable_give_back();
-  message.set_reason(static_cast<proto::LossReason>(give_back.reason));
-  for (const HeldRuns& held : give_back.runs) write_held(held, *message.add_runs());
+void check(const proto::Retract& retract) {
+  check_campaign(retract.campaign());
+  check_ranges(retract.ranges());
 }
 
-void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
-  const RunResult& result = computed.result;
-  message.set_run(result.run.value);
-  message.set_status(static_cast<proto::RunStatus>(result.status));
-  message.set_num_draws(result.num_draws);
-  message.set_num_rounds(result.num_rounds);
-  if (result.has_truth()) {
-    message.mutable_truth()->Assign(result.truth.begin(), result.truth.end());
-    // What was simulated has health; the message has it whenever the status allows it.
-    std::vector<double> health = result.health;
-    health.resize(model().results().health.size());
-    message.mutable_health()->Assign(health.begin(), health.end());
+void check(const proto::GiveBack& give_back) {
+  require_count(give_back.runs_size(), 1, ranges_per_message_max, "runs");
+  check_reason(give_back.reason(),
+               {LossReason::retracted, LossReason::drained, LossReason::walltime,
+                LossReason::preempted, LossReason::failed});
+  int num_ranges = 0;
+  for (const proto::HeldRuns& held : give_back.runs()) check_held(held, num_ranges);
+}
+
+void require_size(int size, std::size_t must, std::string_view field) {
+  if (static_cast<std::size_t>(size) == must) return;
+  throw ConfigError(field, fmt::format("{} entries", size),
+                    fmt::format("must be {} with this status", must));
+}
+
+using Values = google::protobuf::RepeatedField<double>;
+
+/// One value in range for each of `count`.
+void check_values(const Values& values, std::size_t count, std::string_view field) {
+  require_size(values.size(), count, field);
+  for (const double value : values) {
+    if (is_in_range(value)) continue;
+    throw ConfigError(field, fmt::format("{}", value),
+                      fmt::format("must be in [{}, {}]", -magnitude_max, magnitude_max));
   }
-  if (result.has_estimate()) {
-    message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());
-    message.mutable_standard_error()->Assign(result.standard_error.begin(),
-                                             result.standard_error.end());
+}
+
+void check_time(double time_s, std::string_view field) {
+  if (checked_magnitude(time_s, field) <= run_time_s_max) return;
+  throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", run_time_s_max));
+}
+
+void check_health(const Values& health, bool has_health,
+                  const std::vector<HealthQuantity>& quantities) {
+  require_size(health.size(), has_health ? quantities.size() : 0, "health");
+  for (int i = 0; i < health.size(); ++i) {
+    if (health[i] >= 0.0 && health[i] <= magnitude_max) continue;
+    throw ConfigError(fmt::format("health.{}", quantities[static_cast<std::size_t>(i)].column()),
+                      fmt::format("{}", health[i]),
+                      fmt::format("must be in [0, {}]", magnitude_max));
   }
-  message.set_loss_cause(result.loss.cause);
-  message.set_loss_session(result.loss.session);
-  message.set_compute_s(computed.compute_s);
-  message.set_elapsed_s(computed.elapsed_s);
 }
 
-void write(const ResultBatch& batch, proto::Envelope& envelope) {
-  proto::ResultBatch& message = *envelope.mutable_result_batch();
-  message.set_campaign(batch.campaign.value);
-  message.set_attempt(batch.attempt.value);
-  for (const ComputedRun& computed : batch.results) write_run(computed, *message.add_results());
+void check_loss(const proto::ComputedRun& run, bool is_lost, const ResultSchema& schema) {
+  require_in(run.loss_cause(), is_lost ? 1 : 0, is_lost ? schema.loss_causes.size() : 0,
+             "loss_cause");
+  require_in(run.loss_session(), is_lost ? 1 : 0, is_lost ? schema.loss_sessions.size() : 0,
+             "loss_session");
 }
 
-void write(const ResultAck& ack, proto::Envelope& envelope) {
-  envelope.mutable_result_ack()->set_campaign(ack.campaign.value);
-  for (const RunIndex run : ack.runs) envelope.mutable_result_ack()->add_runs(run.value);
+/// Every list is as long as the model's results say; its numbers are in range.
+void check(const proto::ComputedRun& run, const ResultSchema& schema, std::size_t num_errors) {
+  require_in(static_cast<std::uint64_t>(static_cast<int>(run.status())), 1, proto::RunStatus_MAX,
+             "status");
+  check_run(run.run());
+  RunResult result;
+  result.status = static_cast<RunStatus>(run.status());
+  const bool has_estimate = result.has_estimate();
+  const bool has_errors = has_estimate && run.standard_error_size() > 0;
+  const std::size_t num_quantities = schema.quantities.size();
+  check_values(run.truth(), result.has_truth() ? num_quantities : 0, "truth");
+  check_values(run.estimate(), has_estimate ? num_quantities : 0, "estimate");
+  check_values(run.standard_error(), has_errors ? num_errors : 0, "standard_error");
+  check_health(run.health(), result.has_truth(), schema.health);
+  check_loss(run, result.status == RunStatus::lost, schema);
+  check_time(run.compute_s(), "compute_s");
+  check_time(run.elapsed_s(), "elapsed_s");
 }
 
-void write(const Heartbeat& heartbeat, proto::Envelope& envelope) {
-  proto::Heartbeat& message = *envelope.mutable_heartbeat();
-  message.set_num_runs_max(heartbeat.num_runs_max);
-  message.set_num_steps_done(heartbeat.num_steps_done);
-  for (const HeldRuns& held : heartbeat.held) write_held(held, *message.add_held());
-  for (const ComputedBatch& batch : heartbeat.computing) {
-    proto::ComputedBatch& content = *message.add_computing();
-    content.set_campaign(batch.campaign.value);
-    content.set_num_steps_done(batch.num_steps_done);
-    write_ranges(batch.ranges, *content.mutable_ranges());
+void check(const proto::ResultBatch& batch) {
+  require_count(batch.results_size(), 1, runs_per_lease_max, "results");
+  check_campaign(batch.campaign());
+  check_attempt(batch.attempt());
+  const ResultSchema& schema = model().results();
+  const auto num_errors = static_cast<std::size_t>(
+      std::ranges::count_if(schema.quantities, &Quantity::has_standard_error));
+  for (const proto::ComputedRun& run : batch.results()) check(run, schema, num_errors);
+}
+
+void check(const proto::ResultAck& ack) {
+  require_count(ack.runs_size(), 1, runs_per_lease_max, "runs");
+  check_campaign(ack.campaign());
+  for (const std::uint64_t run : ack.runs()) check_run(run);
+}
+
+void check(const proto::Heartbeat& heartbeat) {
+  require_in(heartbeat.num_runs_max(), 0, runs_per_lease_max, "num_runs_max");
+  require_count(heartbeat.held_size(), 0, ranges_per_message_max, "held");
+  require_count(heartbeat.set_aside_size(), 0, ranges_per_message_max, "set_aside");
+  require_count(heartbeat.computing_size(), 0, slots_max, "computing");
+  int num_held = 0;
+  for (const proto::HeldRuns& held : heartbeat.held()) check_held(held, num_held);
+  for (const proto::HeldRuns& held : heartbeat.set_aside()) check_held(held, num_held);
+  int num_computing = 0;
+  for (const proto::ComputedBatch& batch : heartbeat.computing()) {
+    check_campaign(batch.campaign());
+    check_ranges(batch.ranges());
+    num_computing += batch.ranges_size();
+    require_in(static_cast<std::uint64_t>(num_computing), 0, ranges_per_message_max,
+               "number of ranges");
   }
-  for (const HeldRuns& held : heartbeat.set_aside) write_held(held, *message.add_set_aside());
 }
 
-void write(const Bye& bye, proto::Envelope& envelope) {
-  envelope.mutable_bye()->set_reason(static_cast<proto::LossReason>(bye.reason));
+void check(const proto::Bye& bye) {
+  check_reason(bye.reason(), {LossReason::drained, LossReason::walltime, LossReason::preempted,
+                              LossReason::failed});
 }
 
-void write(const HeartbeatAck&, proto::Envelope& envelope) { envelope.mutable_heartbeat_ack(); }
-void write(const Drain&, proto::Envelope& envelope) { envelope.mutable_drain(); }
-void write(const Stop&, proto::Envelope& envelope) { envelope.mutable_stop(); }
+void check_of_worker(const proto::Envelope& envelope) {
+  switch (envelope.from_worker_case()) {
+    case proto::Envelope::kHello:
+      return check(envelope.hello());
+    case proto::Envelope::kCampaignRequest:
+      return check(envelope.campaign_request());
+    case proto::Envelope::kGiveBack:
+      return check(envelope.give_back());
+    case proto::Envelope::kResultBatch:
+      return check(envelope.result_batch());
+    case proto::Envelope::kHeartbeat:
+      return check(envelope.heartbeat());
+    case proto::Envelope::kBye:
+      return check(envelope.bye());
+    case proto::Envelope::FROM_WORKER_NOT_SET:
+      return;
+  }
+}
 
-}  // namespace
+void check_of_coordinator(const proto::Envelope& envelope) {
+  switch (envelope.from_coordinator_case()) {
+    case proto::Envelope::kWelcome:
+      return check(envelope.welcome());
+    case proto::Envelope::kReject:
+      return check(envelope.reject());
+    case proto::Envelope::kDefinitionPart:
+      return check(envelope.definition_part());
+    case proto::Envelope::kForget:
+      return check(envelope.forget());
+    case proto::Envelope::kNotServed:
+      return check(envelope.not_served());
+    case proto::Envelope::kRunLease:
+      return check(envelope.run_lease());
+    case proto::Envelope::kRetract:
+      return check(envelope.retract());
+    case proto::Envelope::kResultAck:
+      return check(envelope.result_ack());
+    case proto::Envelope::kHeartbeatAck:
+    case proto::Envelope::kDrain:
+    case proto::Envelope::kStop:
+    case proto::Envelope::FROM_COORDINATOR_NOT_SET:
+      return;
+  }
+}
 
-std::variant<Packet, DecodeError> decode(std::string_view bytes) {
+/// Whether the message in the envelope is one that a peer may send: numbers and sizes are within
+/// their limits, enumerators are known, names are names, lists have as many entries as others say.
+/// @throws ConfigError reading `field = value (rule)`.
+void check(const proto::Envelope& envelope) {
+  (void)checked_id(envelope.session(), "session");
+  require(!is_of_worker(envelope) || !is_of_coordinator(envelope), "message", "two", "must be one");
+  check_of_worker(envelope);
+  check_of_coordinator(envelope);
+}
+
+/// Why the bytes are not a message, if so.
+std::optional<DecodeError> read(std::string_view bytes, proto::Envelope& envelope) {
   detail::silence_protobuf();
-  if (bytes.size() > message_size_max) return too_large(bytes.size(), message_size_max);
-  EnvelopeArena arena;
-  proto::Envelope& envelope = arena.envelope();
+  if (bytes.size() > message_size_max) {
+    return DecodeError{DecodeFault::too_large, too_large(bytes.size())};
+  }
   const bool is_parsed = has_few_fields(bytes) &&
                          envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!is_parsed) {
@@ -214,30 +320,43 @@ std::variant<Packet, DecodeError> decode(std::string_view bytes) {
                                    bytes.size(), fields_max)};
   }
   if (envelope.protocol_version() != protocol_version) {
-    return wrong_version(envelope.protocol_version());
+    return DecodeError{DecodeFault::wrong_version,
+                       fmt::format("protocol_version = {} (must be {})",
+                                   envelope.protocol_version(), protocol_version)};
   }
-  if (envelope.message_case() == proto::Envelope::MESSAGE_NOT_SET) {
+  if (!is_of_worker(envelope) && !is_of_coordinator(envelope)) {
     return DecodeError{DecodeFault::empty, "message = none (must be of a known kind)"};
   }
   try {
-    return read_packet(envelope);
+    check(envelope);
   } catch (const Error& error) {
     return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
   }
+  if (envelope.has_reject()) {
+    envelope.mutable_reject()->set_text(detail::printable(envelope.reject().text()));
+  }
+  return std::nullopt;
 }
 
-std::string encode(const Packet& packet) {
-  EnvelopeArena arena;
-  proto::Envelope& envelope = arena.envelope();
+}  // namespace
+
+std::variant<proto::Envelope, DecodeError> decode(std::string_view bytes) {
+  proto::Envelope envelope;
+  if (auto error = read(bytes, envelope)) return *std::move(error);
+  return envelope;
+}
+
+std::variant<const proto::Envelope*, DecodeError> decode(std::string_view bytes,
+                                                         google::protobuf::Arena& arena) {
+  auto* const envelope = google::protobuf::Arena::CreateMessage<proto::Envelope>(&arena);
+  if (auto error = read(bytes, *envelope)) return *std::move(error);
+  return envelope;
+}
+
+std::string encode(proto::Envelope envelope) {
   envelope.set_protocol_version(protocol_version);
-  envelope.set_session(packet.header.session.value);
-  envelope.set_epoch(packet.header.epoch.value);
-  envelope.set_sequence(packet.header.sequence);
-  std::visit([&](const auto& content) { write(content, envelope); }, packet.message);
-  if (envelope.ByteSizeLong() > message_size_max) {
-    throw InvalidArgument(fmt::format("message size = {} bytes (must be at most {})",
-                                      envelope.ByteSizeLong(), message_size_max));
-  }
+  const std::size_t size = envelope.ByteSizeLong();
+  if (size > message_size_max) throw InvalidArgument(too_large(size));
   return envelope.SerializeAsString();
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -8,16 +7,15 @@
 
 #include "proto/wire/messages.hpp"
 
+namespace google::protobuf {
+class Arena;
+}  // namespace google::protobuf
+
+namespace proofmass::proto {
+class Envelope;
+}  // namespace proofmass::proto
+
 namespace proofmass::wire {
-
-/// Size limits of an encoded definition and of an encoded message, bytes. A definition travels in
-/// parts.
-inline constexpr std::size_t definition_size_max = std::size_t{64} << 20;
-inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
-
-/// What a coordinator's socket takes at once, bytes. A peer that has shown no key yet may fill a
-/// buffer of this size. 4096 results, the largest message of a worker, need 0.8 MiB.
-inline constexpr std::size_t router_message_size_max = std::size_t{1} << 20;
 
 enum class DecodeFault : std::uint8_t {
   too_large,      ///< More bytes than its kind may have.
@@ -33,14 +31,18 @@ struct DecodeError {
   std::string text;  ///< `field = value (rule)`, for logs and for the peer.
 };
 
-/// The bytes of a message.
-/// @throws InvalidArgument if they are more than the message may have.
-[[nodiscard]] std::string encode(const Packet& packet);
+/// The bytes of a message. Its version becomes protocol_version.
+/// @throws InvalidArgument if they are more than a message may have.
+[[nodiscard]] std::string encode(proto::Envelope envelope);
 
 /// Checks everything: sizes, counts, enumerators, that numbers are finite. What it returns can be
-/// used without further checks of form.
+/// used without further checks of form; a text for people has printable characters only.
 ///
 /// @param bytes  Anything at all, from anybody.
-[[nodiscard]] std::variant<Packet, DecodeError> decode(std::string_view bytes);
+[[nodiscard]] std::variant<proto::Envelope, DecodeError> decode(std::string_view bytes);
+/// In an arena, where the parts of a batch of results, of which there are thousands, are freed at
+/// once.
+[[nodiscard]] std::variant<const proto::Envelope*, DecodeError> decode(
+    std::string_view bytes, google::protobuf::Arena& arena);
 
 }  // namespace proofmass::wire

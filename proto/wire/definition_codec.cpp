@@ -16,9 +16,6 @@ namespace {
 
 /// Tables and columns have at most some thousands; an array of numbers is one.
 constexpr std::size_t definition_fields_max = 4096;
-constexpr std::uint64_t tables_max = 64;
-constexpr std::uint64_t columns_of_a_table_max = 64;
-constexpr std::uint64_t table_columns_max = 1024;
 
 using Values = google::protobuf::RepeatedField<double>;
 
@@ -65,7 +62,7 @@ void write_definition(const Definition& definition, proto::Definition& message) 
 
 Definition read_definition(const proto::Definition& message) {
   require_in(message.text().size(), 1, definition_text_size_max, "definition.text size");
-  require_count(message.tables_size(), 0, tables_max, "definition.tables");
+  require_count(message.tables_size(), 0, definition_tables_max, "definition.tables");
   require_count(message.table_columns_size(), 0, table_columns_max, "definition.table_columns");
   Definition definition{.text = message.text()};
   for (const proto::DataTable& table : message.tables()) {
@@ -113,24 +110,26 @@ std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) 
 EncodedDefinition::EncodedDefinition(std::string bytes)
     : bytes_(std::move(bytes)), checksum_(fnv1a(bytes_)) {}
 
-DefinitionPart EncodedDefinition::part(const CampaignRequest& request) const {
-  const std::uint64_t offset = request.offset < bytes_.size() ? request.offset : 0;
-  return {.campaign = request.campaign,
-          .offset = offset,
-          .total_size = bytes_.size(),
-          .checksum = checksum_,
-          .content = bytes_.substr(offset, definition_part_size_max)};
+proto::DefinitionPart EncodedDefinition::part(CampaignId campaign, std::uint64_t offset) const {
+  if (offset >= bytes_.size()) offset = 0;
+  proto::DefinitionPart part;
+  part.set_campaign(campaign.value);
+  part.set_offset(offset);
+  part.set_total_size(bytes_.size());
+  part.set_checksum(checksum_);
+  part.set_content(bytes_.substr(offset, definition_part_size_max));
+  return part;
 }
 
-IncomingDefinition::Progress IncomingDefinition::add(const DefinitionPart& part) {
-  if (part.total_size != total_size_ || part.checksum != checksum_) {
-    total_size_ = part.total_size;
-    checksum_ = part.checksum;
+IncomingDefinition::Progress IncomingDefinition::add(const proto::DefinitionPart& part) {
+  if (part.total_size() != total_size_ || part.checksum() != checksum_) {
+    total_size_ = part.total_size();
+    checksum_ = part.checksum();
     bytes_.clear();
-    if (part.offset > 0) return Progress::advanced;
+    if (part.offset() > 0) return Progress::advanced;
   }
-  if (part.offset != bytes_.size()) return Progress::ignored;
-  bytes_ += part.content;
+  if (part.offset() != bytes_.size()) return Progress::ignored;
+  bytes_ += part.content();
   return bytes_.size() == total_size_ ? Progress::complete : Progress::advanced;
 }
 

@@ -12,6 +12,7 @@
 
 namespace proofmass::proto {
 class Definition;
+class DefinitionPart;
 }  // namespace proofmass::proto
 
 namespace proofmass::wire {
@@ -31,8 +32,8 @@ class EncodedDefinition {
   explicit EncodedDefinition(const Definition& definition)
       : EncodedDefinition(encode_definition(definition)) {}
 
-  /// The part that starts at the offset of the request, or at 0 if that is beyond the end.
-  [[nodiscard]] DefinitionPart part(const CampaignRequest& request) const;
+  /// The part that starts at the offset, or at 0 if that is beyond the end.
+  [[nodiscard]] proto::DefinitionPart part(CampaignId campaign, std::uint64_t offset) const;
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
 
  private:
@@ -53,7 +54,7 @@ class IncomingDefinition {
     complete,  ///< take() returns the definition.
   };
 
-  [[nodiscard]] Progress add(const DefinitionPart& part);
+  [[nodiscard]] Progress add(const proto::DefinitionPart& part);
   /// What has arrived: the offset of the next part.
   [[nodiscard]] std::uint64_t num_bytes() const { return bytes_.size(); }
   /// The definition, or why the bytes are none; all parts are dropped. @pre It is complete.

@@ -30,8 +30,8 @@ void NullExecution::define(wire::CampaignId campaign, std::shared_ptr<const Camp
   advance(now_);
 }
 
-void NullExecution::submit(wire::RunLease lease) {
-  waiting_.add(lease);
+void NullExecution::submit(const proto::RunLease& lease, std::span<const RunRange> runs) {
+  waiting_.add(lease, runs);
   advance(now_);
 }
 
@@ -106,12 +106,11 @@ std::vector<worker::FinishedRun> NullExecution::take_finished() {
 std::vector<worker::RunningBatch> NullExecution::computing() const {
   std::vector<worker::RunningBatch> running;
   for (const auto& [number, batch] : batches_) {
-    running.push_back(
-        {.number = number,
-         .progress = {.campaign = batch.assignment.campaign,
-                      .ranges = ranges_of_requests(batch.assignment.requests),
-                      .num_steps_done = static_cast<std::uint32_t>(num_steps_done(batch))},
-         .time_left = std::max(worker::Duration::zero(), batch.due_at - now_)});
+    running.push_back({.number = number,
+                       .campaign = batch.assignment.campaign,
+                       .ranges = ranges_of_requests(batch.assignment.requests),
+                       .num_steps_done = static_cast<std::uint32_t>(num_steps_done(batch)),
+                       .time_left = std::max(worker::Duration::zero(), batch.due_at - now_)});
   }
   return running;
 }

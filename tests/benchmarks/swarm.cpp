@@ -70,16 +70,17 @@ wire::SessionId random_session() {
   return {(high << 32) | device() | 1U};
 }
 
-wire::Hello hello_of(int number, std::uint32_t num_slots) {
+proto::Hello hello_of(int number, std::uint32_t num_slots) {
   static const std::uint64_t digest = reference_digest(best_instruction_set());
-  return {.worker_name = "swarm-" + std::to_string(number),
-          .host = "swarm-host-" + std::to_string(number / 32),
-          .process_id = static_cast<std::uint64_t>(getpid()),
-          .num_slots = num_slots,
-          .model_version = std::string(model_version),
-          .build = "benchmark",
-          .reference_digest = digest,
-          .former = std::nullopt};
+  proto::Hello hello;
+  hello.set_worker_name("swarm-" + std::to_string(number));
+  hello.set_host("swarm-host-" + std::to_string(number / 32));
+  hello.set_process_id(static_cast<std::uint64_t>(getpid()));
+  hello.set_num_slots(num_slots);
+  hello.set_model_version(std::string(model_version));
+  hello.set_build("benchmark");
+  hello.set_reference_digest(digest);
+  return hello;
 }
 
 double largest(const std::vector<double>& values) {

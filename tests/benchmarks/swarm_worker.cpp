@@ -31,7 +31,7 @@ zmq::socket_t connected_dealer(zmq::context_t& context, const SwarmWorkerConfig&
 }  // namespace
 
 SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& config,
-                         wire::SessionId session, wire::Hello hello, SwarmCount& count,
+                         wire::SessionId session, proto::Hello hello, SwarmCount& count,
                          TimePoint now)
     : runs_held_max_(config.runs_held_max),
       count_(count),
@@ -39,7 +39,7 @@ SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& confi
       socket_(connected_dealer(context, config)),
       conversation_(
           session, std::move(hello), execution_,
-          [this](const wire::Packet& packet) { send(packet); }, now) {}
+          [this](proto::Envelope message) { send(std::move(message)); }, now) {}
 
 int SwarmWorker::descriptor() { return socket_.get(zmq::sockopt::fd); }
 
@@ -77,16 +77,16 @@ std::optional<worker::Duration> SwarmWorker::unanswered_for(TimePoint now) const
   return now - heartbeats_.front();
 }
 
-void SwarmWorker::send(wire::Packet packet) {
+void SwarmWorker::send(proto::Envelope message) {
   const TimePoint now = time_now();
-  if (auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
-    heartbeat->num_runs_max = std::min(heartbeat->num_runs_max, runs_held_max_);
+  const bool is_heartbeat = message.has_heartbeat();
+  if (is_heartbeat) {
+    proto::Heartbeat& heartbeat = *message.mutable_heartbeat();
+    heartbeat.set_num_runs_max(std::min(heartbeat.num_runs_max(), runs_held_max_));
   }
-  const bool is_heartbeat = std::holds_alternative<wire::Heartbeat>(packet.message);
-  if (const auto* const batch = std::get_if<wire::ResultBatch>(&packet.message)) {
-    note_sent(*batch, now);
-  }
-  if (!socket_.send(zmq::buffer(wire::encode(packet)), zmq::send_flags::dontwait)) {
+  if (message.has_result_batch()) note_sent(message.result_batch(), now);
+  const std::string bytes = wire::encode(std::move(message));
+  if (!socket_.send(zmq::buffer(bytes), zmq::send_flags::dontwait)) {
     ++count_.num_unsent;
   } else if (is_heartbeat) {
     heartbeats_.push_back(now);
@@ -98,36 +98,35 @@ void SwarmWorker::receive(std::string_view bytes, TimePoint now) {
   if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
     throw std::runtime_error("the coordinator sent what cannot be read: " + error->text);
   }
-  const auto& packet = std::get<wire::Packet>(decoded);
-  if (std::holds_alternative<wire::RunLease>(packet.message)) ++count_.num_leases;
-  if (std::holds_alternative<wire::Retract>(packet.message)) ++count_.num_retracts;
-  if (std::holds_alternative<wire::Reject>(packet.message)) {
+  const auto& message = std::get<proto::Envelope>(decoded);
+  if (message.has_run_lease()) ++count_.num_leases;
+  if (message.has_retract()) ++count_.num_retracts;
+  if (message.has_reject()) {
     ++count_.num_rejects;
     heartbeats_.clear();  // The answer to one of them.
   }
-  if (const auto* const ack = std::get_if<wire::ResultAck>(&packet.message)) {
-    note_acknowledged(*ack, now);
-  }
-  if (std::holds_alternative<wire::HeartbeatAck>(packet.message) && !heartbeats_.empty()) {
+  if (message.has_result_ack()) note_acknowledged(message.result_ack(), now);
+  if (message.has_heartbeat_ack() && !heartbeats_.empty()) {
     count_.heartbeat_answers_s.push_back(seconds(now - heartbeats_.front()));
     heartbeats_.erase(heartbeats_.begin());
   }
-  conversation_.on_packet(packet, now);
+  conversation_.on_message(message, now);
 }
 
-void SwarmWorker::note_sent(const wire::ResultBatch& batch, TimePoint now) {
+void SwarmWorker::note_sent(const proto::ResultBatch& batch, TimePoint now) {
   ++count_.num_result_messages;
-  count_.num_results += batch.results.size();
-  for (const wire::ComputedRun& computed : batch.results) {
-    const RunIndex run = computed.result.run;
-    if (run.value % timed_run_step == 0) timed_.try_emplace({batch.campaign, run}, now);
+  count_.num_results += static_cast<std::uint64_t>(batch.results_size());
+  const wire::CampaignId campaign{batch.campaign()};
+  for (const proto::ComputedRun& computed : batch.results()) {
+    const RunIndex run{computed.run()};
+    if (run.value % timed_run_step == 0) timed_.try_emplace({campaign, run}, now);
   }
 }
 
-void SwarmWorker::note_acknowledged(const wire::ResultAck& ack, TimePoint now) {
-  count_.num_acknowledged += ack.runs.size();
-  for (const RunIndex run : ack.runs) {
-    const auto found = timed_.find({ack.campaign, run});
+void SwarmWorker::note_acknowledged(const proto::ResultAck& ack, TimePoint now) {
+  count_.num_acknowledged += static_cast<std::uint64_t>(ack.runs_size());
+  for (const std::uint64_t run : ack.runs()) {
+    const auto found = timed_.find({{ack.campaign()}, {run}});
     if (found == timed_.end()) continue;
     count_.acknowledgements_s.push_back(seconds(now - found->second));
     timed_.erase(found);

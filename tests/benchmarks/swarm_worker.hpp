@@ -54,7 +54,7 @@ class SwarmWorker {
 
   /// @param count  Outlives the worker.
   SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& config, wire::SessionId session,
-              wire::Hello hello, SwarmCount& count, TimePoint now);
+              proto::Hello hello, SwarmCount& count, TimePoint now);
   SwarmWorker(const SwarmWorker&) = delete;
   SwarmWorker& operator=(const SwarmWorker&) = delete;
 
@@ -79,10 +79,10 @@ class SwarmWorker {
   using RunKey = std::pair<wire::CampaignId, RunIndex>;
 
   void note_connection(TimePoint now);
-  void send(wire::Packet packet);
+  void send(proto::Envelope message);
   void receive(std::string_view bytes, TimePoint now);
-  void note_sent(const wire::ResultBatch& batch, TimePoint now);
-  void note_acknowledged(const wire::ResultAck& ack, TimePoint now);
+  void note_sent(const proto::ResultBatch& batch, TimePoint now);
+  void note_acknowledged(const proto::ResultAck& ack, TimePoint now);
 
   std::uint32_t runs_held_max_;
   SwarmCount& count_;

@@ -13,15 +13,14 @@
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/listing.hpp"
-#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/query/query.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/requirements.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -97,11 +96,11 @@ void add_troubles(Store& store, const MicroscopeCampaign& campaign) {
   const RunRange lost{.first = RunIndex{16}, .count = 3};
   for (const bool is_blamed : {false, true, true, true}) {
     entries.emplace_back(
-        LostRuns{.runs = lost,
-                 .attempt = {1},
-                 .worker = session,
-                 .reason = is_blamed ? wire::LossReason::crashed : wire::LossReason::silent,
-                 .is_blamed = is_blamed});
+        ReturnedRuns{.runs = lost,
+                     .attempt = {1},
+                     .worker = session,
+                     .reason = is_blamed ? wire::LossReason::crashed : wire::LossReason::silent,
+                     .is_blamed = is_blamed});
   }
   entries.emplace_back(GivenUpRun{RunIndex{17}});
   entries.emplace_back(EventEntry{.kind = "audit_mismatch", .text = "run=3"});
@@ -229,8 +228,8 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
       const std::vector<double> objectives = MicroscopeCampaign{}.objectives();
       const std::array<std::string, 2> texts{"a_c12 < 9e-4 for 90% with 90%",
                                              "all objectives for 90% with 90%"};
-      for (const auto& answer :
-           check_requirements(Store::open_read_only(file), objectives, texts)) {
+      for (const auto& answer : check_requirements(Store::open_read_only(file), objectives,
+                                                   numbered_requirements(texts))) {
         (void)requirement_text(answer);
       }
       return;

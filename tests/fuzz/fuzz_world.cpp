@@ -44,7 +44,7 @@ coordinator::StoredCampaign stored(bool has_table) {
   static const auto table_definition = make_campaign(true);
   coordinator::StoredCampaign campaign;
   campaign.definition = has_table ? table_definition : plain_definition;
-  campaign.audit_fraction = has_table ? 0.5 : 0.0;
+  campaign.control.audit_fraction = has_table ? 0.5 : 0.0;
   if (has_table) campaign.finished = {{.first = {2}, .count = 3}};
   return campaign;
 }
@@ -73,12 +73,12 @@ class World final : public coordinator::Outbox {
   [[nodiscard]] const FuzzSummary& summary() const { return summary_; }
 
   // Outbox.
-  void send(wire::WorkerId worker, wire::Message message) override {
+  void send(wire::WorkerId worker, proto::Envelope message) override {
     gateway_.send(worker, std::move(message));
   }
-  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(wire::WorkerId worker, CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override {
-    gateway_.send_definition(worker, request, definition);
+    gateway_.send_definition(worker, campaign, offset, definition);
   }
   void store(wire::WorkerId, wire::LeasedResult result) override {
     const auto& run = result.computed.result.run;
@@ -89,9 +89,9 @@ class World final : public coordinator::Outbox {
   void compare(wire::WorkerId worker, wire::LeasedResult result) override {
     to_compare_.emplace_back(worker, std::move(result));
   }
-  void record(const coordinator::Loss& loss) override {
-    PROOFMASS_EXPECT(loss.runs.count > 0 && loss.runs.end() <= fuzz_num_runs);
-    summary_.num_lost += loss.runs.count;
+  void record(CampaignId, wire::WorkerId, const coordinator::ReturnedRuns& returned) override {
+    PROOFMASS_EXPECT(returned.runs.count > 0 && returned.runs.end() <= fuzz_num_runs);
+    summary_.num_lost += returned.runs.count;
   }
   void give_up(CampaignId, RunIndex run) override {
     PROOFMASS_EXPECT(run.value < fuzz_num_runs);
@@ -115,10 +115,10 @@ class World final : public coordinator::Outbox {
 
   void note_sent(std::string_view bytes) {
     const auto decoded = wire::decode(bytes);
-    const auto* const packet = std::get_if<wire::Packet>(&decoded);
-    PROOFMASS_EXPECT(packet != nullptr);
-    summary_.num_leases += std::holds_alternative<wire::RunLease>(packet->message) ? 1U : 0U;
-    summary_.num_rejections += std::holds_alternative<wire::Reject>(packet->message) ? 1U : 0U;
+    const auto* const message = std::get_if<proto::Envelope>(&decoded);
+    PROOFMASS_EXPECT(message != nullptr);
+    summary_.num_leases += message->has_run_lease() ? 1U : 0U;
+    summary_.num_rejections += message->has_reject() ? 1U : 0U;
   }
 
   static std::string routing_id(const Step& step) {
@@ -159,40 +159,56 @@ class World final : public coordinator::Outbox {
   /// What has been decoded is encoded and decoded again: to the same bytes.
   void check_message(std::string_view bytes) {
     const auto decoded = wire::decode(bytes);
-    const auto* const packet = std::get_if<wire::Packet>(&decoded);
-    if (packet == nullptr) return;
+    const auto* const message = std::get_if<proto::Envelope>(&decoded);
+    if (message == nullptr) return;
     ++summary_.num_orders;
-    const std::string once = wire::encode(*packet);
-    PROOFMASS_EXPECT(wire::encode(std::get<wire::Packet>(wire::decode(once))) == once);
+    const std::string once = wire::encode(*message);
+    PROOFMASS_EXPECT(wire::encode(std::get<proto::Envelope>(wire::decode(once))) == once);
+  }
+
+  /// What is read of a reply and written is read and written again: to the same bytes.
+  template <typename Rewrite>
+  static void check_kept(const proto::ReplyEnvelope& reply, const Rewrite& rewrite) {
+    proto::ReplyEnvelope once;
+    rewrite(reply, once);
+    proto::ReplyEnvelope twice;
+    rewrite(once, twice);
+    PROOFMASS_EXPECT(wire::encode(std::move(twice)) == wire::encode(std::move(once)));
   }
 
   void check_reply(std::string_view bytes) {
     const auto decoded = wire::decode_reply(bytes);
-    const auto* const packet = std::get_if<wire::ReplyPacket>(&decoded);
-    if (packet == nullptr) return;
+    const auto* const reply = std::get_if<proto::ReplyEnvelope>(&decoded);
+    if (reply == nullptr) return;
     ++summary_.num_replies;
-    const std::string once = wire::encode(*packet);
-    PROOFMASS_EXPECT(wire::encode(std::get<wire::ReplyPacket>(wire::decode_reply(once))) == once);
+    const std::string once = wire::encode(*reply);
+    PROOFMASS_EXPECT(wire::encode(std::get<proto::ReplyEnvelope>(wire::decode_reply(once))) ==
+                     once);
+    if (reply->has_status())
+      check_kept(*reply, [](const auto& from, auto& to) {
+        wire::write(wire::read(from.status()), *to.mutable_status());
+      });
+    if (reply->has_workers())
+      check_kept(*reply, [](const auto& from, auto& to) {
+        wire::write(wire::read(from.workers()), *to.mutable_workers());
+      });
   }
 
   void carry_out_request(std::string_view bytes) {
     const auto decoded = wire::decode_request(bytes);
-    const auto* const packet = std::get_if<wire::RequestPacket>(&decoded);
-    if (packet == nullptr) return;
+    const auto* const request = std::get_if<proto::RequestEnvelope>(&decoded);
+    if (request == nullptr) return;
     ++summary_.num_requests;
-    const std::string once = wire::encode(*packet);
-    PROOFMASS_EXPECT(wire::encode(std::get<wire::RequestPacket>(wire::decode_request(once))) ==
-                     once);
-    if (const auto* const submit = std::get_if<wire::SubmitRequest>(&packet->request)) {
-      return read_definition(submit->definition);
+    const std::string once = wire::encode(*request);
+    auto again = std::get<proto::RequestEnvelope>(wire::decode_request(once));
+    PROOFMASS_EXPECT(wire::encode(again) == once);
+    if (request->has_submit()) {
+      return read_definition(wire::take_definition(*again.mutable_submit()));
     }
-    if (const auto* const report = std::get_if<wire::FactoryReport>(&packet->request)) {
-      return take_report(*report);
-    }
-    const auto* const control = std::get_if<wire::ControlRequest>(&packet->request);
-    if (control == nullptr) return;
-    control_campaign(control->campaign == "table" ? fuzz_table_campaign : fuzz_campaign,
-                     control->action);
+    if (request->has_factory_report()) return take_report(wire::read(request->factory_report()));
+    if (!request->has_control()) return;
+    control_campaign(request->control().campaign() == "table" ? fuzz_table_campaign : fuzz_campaign,
+                     static_cast<wire::ControlAction>(request->control().action()));
   }
 
   /// As the service does it.
@@ -213,8 +229,10 @@ class World final : public coordinator::Outbox {
                                    .model_version = "m",
                                    .campaigns = {},
                                    .factories = factories_.current(now_)};
-    const std::string sent = wire::encode(wire::ReplyPacket{.id = 1, .reply = status});
-    PROOFMASS_EXPECT(std::holds_alternative<wire::ReplyPacket>(wire::decode_reply(sent)));
+    proto::ReplyEnvelope reply;
+    wire::write(status, *reply.mutable_status());
+    PROOFMASS_EXPECT(std::holds_alternative<proto::ReplyEnvelope>(
+        wire::decode_reply(wire::encode(std::move(reply)))));
   }
 
   void control_campaign(CampaignId id, wire::ControlAction action) {

@@ -11,10 +11,22 @@
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
+#include "tests/proto/wire/requests.hpp"
 #include "tests/support/drawn_result.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::test {
 namespace {
+
+template <typename Content>
+std::string encoded(const Content& content, wire::SessionId session, wire::Epoch epoch,
+                    std::uint64_t sequence) {
+  proto::Envelope envelope = in_envelope(content);
+  envelope.set_session(session.value);
+  envelope.set_epoch(epoch.value);
+  envelope.set_sequence(sequence);
+  return wire::encode(std::move(envelope));
+}
 
 /// A worker process that says real things on one connection.
 class Speaker {
@@ -22,68 +34,59 @@ class Speaker {
   Speaker(std::vector<Step>& steps, std::uint8_t connection, std::uint64_t session)
       : steps_(steps), connection_(connection), session_{session} {}
 
-  void say(wire::Message message, wire::Epoch epoch = fuzz_epoch) {
-    const wire::Header header{.session = session_, .epoch = epoch, .sequence = ++sequence_};
+  template <typename Content>
+  void say(const Content& content, wire::Epoch epoch = fuzz_epoch) {
     steps_.push_back({.kind = StepKind::worker_message,
                       .number = connection_,
                       .value = 0,
-                      .content = wire::encode({.header = header, .message = std::move(message)})});
+                      .content = encoded(content, session_, epoch, ++sequence_)});
   }
 
   void say_hello(const std::string& host,
-                 const std::optional<wire::FormerSession>& former = std::nullopt) {
-    say(wire::Hello{.worker_name = "w",
-                    .host = host,
-                    .process_id = 1000,
-                    .num_slots = 4,
-                    .model_version = std::string(model_version),
-                    .build = "b",
-                    .reference_digest = fuzz_reference_digest,
-                    .former = former},
-        wire::Epoch{});
+                 const std::optional<proto::FormerSession>& former = std::nullopt) {
+    proto::Hello hello = make_hello("w", host, 4, model_version);
+    hello.set_process_id(1000);
+    hello.set_build("b");
+    hello.set_reference_digest(fuzz_reference_digest);
+    if (former) *hello.mutable_former() = *former;
+    say(hello, wire::Epoch{});
   }
 
   /// Runs whose results were not taken before; besides some that it holds.
   void set_aside(wire::CampaignId campaign, RunRange runs, std::uint32_t attempt) {
-    wire::Heartbeat heartbeat{.num_runs_max = 8, .held = {}, .computing = {}};
-    heartbeat.held = {{.campaign = campaign, .attempt = {1}, .ranges = {{{0}, 2}}}};
-    heartbeat.set_aside = {{.campaign = campaign, .attempt = {attempt}, .ranges = {runs}}};
-    say(std::move(heartbeat));
+    proto::Heartbeat heartbeat = make_heartbeat(8, {make_held(campaign, {1}, {{{0}, 2}})});
+    *heartbeat.add_set_aside() = make_held(campaign, {attempt}, {runs});
+    say(heartbeat);
   }
 
   /// Runs [first, first + count) are held; the first of them are being computed.
   void beat(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count,
             std::uint32_t attempt = 1) {
-    wire::Heartbeat heartbeat{
-        .num_runs_max = 8, .num_steps_done = ++num_steps_, .held = {}, .computing = {}};
+    proto::Heartbeat heartbeat = make_heartbeat(8);
+    heartbeat.set_num_steps_done(++num_steps_);
     if (count > 0) {
-      const RunRange runs{.first = {first}, .count = count};
-      heartbeat.held = {{.campaign = campaign, .attempt = {attempt}, .ranges = {runs}}};
-      heartbeat.computing = {
-          {.campaign = campaign,
-           .ranges = {{.first = {first}, .count = std::min<std::uint64_t>(count, 4)}},
-           .num_steps_done = num_steps_}};
+      *heartbeat.add_held() = make_held(campaign, {attempt}, {{{first}, count}});
+      *heartbeat.add_computing() =
+          make_computed_batch(campaign, {{{first}, std::min<std::uint64_t>(count, 4)}}, num_steps_);
     }
-    say(std::move(heartbeat));
+    say(heartbeat);
   }
 
   void deliver(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count,
                std::uint32_t attempt = 1) {
-    wire::ResultBatch batch{.campaign = campaign, .attempt = {attempt}, .results = {}};
+    std::vector<wire::ComputedRun> results;
     for (std::uint64_t run = first; run < first + count; ++run) {
       wire::ComputedRun computed;
       computed.result = drawn_result({.run = {run}});
       computed.compute_s = 0.5;
       computed.elapsed_s = 8.0;
-      batch.results.push_back(computed);
+      results.push_back(computed);
     }
-    say(std::move(batch));
+    say(make_result_batch(campaign, {attempt}, results));
   }
 
   void give_back(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count) {
-    const RunRange runs{.first = {first}, .count = count};
-    say(wire::GiveBack{.reason = wire::LossReason::drained,
-                       .runs = {{.campaign = campaign, .attempt = {1}, .ranges = {runs}}}});
+    say(make_give_back(wire::LossReason::drained, {make_held(campaign, {1}, {{{first}, count}})}));
   }
 
  private:
@@ -103,22 +106,22 @@ Step elapsed(std::uint16_t seconds) {
   return happening(StepKind::elapse, 0, static_cast<std::uint16_t>(seconds * per_second));
 }
 
-Step from_client(wire::ClientRequest request) {
+Step from_client(proto::RequestEnvelope request) {
   return {.kind = StepKind::client_request,
           .number = 0,
           .value = 0,
-          .content = wire::encode(wire::RequestPacket{.id = 1, .request = std::move(request)})};
+          .content = wire::encode(numbered(1, std::move(request)))};
 }
 
-Step to_client(wire::ClientReply reply) {
+Step to_client(proto::ReplyEnvelope reply) {
   return {.kind = StepKind::client_reply,
           .number = 0,
           .value = 0,
-          .content = wire::encode(wire::ReplyPacket{.id = 1, .reply = std::move(reply)})};
+          .content = wire::encode(numbered(1, std::move(reply)))};
 }
 
-Step control(wire::ControlAction action, const std::string& campaign) {
-  return from_client(wire::ControlRequest{.action = action, .campaign = campaign});
+Step from_client(wire::ControlAction action, const std::string& campaign) {
+  return from_client(control(action, campaign));
 }
 
 std::string worker_that_delivers() {
@@ -126,8 +129,8 @@ std::string worker_that_delivers() {
   Speaker worker(steps, 0, 11);
   worker.say_hello("h");
   worker.beat(fuzz_campaign, 0, 0);
-  worker.say(wire::CampaignRequest{.campaign = fuzz_campaign});
-  worker.say(wire::CampaignRequest{.campaign = fuzz_campaign, .offset = 1000});
+  worker.say(make_request(fuzz_campaign));
+  worker.say(make_request(fuzz_campaign, 1000));
   worker.beat(fuzz_campaign, 0, 8);
   worker.deliver(fuzz_campaign, 0, 4);
   steps.push_back(happening(StepKind::commit, 3));
@@ -135,7 +138,7 @@ std::string worker_that_delivers() {
   steps.push_back(happening(StepKind::compare));
   steps.push_back(happening(StepKind::compare, 1));
   worker.give_back(fuzz_campaign, 4, 2);
-  worker.say(wire::Bye{.reason = wire::LossReason::walltime});
+  worker.say(make_bye(wire::LossReason::walltime));
   return to_bytes(steps);
 }
 
@@ -163,12 +166,12 @@ std::string workers_that_are_lost() {
 /// another.
 std::string run_that_crashes_workers() {
   std::vector<Step> steps;
-  steps.push_back(control(wire::ControlAction::cancel, "table"));
+  steps.push_back(from_client(wire::ControlAction::cancel, "table"));
   Speaker first(steps, 0, 11);
   first.say_hello("h");
   first.deliver(fuzz_campaign, 1, fuzz_num_runs - 1);
   steps.push_back(happening(StepKind::commit, fuzz_num_runs));
-  first.say(wire::Bye{.reason = wire::LossReason::drained});
+  first.say(make_bye(wire::LossReason::drained));
   for (std::uint8_t i = 1; i <= 4; ++i) {
     Speaker worker(steps, i, 11U + i);
     worker.say_hello(i < 4 ? "h" : "g");
@@ -183,7 +186,7 @@ std::string campaign_that_is_audited() {
   std::vector<Step> steps;
   Speaker first(steps, 0, 11);
   Speaker second(steps, 1, 12);
-  steps.push_back(control(wire::ControlAction::cancel, "hardy2013"));
+  steps.push_back(from_client(wire::ControlAction::cancel, "hardy2013"));
   first.say_hello("h");
   second.say_hello("g");
   for (std::uint64_t run = 0; run < fuzz_num_runs; run += 4) {
@@ -203,14 +206,14 @@ std::string campaign_that_is_controlled() {
   Speaker worker(steps, 0, 11);
   worker.say_hello("h");
   worker.beat(fuzz_campaign, 0, 0);
-  steps.push_back(control(wire::ControlAction::pause, "hardy2013"));
+  steps.push_back(from_client(wire::ControlAction::pause, "hardy2013"));
   worker.beat(fuzz_campaign, 0, 8);
-  steps.push_back(control(wire::ControlAction::resume, "hardy2013"));
+  steps.push_back(from_client(wire::ControlAction::resume, "hardy2013"));
   steps.push_back(happening(StepKind::store_failure, 0));
   worker.deliver(fuzz_campaign, 0, 2);
   steps.push_back(happening(StepKind::store_failure, 1));
-  steps.push_back(control(wire::ControlAction::cancel, "table"));
-  steps.push_back(control(wire::ControlAction::resume, "table"));
+  steps.push_back(from_client(wire::ControlAction::cancel, "table"));
+  steps.push_back(from_client(wire::ControlAction::resume, "table"));
   return to_bytes(steps);
 }
 
@@ -218,19 +221,16 @@ std::string stranger() {
   std::vector<Step> steps;
   Speaker worker(steps, 0, 11);
   worker.beat(fuzz_campaign, 0, 8);  // Before Hello.
-  worker.say(wire::Bye{}, wire::Epoch{8});
-  worker.say(wire::Stop{});
+  worker.say(make_bye(), wire::Epoch{8});
+  worker.say(proto::Stop());
   worker.say_hello("h");  // Is not listened to any more.
   Speaker other_model(steps, 1, 12);
-  other_model.say(wire::Hello{.worker_name = "w",
-                              .host = "h",
-                              .process_id = 1,
-                              .num_slots = 1,
-                              .model_version = "other",
-                              .build = "b",
-                              .reference_digest = 1,
-                              .former = wire::FormerSession{.session = {11}}},
-                  wire::Epoch{});
+  proto::Hello hello = make_hello("w", "h", 1, "other");
+  hello.set_build("b");
+  hello.set_reference_digest(1);
+  *hello.mutable_former() = make_former({11});
+  hello.mutable_former()->clear_signal();
+  other_model.say(hello, wire::Epoch{});
   Speaker thief(steps, 2, 12);
   thief.say_hello("h");
   return to_bytes(steps);
@@ -269,7 +269,7 @@ std::string hosts_that_lie() {
   for (std::uint8_t i = 0; i < 7; ++i) {
     Speaker worker(steps, i, 11U + i);
     const wire::SessionId former{10U + i};
-    worker.say_hello(i < 4 ? "h" : "g", wire::FormerSession{.session = former, .signal = 11});
+    worker.say_hello(i < 4 ? "h" : "g", make_former(former));
     if (i != 2) worker.beat(fuzz_campaign, 0, 0);
   }
   steps.push_back(elapsed(16));  // Some make room for others.
@@ -310,50 +310,46 @@ std::string client_messages() {
   wire::WorkerStatus worker;
   worker.id = {1};
   worker.name = worker.host = "w";
-  return to_bytes({from_client(wire::StatusRequest{}), from_client(wire::WorkersRequest{}),
-                   from_client(report), to_client(status),
-                   to_client(wire::WorkersReply{.workers = {worker}}),
-                   to_client(wire::DoneReply{"done"}), to_client(wire::ErrorReply{"a = b (c)"})});
+  proto::RequestEnvelope status_request;
+  status_request.mutable_status();
+  proto::RequestEnvelope workers_request;
+  workers_request.mutable_workers();
+  return to_bytes({from_client(status_request), from_client(workers_request),
+                   from_client(request_of(report)), to_client(reply_with(status)),
+                   to_client(reply_with(wire::WorkersReply{.workers = {worker}})),
+                   to_client(wire::done_reply("done")), to_client(wire::error_reply("a = b (c)"))});
 }
 
 std::string submission() {
+  const Definition definition = definition_of(campaign_with_table());
   return to_bytes(
-      {from_client(wire::SubmitRequest{.definition = definition_of(campaign_with_table()),
-                                       .priority = -5,
-                                       .audit_fraction = 0.25})});
+      {from_client(test::submission(definition, {.priority = -5, .audit_fraction = 0.25}))});
 }
 
 std::string coordinator_messages() {
   std::vector<Step> steps;
-  const auto add = [&](wire::Message message) {
-    const wire::Header header{.session = {11}, .epoch = fuzz_epoch, .sequence = steps.size() + 1};
+  const auto add = [&](const auto& content) {
     steps.push_back({.kind = StepKind::coordinator_message,
                      .number = 0,
                      .value = 0,
-                     .content = wire::encode({.header = header, .message = std::move(message)})});
+                     .content = encoded(content, {11}, fuzz_epoch, steps.size() + 1)});
   };
   const RunRange runs{.first = {3}, .count = 2};
-  add(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 5.0});
-  add(wire::Reject{.reason = wire::RejectReason::full, .text = "full"});
-  add(wire::RunLease{.campaign = fuzz_campaign,
-                     .runs = runs,
-                     .attempt = {1},
-                     .is_alone = true,
-                     .batch_runs_max = 7,
-                     .table_values = {0.5, 0.25}});
-  add(wire::Retract{.campaign = fuzz_campaign, .ranges = {runs}});
-  add(wire::ResultAck{.campaign = fuzz_campaign, .runs = {{3}, {4}}});
-  add(wire::Forget{.campaign = fuzz_campaign, .num_runs = 20});
-  add(wire::NotServed{.campaign = fuzz_campaign, .ranges = {}});
-  add(wire::NotServed{.campaign = fuzz_campaign, .ranges = {runs}});
-  add(wire::DefinitionPart{.campaign = fuzz_campaign,
-                           .offset = 2,
-                           .total_size = 5,
-                           .checksum = 0xcbf29ce484222325U,
-                           .content = "abc"});
-  add(wire::HeartbeatAck{});
-  add(wire::Drain{});
-  add(wire::Stop{});
+  add(make_welcome({1}, 5.0));
+  add(make_reject(proto::REJECT_REASON_FULL, "full"));
+  proto::RunLease lease = make_lease(fuzz_campaign, runs, {1}, {0.5, 0.25});
+  lease.set_is_alone(true);
+  lease.set_batch_runs_max(7);
+  add(lease);
+  add(make_retract(fuzz_campaign, {runs}));
+  add(make_ack(fuzz_campaign, {{3}, {4}}));
+  add(make_forget(fuzz_campaign, 20));
+  add(make_not_served(fuzz_campaign));
+  add(make_not_served(fuzz_campaign, {runs}));
+  add(make_part(fuzz_campaign, 2, 5, 0xcbf29ce484222325U, "abc"));
+  add(proto::HeartbeatAck());
+  add(proto::Drain());
+  add(proto::Stop());
   return to_bytes(steps);
 }
 

@@ -27,6 +27,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/proto/link/raw_peer.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/system/fault_fixture.hpp"
 
 namespace proofmass::test {
@@ -161,32 +162,27 @@ TEST_F(BoundedMemory, HoldsAgainstMessagesThatNeverEnd) {
 /// A worker that asks for a large definition again and again and reads no answer.
 void ask_and_not_read(RawPeer& peer, std::uint64_t session, const std::atomic<bool>& is_stopping) {
   peer.introduce();
-  wire::Header header{.session = {session}, .epoch = {}, .sequence = 0};
-  const auto say = [&](const wire::Message& message) {
-    ++header.sequence;
-    peer.send(RawPeer::frame(0, wire::encode({.header = header, .message = message})));
+  std::uint64_t epoch = 0;
+  std::uint64_t num_sent = 0;
+  const auto say = [&](const auto& content) {
+    proto::Envelope envelope = in_envelope(content);
+    envelope.set_session(session);
+    envelope.set_epoch(epoch);
+    envelope.set_sequence(++num_sent);
+    peer.send(RawPeer::frame(0, wire::encode(envelope)));
   };
-  const auto next = [&]() -> wire::Packet {
-    return std::get<wire::Packet>(wire::decode(peer.receive()));
-  };
-  say(wire::Hello{.worker_name = "asker",
-                  .host = "there",
-                  .process_id = session,
-                  .num_slots = 1,
-                  .model_version = std::string(model_version),
-                  .build = "test",
-                  .reference_digest = reference_digest(best_instruction_set()),
-                  .former = {}});
+  proto::Hello hello = make_hello("asker", "there", 1, model_version);
+  hello.set_reference_digest(reference_digest(best_instruction_set()));
+  say(hello);
   for (;;) {
-    const wire::Packet packet = next();
-    if (std::holds_alternative<wire::Reject>(packet.message)) throw std::runtime_error("rejected");
-    if (std::holds_alternative<wire::Welcome>(packet.message)) {
-      header.epoch = packet.header.epoch;
-      say(wire::Heartbeat{.num_runs_max = 1, .held = {}, .computing = {}});
+    const auto message = std::get<proto::Envelope>(wire::decode(peer.receive()));
+    if (message.has_reject()) throw std::runtime_error("rejected");
+    if (message.has_welcome()) {
+      epoch = message.epoch();
+      say(make_heartbeat(1));
     }
-    const auto* const lease = std::get_if<wire::RunLease>(&packet.message);
-    if (lease == nullptr) continue;
-    for (int i = 0; i < 300; ++i) say(wire::CampaignRequest{.campaign = lease->campaign});
+    if (!message.has_run_lease()) continue;
+    for (int i = 0; i < 300; ++i) say(make_request({message.run_lease().campaign()}));
     break;
   }
   wait_until("the end, or a cut", [&] { return is_stopping || peer.send_some("") < 0; });

@@ -3,14 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
 #include <variant>
 
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "core/runs.hpp"
 #include "proto/wire/names.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -42,7 +45,7 @@ std::vector<RunRange> ranges_of(const Runs& runs) {
 /// What a coordinator finds when it starts.
 coordinator::StoredCampaign found_in(const PlayedFile& file) {
   coordinator::StoredCampaign stored = file.stored;
-  stored.phase = file.phase;
+  stored.control.phase = file.phase;
   std::vector<RunIndex> committed;
   for (const auto& [run, count] : file.num_commits) committed.push_back(run);
   stored.finished = ranges_of(committed);
@@ -96,19 +99,19 @@ void PlayedCoordinator::kill() {
   }
 }
 
-void PlayedCoordinator::receive(const wire::Packet& packet, const coordinator::HostId& from) {
+void PlayedCoordinator::receive(const proto::Envelope& message, const coordinator::HostId& from) {
   if (!life_) return;
   if (is_stalled()) {
-    life_->waiting.emplace_back(packet, from);
+    life_->waiting.emplace_back(message, from);
     return;
   }
-  const wire::WorkerId worker = meet(packet.header.session, from);
-  const bool is_hello = std::holds_alternative<wire::Hello>(packet.message);
-  if (is_hello) life_->peers.at(worker).said_hello = true;
-  if (packet.header.epoch != life_->epoch && !is_hello) {
+  ASSERT_TRUE(wire::is_of_worker(message));
+  const wire::WorkerId worker = meet({message.session()}, from);
+  if (message.has_hello()) life_->peers.at(worker).said_hello = true;
+  if (message.epoch() != life_->epoch.value && !message.has_hello()) {
     coordinator::reject_unregistered(worker, *this);
   } else {
-    handle(worker, packet, from);
+    on_message(life_->state, worker, from, message, agenda_.now(), *this);
     check_adoptions(worker);
   }
   after_event();
@@ -127,32 +130,11 @@ void PlayedCoordinator::stall(Duration duration) {
 void PlayedCoordinator::go_on() {
   life_->stalled_until = TimePoint{};
   if (random_.happens(0.3)) tick();
-  for (const auto& [packet, from] : std::exchange(life_->waiting, {})) {
+  for (const auto& [message, from] : std::exchange(life_->waiting, {})) {
     ++num_events_["message_waited"];
-    receive(packet, from);
+    receive(message, from);
   }
   for (const auto& [id, file] : files_) flush(id);
-}
-
-void PlayedCoordinator::handle(wire::WorkerId worker, const wire::Packet& packet,
-                               const coordinator::HostId& from) {
-  coordinator::State& state = life_->state;
-  const TimePoint now = agenda_.now();
-  if (const auto* const hello = std::get_if<wire::Hello>(&packet.message)) {
-    on_hello(state, worker, packet.header.session, from, *hello, now, *this);
-  } else if (const auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
-    on_heartbeat(state, worker, *heartbeat, packet.header.sequence, now, *this);
-  } else if (const auto* const results = std::get_if<wire::ResultBatch>(&packet.message)) {
-    on_results(state, worker, *results, now, *this);
-  } else if (const auto* const give_back = std::get_if<wire::GiveBack>(&packet.message)) {
-    on_give_back(state, worker, *give_back, now, *this);
-  } else if (const auto* const request = std::get_if<wire::CampaignRequest>(&packet.message)) {
-    on_campaign_request(state, worker, *request, now, *this);
-  } else if (const auto* const bye = std::get_if<wire::Bye>(&packet.message)) {
-    on_bye(state, worker, *bye, now, *this);
-  } else {
-    ADD_FAILURE() << "a worker sent what only a coordinator sends";
-  }
 }
 
 void PlayedCoordinator::tick() {
@@ -293,24 +275,28 @@ void PlayedCoordinator::after_event() {
   for (const auto& [id, campaign] : life_->state.campaigns) files_.at(id).phase = campaign.phase;
 }
 
-void PlayedCoordinator::send(wire::WorkerId worker, wire::Message message) {
+void PlayedCoordinator::send(wire::WorkerId worker, proto::Envelope message) {
   check_sent(worker, message);
-  if (const auto* const lease = std::get_if<wire::RunLease>(&message)) {
-    attempt_max_ = std::max(attempt_max_, lease->attempt.value);
-    auto& lent = lent_[life_->peers.at(worker).session];
-    for (RunIndex run = lease->runs.first; run.value < lease->runs.end(); ++run.value) {
-      lent.insert({lease->campaign, run});
+  Peer& peer = life_->peers.at(worker);
+  if (message.has_run_lease()) {
+    const proto::RunLease& lease = message.run_lease();
+    attempt_max_ = std::max(attempt_max_, lease.attempt());
+    for (const RunIndex run : indices_of(std::array{wire::runs_of(lease)})) {
+      lent_[peer.session].insert({{lease.campaign()}, run});
     }
   }
-  if (const auto* const not_served = std::get_if<wire::NotServed>(&message)) {
-    ++num_events_[not_served->ranges.empty() ? "campaign_not_served" : "runs_not_served"];
+  if (message.has_not_served()) {
+    const bool is_of_all = message.not_served().ranges().empty();
+    ++num_events_[is_of_all ? "campaign_not_served" : "runs_not_served"];
   }
-  Peer& peer = life_->peers.at(worker);
-  send_({.header = {.session = peer.session, .epoch = life_->epoch, .sequence = ++peer.num_sent},
-         .message = std::move(message)});
+  message.set_session(peer.session.value);
+  message.set_epoch(life_->epoch.value);
+  message.set_sequence(++peer.num_sent);
+  send_(message);
 }
 
-void PlayedCoordinator::send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+void PlayedCoordinator::send_definition(wire::WorkerId worker, wire::CampaignId campaign,
+                                        std::uint64_t offset,
                                         const std::shared_ptr<const Campaign>& definition) {
   ++num_events_["definition_sent"];
   auto known = definitions_.find(definition.get());
@@ -318,7 +304,7 @@ void PlayedCoordinator::send_definition(wire::WorkerId worker, const wire::Campa
     const wire::EncodedDefinition encoded(definition->definition(TableColumns::left_out));
     known = definitions_.emplace(definition.get(), std::pair(definition, encoded)).first;
   }
-  send(worker, known->second.second.part(request));
+  send(worker, in_envelope(known->second.second.part(campaign, offset)));
 }
 
 void PlayedCoordinator::write_later(wire::CampaignId id, std::function<void(PlayedFile&)> write) {
@@ -358,13 +344,14 @@ void PlayedCoordinator::compare(wire::WorkerId worker, wire::LeasedResult result
   });
 }
 
-void PlayedCoordinator::record(const coordinator::Loss& loss) {
+void PlayedCoordinator::record(wire::CampaignId campaign, wire::WorkerId worker,
+                               const coordinator::ReturnedRuns& loss) {
   ++num_events_[std::string(wire::name_of(loss.reason))];
   const bool is_of_a_crash = coordinator::is_blamed(loss.reason);
-  const bool is_honest = life_->peers.at(loss.worker).is_honest;
+  const bool is_honest = life_->peers.at(worker).is_honest;
   EXPECT_TRUE(may_crash_ || !is_of_a_crash || !is_honest) << "a liar has ended an honest worker";
   if (!loss.is_blamed) return;
-  write_later(loss.campaign, [loss](PlayedFile& file) {
+  write_later(campaign, [loss](PlayedFile& file) {
     for (RunIndex run = loss.runs.first; run.value < loss.runs.end(); ++run.value) {
       auto& blamed = file.blamed[run];
       blamed.run = run;

@@ -29,7 +29,7 @@ struct PlayedFile {
   std::set<RunIndex> given_up;
   std::set<RunIndex> compared;
   std::set<RunIndex> audits_given_up;
-  std::map<RunIndex, coordinator::StoredCampaign::Blamed> blamed;
+  std::map<RunIndex, coordinator::BlamedRun> blamed;
   bool is_failing = false;  ///< Nothing can be stored for now.
   /// It has lost its name: if the coordinator ends before that is mended, what is left is the copy.
   bool is_nameless = false;
@@ -50,7 +50,7 @@ inline const std::string liar_key = "liar";
 /// can be missing or older than they were, and the thread that serves it can stall.
 class PlayedCoordinator final : public coordinator::Outbox {
  public:
-  using Send = std::function<void(const wire::Packet&)>;
+  using Send = std::function<void(const proto::Envelope&)>;
 
   PlayedCoordinator(Agenda& agenda, Randomness& random, Send send);
 
@@ -62,7 +62,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   /// @pre It does not run.
   void start();
   void kill();
-  void receive(const wire::Packet& packet, const coordinator::HostId& from);
+  void receive(const proto::Envelope& message, const coordinator::HostId& from);
   void tick();
   /// Its thread does nothing for so long; what is sent to it waits.
   void stall(Duration duration);
@@ -104,12 +104,13 @@ class PlayedCoordinator final : public coordinator::Outbox {
   }
 
   // Outbox.
-  void send(wire::WorkerId worker, wire::Message message) override;
-  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+  void send(wire::WorkerId worker, proto::Envelope message) override;
+  void send_definition(wire::WorkerId worker, wire::CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override;
   void store(wire::WorkerId, wire::LeasedResult result) override;
   void compare(wire::WorkerId worker, wire::LeasedResult result) override;
-  void record(const coordinator::Loss& loss) override;
+  void record(wire::CampaignId campaign, wire::WorkerId worker,
+              const coordinator::ReturnedRuns& returned) override;
   void give_up(wire::CampaignId campaign, RunIndex run) override;
   void log(coordinator::Event event, wire::CampaignId campaign) override;
 
@@ -129,18 +130,17 @@ class PlayedCoordinator final : public coordinator::Outbox {
     std::map<wire::CampaignId, std::deque<std::function<void(PlayedFile&)>>> writes;
     TimePoint stalled_until{};
     /// And whence they came.
-    std::deque<std::pair<wire::Packet, coordinator::HostId>> waiting;
+    std::deque<std::pair<proto::Envelope, coordinator::HostId>> waiting;
   };
 
   wire::WorkerId meet(wire::SessionId session, const coordinator::HostId& from);
-  void handle(wire::WorkerId worker, const wire::Packet& packet, const coordinator::HostId& from);
   void serve(wire::CampaignId id);
   void go_on();
-  void check_sent(wire::WorkerId worker, const wire::Message& message) const;
-  void check_lease(const wire::RunLease& lease) const;
-  void check_forget(const wire::Forget& forget) const;
-  void check_not_served(const wire::NotServed& not_served) const;
-  void check_reject(const wire::Reject& reject, const Peer& peer) const;
+  void check_sent(wire::WorkerId worker, const proto::Envelope& message) const;
+  void check_lease(const proto::RunLease& lease) const;
+  void check_forget(const proto::Forget& forget) const;
+  void check_not_served(const proto::NotServed& not_served) const;
+  void check_reject(const proto::Reject& reject, const Peer& peer) const;
   void check_adoptions(wire::WorkerId worker) const;
   void after_event();
   /// Does it later and in order, unless the process has ended by then; a failing file waits.

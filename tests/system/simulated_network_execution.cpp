@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/runs.hpp"
+#include "proto/proofmass.pb.h"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
@@ -37,9 +39,9 @@ void PlayedExecution::define(wire::CampaignId campaign, std::shared_ptr<const Ca
   defined_.insert(campaign);
 }
 
-void PlayedExecution::submit(wire::RunLease lease) {
-  for (RunIndex run = lease.runs.first; run.value < lease.runs.end(); ++run.value) {
-    waiting_.push_back({{lease.campaign, run}, lease.is_alone});
+void PlayedExecution::submit(const proto::RunLease& lease, std::span<const RunRange> runs) {
+  for (const RunIndex run : indices_of(runs)) {
+    waiting_.push_back({{{lease.campaign()}, run}, lease.is_alone()});
   }
 }
 
@@ -76,9 +78,9 @@ std::vector<worker::RunningBatch> PlayedExecution::computing() const {
   std::vector<worker::RunningBatch> computing;
   for (const Batch& batch : batches_) {
     computing.push_back({.number = batch.number,
-                         .progress = {.campaign = batch.runs[0].first,
-                                      .ranges = ranges_of(batch.runs),
-                                      .num_steps_done = batch.num_steps_done},
+                         .campaign = batch.runs[0].first,
+                         .ranges = ranges_of(batch.runs),
+                         .num_steps_done = batch.num_steps_done,
                          .time_left = std::nullopt});
   }
   return computing;

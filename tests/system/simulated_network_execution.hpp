@@ -41,7 +41,7 @@ class PlayedExecution final : public worker::Execution {
     return std::make_shared<const MicroscopeCampaign>();
   }
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
-  void submit(wire::RunLease lease) override;
+  void submit(const proto::RunLease& lease, std::span<const RunRange> runs) override;
   std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
                                      std::span<const RunRange> ranges) override;
   bool drop_batch(std::uint64_t number) override;

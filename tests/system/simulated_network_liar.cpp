@@ -2,25 +2,21 @@
 
 #include <array>
 #include <iterator>
+#include <stdexcept>
 #include <utility>
-#include <variant>
 
 #include "core/microscope/simulation/run.hpp"
+#include "core/runs.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 namespace {
 
-constexpr std::size_t num_kinds = std::variant_size_v<wire::WorkerMessage>;
+using Envelope = proto::Envelope;
 
-template <typename Kind, std::size_t i = 0>
-consteval std::size_t kind_of() {
-  if constexpr (std::is_same_v<Kind, std::variant_alternative_t<i, wire::WorkerMessage>>) {
-    return i;
-  } else {
-    return kind_of<Kind, i + 1>();
-  }
-}
+constexpr std::array kinds{Envelope::kHello,       Envelope::kCampaignRequest, Envelope::kGiveBack,
+                           Envelope::kResultBatch, Envelope::kHeartbeat,       Envelope::kBye};
 
 template <typename Values>
 auto any_of(const Values& values, Randomness& random) {
@@ -44,22 +40,17 @@ Liar::Liar(const Draws& draws, const Poison& poison, Randomness& random, Send se
   for (const wire::SessionId session : sessions_) lent_[session];
 }
 
-void Liar::hear(const wire::Packet& packet) {
-  auto& lent = lent_.at(packet.header.session);
-  if (std::holds_alternative<wire::Welcome>(packet.message)) {
-    registered_.insert(packet.header.session);
+void Liar::hear(const Envelope& message) {
+  const wire::SessionId session{message.session()};
+  auto& lent = lent_.at(session);
+  if (message.has_welcome()) registered_.insert(session);
+  if (message.has_reject()) registered_.erase(session);
+  const proto::RunLease& lease = message.run_lease();
+  for (const RunIndex run : indices_of(std::array{wire::runs_of(lease)})) {
+    lent[{{lease.campaign()}, run}] = {lease.attempt()};
   }
-  if (std::holds_alternative<wire::Reject>(packet.message)) {
-    registered_.erase(packet.header.session);
-  }
-  if (const auto* const lease = std::get_if<wire::RunLease>(&packet.message)) {
-    for (RunIndex run = lease->runs.first; run.value < lease->runs.end(); ++run.value) {
-      lent[{lease->campaign, run}] = lease->attempt;
-    }
-  }
-  if (const auto* const ack = std::get_if<wire::ResultAck>(&packet.message)) {
-    for (const RunIndex run : ack->runs) lent.erase({ack->campaign, run});
-  }
+  const proto::ResultAck& ack = message.result_ack();
+  for (const std::uint64_t run : ack.runs()) lent.erase({{ack.campaign()}, {run}});
 }
 
 void Liar::speak(const std::vector<wire::SessionId>& honest,
@@ -67,9 +58,9 @@ void Liar::speak(const std::vector<wire::SessionId>& honest,
   honest_ = honest;
   hosts_ = hosts;
   session_ = any_of(sessions_, random_);
-  const std::size_t kind = next_kind();
-  const bool crashes = kind == kind_of<wire::Hello>() && habit_ == Habit::crash;
-  if (crashes || (kind == kind_of<wire::Hello>() && random_.happens(0.5))) begin_again();
+  const Kind kind = next_kind();
+  const bool crashes = kind == Envelope::kHello && habit_ == Habit::crash;
+  if (crashes || (kind == Envelope::kHello && random_.happens(0.5))) begin_again();
   send_(session_, lie(kind));
 }
 
@@ -83,101 +74,102 @@ void Liar::begin_again() {
 }
 
 /// Mostly it asks for runs and then does what is its habit.
-std::size_t Liar::next_kind() {
+Liar::Kind Liar::next_kind() {
   if (is_single_minded_) {
-    if (!registered_.contains(session_)) return kind_of<wire::Hello>();
+    if (!registered_.contains(session_)) return Envelope::kHello;
   } else if (random_.happens(0.15)) {
-    return random_.below(num_kinds);
+    return kinds.at(random_.below(kinds.size()));
   } else if (random_.happens(0.2)) {
-    return kind_of<wire::Hello>();
+    return Envelope::kHello;
   }
-  if (random_.happens(0.4)) return kind_of<wire::Heartbeat>();
+  if (random_.happens(0.4)) return Envelope::kHeartbeat;
   switch (habit_) {
     case Habit::hoard:
     case Habit::stall:
-      return kind_of<wire::Heartbeat>();
+      return Envelope::kHeartbeat;
     case Habit::give_back:
-      return kind_of<wire::GiveBack>();
+      return Envelope::kGiveBack;
     case Habit::crash:
-      return kind_of<wire::Hello>();
+      return Envelope::kHello;
     case Habit::come_and_go:
-      return kind_of<wire::Bye>();
+      return Envelope::kBye;
     case Habit::mixed:
       break;
   }
-  return random_.below(num_kinds);
+  return kinds.at(random_.below(kinds.size()));
 }
 
-wire::Message Liar::lie(std::size_t kind) {
-  wire::Message message;
-  [&]<std::size_t... i>(std::index_sequence<i...>) {
-    const auto say = [&]<typename Kind>(std::type_identity<Kind> type) { message = lie(type); };
-    (void)((kind == i &&
-            (say(std::type_identity<std::variant_alternative_t<i, wire::WorkerMessage>>{}),
-             true)) ||
-           ...);
+Envelope Liar::lie(Kind kind) {
+  switch (kind) {
+    case Envelope::kHello:
+      return in_envelope(hello());
+    case Envelope::kHeartbeat:
+      return in_envelope(heartbeat());
+    case Envelope::kResultBatch:
+      return results();
+    case Envelope::kGiveBack:
+      return in_envelope(give_back());
+    case Envelope::kCampaignRequest: {
+      const wire::CampaignId campaign = any_run().first;
+      return in_envelope(make_request(campaign, random_.below(1 << 20)));
+    }
+    case Envelope::kBye:
+      return in_envelope(
+          make_bye(random_.happens(0.5) ? wire::LossReason::failed : wire::LossReason::walltime));
+    case Envelope::FROM_WORKER_NOT_SET:
+      break;
   }
-  (std::make_index_sequence<num_kinds>());
-  return message;
+  throw std::logic_error("a worker does not say this");
 }
 
 RunKey Liar::any_run() { return any_of(draws_, random_).first; }
 
 /// Runs of a whole campaign, or some of them.
-wire::HeldRuns Liar::claim() {
+proto::HeldRuns Liar::claim() {
   const auto [campaign, run] = any_run();
   const RunRange runs =
       random_.happens(0.5) ? RunRange{{0}, 2000} : RunRange{run, 1 + random_.below(4)};
-  return {.campaign = campaign,
-          .attempt = {static_cast<std::uint32_t>(1 + random_.below(9))},
-          .ranges = {runs}};
+  return make_held(campaign, {static_cast<std::uint32_t>(1 + random_.below(9))}, {runs});
 }
 
-std::vector<wire::HeldRuns> Liar::held() {
-  std::vector<wire::HeldRuns> held;
+std::vector<proto::HeldRuns> Liar::held() {
+  std::vector<proto::HeldRuns> held;
   for (const auto& [key, attempt] : lent_.at(session_)) {
-    held.push_back({.campaign = key.first, .attempt = attempt, .ranges = {{key.second, 1}}});
+    held.push_back(make_held(key.first, attempt, {{key.second, 1}}));
   }
   return held;
 }
 
-wire::Message Liar::lie(std::type_identity<wire::Hello>) {
-  wire::Hello hello{.worker_name = "liar",
-                    .host = hosts_.empty() ? "h" : any_of(hosts_, random_),
-                    .process_id = 1,
-                    .num_slots = static_cast<std::uint32_t>(1 + random_.below(8)),
-                    .model_version = std::string(model_version),
-                    .build = "test",
-                    .former = {}};
+proto::Hello Liar::hello() {
+  const std::string host = hosts_.empty() ? "h" : any_of(hosts_, random_);
+  proto::Hello hello =
+      make_hello("liar", host, static_cast<std::uint32_t>(1 + random_.below(8)), model_version);
   const wire::LossReason reason =
       random_.happens(0.5) ? wire::LossReason::crashed : wire::LossReason::out_of_memory;
-  if (former_.value != 0) hello.former = wire::FormerSession{former_, reason, 11};
+  if (former_.value != 0) *hello.mutable_former() = make_former(former_, reason);
   if (!honest_.empty() && random_.happens(0.2)) {
-    hello.former = wire::FormerSession{any_of(honest_, random_), reason, 11};
+    *hello.mutable_former() = make_former(any_of(honest_, random_), reason);
   }
   return hello;
 }
 
-wire::Message Liar::lie(std::type_identity<wire::Heartbeat>) {
+proto::Heartbeat Liar::heartbeat() {
   constexpr std::array<std::uint32_t, 3> credits{0, 8, 4096};
-  wire::Heartbeat heartbeat{.num_runs_max = credits.at(random_.below(credits.size())),
-                            .num_steps_done = ++num_steps_done_,
-                            .held = held(),
-                            .computing = {}};
+  proto::Heartbeat heartbeat = make_heartbeat(credits.at(random_.below(credits.size())), held());
+  heartbeat.set_num_steps_done(++num_steps_done_);
   const bool seems_to_advance = habit_ != Habit::stall;
-  for (const wire::HeldRuns& held : heartbeat.held) {
-    heartbeat.computing.push_back({.campaign = held.campaign,
-                                   .ranges = held.ranges,
-                                   .num_steps_done = seems_to_advance ? num_steps_done_ : 1});
+  for (const proto::HeldRuns& held : heartbeat.held()) {
+    *heartbeat.add_computing() = make_computed_batch(
+        {held.campaign()}, wire::ranges_of(held.ranges()), seems_to_advance ? num_steps_done_ : 1);
   }
   if (is_single_minded_) {
-    heartbeat.num_runs_max = 4096;
+    heartbeat.set_num_runs_max(4096);
     return heartbeat;
   }
-  if (random_.happens(0.3)) heartbeat.computing.clear();
-  if (random_.happens(0.2)) heartbeat.held.clear();
-  if (random_.happens(0.3)) heartbeat.held.push_back(claim());
-  if (random_.happens(0.2)) heartbeat.set_aside.push_back(claim());
+  if (random_.happens(0.3)) heartbeat.clear_computing();
+  if (random_.happens(0.2)) heartbeat.clear_held();
+  if (random_.happens(0.3)) *heartbeat.add_held() = claim();
+  if (random_.happens(0.2)) *heartbeat.add_set_aside() = claim();
   return heartbeat;
 }
 
@@ -191,7 +183,7 @@ wire::ComputedRun Liar::made_up(const RunKey& key) {
           .elapsed_s = times_s.at(random_.below(times_s.size()))};
 }
 
-wire::Message Liar::lie(std::type_identity<wire::ResultBatch>) {
+Envelope Liar::results() {
   const auto& lent = lent_.at(session_);
   const bool tells_the_truth = !lent.empty() && random_.happens(truthfulness_);
   const RunKey key = tells_the_truth ? any_of(lent, random_).first : any_run();
@@ -202,27 +194,18 @@ wire::Message Liar::lie(std::type_identity<wire::ResultBatch>) {
     computed.result.truth = draws_.at(key).truth;
   } else if (lent.contains(key)) {
     // What it is lent it may spoil, as a worker that computes wrongly. Here it does not.
-    return lie(std::type_identity<wire::Heartbeat>{});
+    return in_envelope(heartbeat());
   }
-  return wire::ResultBatch{.campaign = key.first,
-                           .attempt = {static_cast<std::uint32_t>(1 + random_.below(9))},
-                           .results = {std::move(computed)}};
+  const wire::Attempt attempt{static_cast<std::uint32_t>(1 + random_.below(9))};
+  return in_envelope(make_result_batch(key.first, attempt, {computed}));
 }
 
-wire::Message Liar::lie(std::type_identity<wire::GiveBack>) {
+proto::GiveBack Liar::give_back() {
   constexpr std::array reasons{wire::LossReason::retracted, wire::LossReason::drained,
                                wire::LossReason::preempted, wire::LossReason::failed};
-  std::vector<wire::HeldRuns> runs = held();
+  std::vector<proto::HeldRuns> runs = held();
   if (runs.empty() || random_.happens(0.2)) runs.push_back(claim());
-  return wire::GiveBack{.reason = reasons.at(random_.below(reasons.size())), .runs = runs};
-}
-
-wire::Message Liar::lie(std::type_identity<wire::CampaignRequest>) {
-  return wire::CampaignRequest{.campaign = any_run().first, .offset = random_.below(1 << 20)};
-}
-
-wire::Message Liar::lie(std::type_identity<wire::Bye>) {
-  return wire::Bye{random_.happens(0.5) ? wire::LossReason::failed : wire::LossReason::walltime};
+  return make_give_back(reasons.at(random_.below(reasons.size())), runs);
 }
 
 }  // namespace proofmass::test

@@ -5,10 +5,10 @@
 #include <map>
 #include <set>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
+#include "proto/proofmass.pb.h"
 #include "tests/system/simulated_network_execution.hpp"
 #include "tests/system/simulated_network_time.hpp"
 
@@ -21,33 +21,33 @@ inline const std::string liar_address = "liar";
 /// of lie for each message of a worker. It goes on for ever.
 class Liar {
  public:
-  using Send = std::function<void(wire::SessionId, wire::Message)>;
+  using Send = std::function<void(wire::SessionId, proto::Envelope)>;
 
   /// @param draws, random  Outlive this object.
   Liar(const Draws& draws, const Poison& poison, Randomness& random, Send send);
 
   /// Says something, at random, of one of its sessions.
   void speak(const std::vector<wire::SessionId>& honest, const std::vector<std::string>& hosts);
-  void hear(const wire::Packet& packet);
+  void hear(const proto::Envelope& message);
   [[nodiscard]] bool has(wire::SessionId session) const { return lent_.contains(session); }
 
  private:
   /// Where it does harm: what it makes of runs that it is lent, in most of its messages.
   enum class Habit : std::uint8_t { hoard, stall, give_back, crash, come_and_go, mixed };
 
-  // One for each message of wire::WorkerMessage: another one without a lie does not compile.
-  wire::Message lie(std::type_identity<wire::Hello>);
-  wire::Message lie(std::type_identity<wire::Heartbeat>);
-  wire::Message lie(std::type_identity<wire::ResultBatch>);
-  wire::Message lie(std::type_identity<wire::GiveBack>);
-  wire::Message lie(std::type_identity<wire::CampaignRequest>);
-  wire::Message lie(std::type_identity<wire::Bye>);
-  wire::Message lie(std::size_t kind);
+  using Kind = proto::Envelope::FromWorkerCase;
 
-  [[nodiscard]] std::size_t next_kind();
+  /// One for each message of a worker: another one without a lie does not compile.
+  proto::Envelope lie(Kind kind);
+  proto::Hello hello();
+  proto::Heartbeat heartbeat();
+  proto::Envelope results();
+  proto::GiveBack give_back();
+
+  [[nodiscard]] Kind next_kind();
   void begin_again();
-  wire::HeldRuns claim();
-  std::vector<wire::HeldRuns> held();
+  proto::HeldRuns claim();
+  std::vector<proto::HeldRuns> held();
   wire::ComputedRun made_up(const RunKey& key);
   RunKey any_run();
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/microscope/simulation/run.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/system/simulated_network_world.hpp"
 
 // Troubles beyond the network: files that cannot be opened, lose their names or come back as older
@@ -98,48 +99,43 @@ void World::lie() {
   auto victim = processes_.begin();
   std::advance(victim, static_cast<std::ptrdiff_t>(random_.below(processes_.size())));
   const std::string host = machines_.at(victim->second.machine).host;
-  const auto hello = [&](std::optional<wire::FormerSession> former) {
-    return wire::Hello{.worker_name = "liar",
-                       .host = host,
-                       .process_id = 1,
-                       .num_slots = 1,
-                       .model_version = std::string(model_version),
-                       .build = "test",
-                       .former = former};
+  const auto hello = [&](std::optional<wire::SessionId> former) {
+    proto::Hello said = make_hello("liar", host, 1, model_version);
+    if (former) *said.mutable_former() = make_former(*former);
+    return in_envelope(said);
   };
   const wire::SessionId first{random_.number()};
   const wire::SessionId second{random_.number()};
   if (random_.happens(0.5)) {
     // A process that it has never been.
-    return say_as_liar(first, hello(wire::FormerSession{.session = victim->first, .signal = 11}));
+    return say_as_liar(first, hello(victim->first));
   }
   // A process of its own that has done nothing, or has taken some runs.
   say_as_liar(first, hello(std::nullopt));
   if (host == machines_.front().host && random_.happens(0.3)) {
-    say_as_liar(first, wire::Heartbeat{.num_runs_max = 2, .held = {}, .computing = {}});
+    say_as_liar(first, in_envelope(make_heartbeat(2)));
   }
-  say_as_liar(second, hello(wire::FormerSession{.session = first, .signal = 11}));
+  say_as_liar(second, hello(first));
 }
 
-void World::say_as_liar(wire::SessionId session, wire::Message message) {
-  const bool is_hello = std::holds_alternative<wire::Hello>(message);
+void World::say_as_liar(wire::SessionId session, proto::Envelope message) {
+  message.set_session(session.value);
+  message.set_epoch(message.has_hello() ? 0 : coordinator_.epoch().value);
+  message.set_sequence(++num_liar_messages_);
   coordinator_.receive(
-      {.header = {.session = session,
-                  .epoch = is_hello ? wire::Epoch{} : coordinator_.epoch(),
-                  .sequence = ++num_liar_messages_},
-       .message = std::move(message)},
-      {.key = weather_.has_one_key ? honest_key : liar_key, .address = liar_address});
+      message, {.key = weather_.has_one_key ? honest_key : liar_key, .address = liar_address});
 }
 
 /// Also when all else is calm: the campaigns must finish nevertheless.
 void World::lie_for_ever() {
   if (!liar_) {
-    liar_.emplace(draws_, poison_, random_, [this](wire::SessionId session, wire::Message message) {
-      // What waits would be compared with what it is lent later.
-      if (coordinator_.is_running() && !coordinator_.is_stalled()) {
-        say_as_liar(session, std::move(message));
-      }
-    });
+    liar_.emplace(draws_, poison_, random_,
+                  [this](wire::SessionId session, proto::Envelope message) {
+                    // What waits would be compared with what it is lent later.
+                    if (coordinator_.is_running() && !coordinator_.is_stalled()) {
+                      say_as_liar(session, std::move(message));
+                    }
+                  });
   }
   std::vector<wire::SessionId> honest;
   std::vector<std::string> hosts;

@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "core/microscope/simulation/run.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -21,9 +22,10 @@ constexpr Duration deadline = 2h;  // Of simulated time.
 }  // namespace
 
 World::World(std::uint64_t seed)
-    : random_(seed), coordinator_(agenda_, random_, [this](const wire::Packet& packet) {
-        if (liar_ && liar_->has(packet.header.session)) return liar_->hear(packet);
-        transmit(packet.header.session, [this, packet] { arrive(packet); });
+    : random_(seed), coordinator_(agenda_, random_, [this](const proto::Envelope& message) {
+        const wire::SessionId session{message.session()};
+        if (liar_ && liar_->has(session)) return liar_->hear(message);
+        transmit(session, [this, message] { arrive(message); });
       }) {
   draw_weather();
   draw_troubles();
@@ -73,12 +75,9 @@ void World::add_campaigns() {
     campaign.seed = random_.number();
     coordinator::StoredCampaign stored{
         .definition = std::make_shared<const MicroscopeCampaign>(campaign),
-        .priority = priority,
-        .finished = {},
-        .given_up = {},
-        .blamed = {}};
+        .control = {.priority = priority}};
     constexpr std::array fractions{0.0, 0.0, 0.3, 1.0};
-    stored.audit_fraction = fractions.at(random_.below(fractions.size()));
+    stored.control.audit_fraction = fractions.at(random_.below(fractions.size()));
     coordinator_.add_file(id, stored);
     num_runs_wanted_[id] = weather_.extension_s < never_s ? num_runs + 12 : num_runs;
     campaign.num_runs = num_runs_wanted_[id];
@@ -176,7 +175,7 @@ void World::check_end() {
       }
       EXPECT_EQ(commits->second, 1) << "campaign " << id.value << " run " << run.value;
       const bool is_to_be_audited =
-          coordinator::is_audited(campaign.seed, run, file.stored.audit_fraction);
+          coordinator::is_audited(campaign.seed, run, file.stored.control.audit_fraction);
       EXPECT_TRUE(!is_to_be_audited || file.compared.contains(run) ||
                   file.audits_given_up.contains(run))
           << "not audited: campaign " << id.value << " run " << run.value;
@@ -201,44 +200,42 @@ void World::transmit(wire::SessionId session, const std::function<void()>& arriv
   }
 }
 
-void World::arrive(const wire::Packet& packet) {
-  const wire::SessionId session = packet.header.session;
+void World::arrive(const proto::Envelope& message) {
+  const wire::SessionId session{message.session()};
   Process* const process = find(session);
   if (process == nullptr) return;
   if (agenda_.now() < process->stalled_until) {
-    agenda_.add(process->stalled_until - agenda_.now(), [this, packet] { arrive(packet); });
+    agenda_.add(process->stalled_until - agenda_.now(), [this, message] { arrive(message); });
     return;
   }
-  receive(*process, packet);
+  receive(*process, message);
   end_if_over(session);
 }
 
 /// A message takes no result from a worker but by an acknowledgement, or if it says that runs of
 /// just these numbers are to be forgotten.
-void World::receive(Process& process, const wire::Packet& packet) {
+void World::receive(Process& process, const proto::Envelope& message) {
   worker::Conversation& conversation = *process.conversation;
-  const auto* const forget = std::get_if<wire::Forget>(&packet.message);
+  const proto::Forget& forget = message.forget();
   const auto num_kept = [&] {
-    if (forget == nullptr) return conversation.num_unacknowledged();
+    if (!message.has_forget()) return conversation.num_unacknowledged();
     std::size_t count = 0;
     for (const wire::LeasedResult& result : conversation.unacknowledged()) {
-      const bool is_forgotten = result.campaign == forget->campaign &&
-                                result.computed.result.run.value < forget->num_runs;
+      const bool is_forgotten = result.campaign.value == forget.campaign() &&
+                                result.computed.result.run.value < forget.num_runs();
       if (!is_forgotten) ++count;
     }
     return count;
   };
   const std::size_t num_before = num_kept();
-  conversation.on_packet(packet, agenda_.now());
-  if (!std::holds_alternative<wire::ResultAck>(packet.message)) {
+  conversation.on_message(message, agenda_.now());
+  if (!message.has_result_ack()) {
     EXPECT_EQ(num_kept(), num_before) << "results were thrown away";
   }
-  const auto* const reject = std::get_if<wire::Reject>(&packet.message);
-  const bool is_quarantined =
-      reject != nullptr && reject->reason == wire::RejectReason::quarantined;
+  const bool is_quarantined = message.reject().reason() == proto::REJECT_REASON_QUARANTINED;
   if (!is_quarantined || std::exchange(process.is_heeded, true)) return;
   agenda_.add(random_.duration(60.0),
-              [this, session = packet.header.session] { heed_quarantine(session); });
+              [this, session = wire::SessionId{message.session()}] { heed_quarantine(session); });
 }
 
 void World::tick_coordinator() {
@@ -262,16 +259,12 @@ void World::restart_coordinator() {
 
 // Workers' processes.
 
-void World::start_process(std::size_t machine, std::optional<wire::FormerSession> former) {
+void World::start_process(std::size_t machine, std::optional<proto::FormerSession> former) {
   const wire::SessionId session{random_.number()};
   const Machine& on = machines_.at(machine);
-  const wire::Hello hello{.worker_name = "w",
-                          .host = on.host,
-                          .process_id = 1,
-                          .num_slots = static_cast<std::uint32_t>(on.num_threads * on.num_lanes),
-                          .model_version = std::string(model_version),
-                          .build = "test",
-                          .former = former};
+  const auto num_slots = static_cast<std::uint32_t>(on.num_threads * on.num_lanes);
+  proto::Hello hello = make_hello("w", on.host, num_slots, model_version);
+  if (former) *hello.mutable_former() = *former;
   worker::ConversationConfig config;
   config.hello_delay_max = 8s;
   config.refusal_delay = 5s;
@@ -282,9 +275,9 @@ void World::start_process(std::size_t machine, std::optional<wire::FormerSession
   process.machine = machine;
   process.execution =
       std::make_unique<PlayedExecution>(poison_, draws_, on.num_threads, on.num_lanes);
-  const auto send = [this, machine](const wire::Packet& packet) {
-    transmit(packet.header.session, [this, packet, host = machines_.at(machine).host] {
-      coordinator_.receive(packet, {.key = honest_key, .address = host});
+  const auto send = [this, machine](const proto::Envelope& message) {
+    transmit({message.session()}, [this, message, host = machines_.at(machine).host] {
+      coordinator_.receive(message, {.key = honest_key, .address = host});
     });
   };
   process.conversation = std::make_unique<worker::Conversation>(session, hello, *process.execution,
@@ -352,7 +345,7 @@ void World::crash(wire::SessionId session) {
   if (!random_.happens(0.9)) return replace(session);
   const std::size_t machine = processes_.at(session).machine;
   processes_.erase(session);
-  const wire::FormerSession former{session, wire::LossReason::crashed, 11};
+  const proto::FormerSession former = make_former(session);
   agenda_.add(random_.duration(3.0), [this, machine, former] { start_process(machine, former); });
 }
 

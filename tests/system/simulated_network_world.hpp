@@ -112,7 +112,7 @@ class World {
   [[nodiscard]] bool is_calm() const;
   [[nodiscard]] Process* find(wire::SessionId session);
 
-  void start_process(std::size_t machine, std::optional<wire::FormerSession> former);
+  void start_process(std::size_t machine, std::optional<proto::FormerSession> former);
   void plan_process(wire::SessionId session);
   void tick_process(wire::SessionId session);
   void compute(wire::SessionId session);
@@ -121,8 +121,8 @@ class World {
   void end_if_over(wire::SessionId session);
 
   void transmit(wire::SessionId session, const std::function<void()>& arrive);
-  void arrive(const wire::Packet& packet);
-  void receive(Process& process, const wire::Packet& packet);
+  void arrive(const proto::Envelope& message);
+  void receive(Process& process, const proto::Envelope& message);
   void tick_coordinator();
   void restart_coordinator();
   void start_coordinator();
@@ -132,7 +132,7 @@ class World {
   void open_later(wire::CampaignId id);
   void end_troubles();
   void lie();
-  void say_as_liar(wire::SessionId session, wire::Message message);
+  void say_as_liar(wire::SessionId session, proto::Envelope message);
   void lie_for_ever();
   void heed_quarantine(wire::SessionId session);
   void spool(Process& process);

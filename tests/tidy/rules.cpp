@@ -101,8 +101,14 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
   if (matches(include, "^boost/math") && file.path != "core/statistics/distribution.cpp") {
     return "laws whose last bits depend on the processor stay in core/statistics/distribution.cpp";
   }
-  if (matches(include, "\\.pb\\.h$|^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
-    return "Protobuf types stay in proto/wire/*.cpp";
+  if (matches(include, "^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
+    return "what Protobuf itself offers stays in proto/wire/*.cpp";
+  }
+  if (matches(include, "\\.pb\\.h$|^proto/wire/client_codec\\.hpp$") &&
+      !matches(file.path, "^(proto/wire|coordinator/(cli|net)|worker|tests)/") &&
+      !(file.is_in("coordinator/dispatch") && is_source)) {
+    return "messages stay in proto/wire, coordinator/cli, coordinator/dispatch/*.cpp, "
+           "coordinator/net and worker";
   }
   if (matches(include, "^toml") &&
       !matches(file.path,

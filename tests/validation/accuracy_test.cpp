@@ -8,6 +8,7 @@
 #include "core/campaign/statistics.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/statistics_of.hpp"
 
 namespace proofmass {
 namespace {
@@ -20,16 +21,14 @@ CampaignStatistics statistics_of(Correction correction) {
   campaign.seed = 20130501;
   campaign.scenario.estimation.correction = correction;
   const RunPlan plan(campaign);
-  StatisticsPasses passes(campaign.objectives());
+  std::vector<RunResult> results;
   for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
     std::vector<RunRequest> requests;
     for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
-    for (const RunResult& result : plan.simulate_batch(requests, best_instruction_set())) {
-      passes.add(result);
-    }
+    const std::vector<RunResult> batch = plan.simulate_batch(requests, best_instruction_set());
+    results.insert(results.end(), batch.begin(), batch.end());
   }
-  EXPECT_FALSE(passes.end_pass());
-  return passes.statistics();
+  return test::statistics_of(campaign.objectives(), results);
 }
 
 TEST(Accuracy, FirstOrderMeansAreThePapersWhereItSaysWhatItDid) {

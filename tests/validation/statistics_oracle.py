@@ -199,20 +199,12 @@ def bootstrap_deviation_interval(name, confidence):
 # ---- functions of two columns ---------------------------------------------------------------------
 
 
-def with_interval(r, variance, confidence):
-    half = scipy.stats.norm.ppf(0.5 + 0.5 * float(confidence)) * math.sqrt(variance)
-    z = mpmath.atanh(r)
-    return r, mpmath.tanh(z - half), mpmath.tanh(z + half)
+def linear_correlation(x, y):
+    return (exact_correlation(columns[x], columns[y]),)
 
 
-def linear_correlation(x, y, confidence):
-    r = exact_correlation(columns[x], columns[y])
-    return with_interval(r, 1 / (len(columns[x]) - 3), confidence)
-
-
-def rank_correlation(x, y, confidence):
-    r = exact_correlation(ranks(x), ranks(y))
-    return with_interval(r, (1 + float(r) ** 2 / 2) / (len(columns[x]) - 3), confidence)
+def rank_correlation(x, y):
+    return (exact_correlation(ranks(x), ranks(y)),)
 
 
 def first_order_index(x, y, confidence):
@@ -326,7 +318,7 @@ def wilks_upper(name, coverage, confidence):
     orders = [k + 1 for k in range(n)
               if scipy.stats.binom.cdf(k, n, 1 - float(coverage)) <= 1 - float(confidence)]
     value = np.sort(values)[n - max(orders)]
-    return value, max(orders), list(values).index(value)
+    return value, max(orders)
 
 
 def binomial(k, n, p):

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "core/statistics/bootstrap.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/distribution.hpp"
@@ -18,8 +17,8 @@
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
+#include "core/statistics/requirement.hpp"
 #include "core/statistics/sensitivity.hpp"
-#include "core/statistics/tolerance.hpp"
 #include "tests/core/statistics/columns.hpp"
 
 namespace proofmass {
@@ -115,13 +114,9 @@ void ask_about_dependence(Questions& questions, const std::string& x, const std:
   const std::vector<double>& first = questions.column(x);
   const std::vector<double>& second = questions.column(y);
   const std::string names = fmt::format(" {} {}", x, y);
-  const auto linear = linear_correlation(first, second, confidence);
-  const auto rank = rank_correlation(first, second, confidence);
   const auto index = test::first_order_index(first, second, confidence);
-  questions.ask("linear_correlation" + names + " 0.9",
-                {linear->coefficient, linear->interval.lower, linear->interval.upper});
-  questions.ask("rank_correlation" + names + " 0.9",
-                {rank->coefficient, rank->interval.lower, rank->interval.upper});
+  questions.ask("linear_correlation" + names, {linear_correlation(first, second).value()});
+  questions.ask("rank_correlation" + names, {rank_correlation(first, second).value()});
   questions.ask("first_order_index" + names + " 0.9",
                 {index->index, index->standard_error, index->interval.lower, index->interval.upper,
                  index->p_value});
@@ -234,11 +229,12 @@ void ask_about_probabilities(Questions& questions) {
 void ask_about_tolerances(Questions& questions) {
   for (const double coverage : {0.5, 0.9, 0.95, 0.99}) {
     for (const double shown_with : {0.6, 0.9, 0.95, 0.999}) {
-      const auto bound = wilks_upper(questions.column("magnitudes"), {coverage, shown_with});
+      const std::vector<double>& values = questions.column("magnitudes");
+      const Tolerance tolerance{coverage, shown_with};
+      const auto bound = wilks_upper(values, tolerance);
       if (!bound) continue;
-      questions.ask(
-          fmt::format("wilks_upper magnitudes {} {}", coverage, shown_with),
-          {bound->value, static_cast<double>(bound->order), static_cast<double>(bound->index)});
+      questions.ask(fmt::format("wilks_upper magnitudes {} {}", coverage, shown_with),
+                    {*bound, static_cast<double>(wilks_order(tolerance, values.size()))});
     }
   }
 }

@@ -14,6 +14,10 @@
 #include "core/model.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass::proto {
+class RunLease;
+}  // namespace proofmass::proto
+
 namespace proofmass::worker {
 
 /// A monotonic time, handed in by the caller.
@@ -30,7 +34,9 @@ struct FinishedRun {
 /// Runs that are being computed together.
 struct RunningBatch {
   std::uint64_t number = 0;  ///< No other batch of the execution has it.
-  wire::ComputedBatch progress;
+  wire::CampaignId campaign;
+  std::vector<RunRange> ranges;  ///< Not empty.
+  std::uint32_t num_steps_done = 0;
   /// Until its results are there, if it goes on as it has; nothing before its first step is done.
   std::optional<Duration> time_left;
 };
@@ -52,9 +58,9 @@ class Execution {
   /// What the runs of a campaign compute. @pre It is not defined.
   virtual void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) = 0;
 
-  /// Queues runs; those of a campaign that is not defined wait until it is.
+  /// Queues some runs of a lease; those of a campaign that is not defined wait until it is.
   /// @pre The execution has none of them.
-  virtual void submit(wire::RunLease lease) = 0;
+  virtual void submit(const proto::RunLease& lease, std::span<const RunRange> runs) = 0;
 
   /// Drops those of these runs that wait, and returns them in ascending order.
   [[nodiscard]] virtual std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,

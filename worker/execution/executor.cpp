@@ -106,10 +106,10 @@ bool Executor::is_in_use(wire::CampaignId campaign) const {
          std::ranges::any_of(batches_, is_of_it);
 }
 
-void Executor::submit(wire::RunLease lease) {
+void Executor::submit(const proto::RunLease& lease, std::span<const RunRange> runs) {
   {
     const std::lock_guard lock(mutex_);
-    queue_.add(lease);
+    queue_.add(lease, runs);
   }
   changed_.notify_all();
 }
@@ -161,9 +161,9 @@ std::vector<RunningBatch> Executor::computing() const {
     const int num_done = batch->num_steps_done;
     running.push_back(
         {.number = number,
-         .progress = {.campaign = batch->assignment.campaign,
-                      .ranges = requested_ranges(batch->assignment.requests),
-                      .num_steps_done = static_cast<std::uint32_t>(num_done)},
+         .campaign = batch->assignment.campaign,
+         .ranges = requested_ranges(batch->assignment.requests),
+         .num_steps_done = static_cast<std::uint32_t>(num_done),
          .time_left = time_left(now() - batch->started_at, num_done, batch->prepared->num_steps)});
   }
   return running;

@@ -56,7 +56,7 @@ class Executor final : public Execution {
 
   [[nodiscard]] bool is_defined(wire::CampaignId campaign) const override;
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
-  void submit(wire::RunLease lease) override;
+  void submit(const proto::RunLease& lease, std::span<const RunRange> runs) override;
   [[nodiscard]] std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
                                                    std::span<const RunRange> ranges) override;
   [[nodiscard]] bool drop_batch(std::uint64_t number) override;

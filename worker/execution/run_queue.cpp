@@ -3,17 +3,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/runs.hpp"
+#include "proto/proofmass.pb.h"
+
 namespace proofmass::worker {
 
-void RunQueue::add(const wire::RunLease& lease) {
-  const auto width = static_cast<std::ptrdiff_t>(lease.table_values.size() / lease.runs.count);
-  auto values = lease.table_values.begin();
-  for (std::uint64_t run = lease.runs.first.value; run < lease.runs.end(); ++run) {
-    runs_.push_back({.campaign = lease.campaign,
-                     .is_alone = lease.is_alone,
-                     .batch_runs_max = lease.batch_runs_max,
-                     .request = {.run = {run}, .table_values = {values, values + width}}});
-    values += width;
+void RunQueue::add(const proto::RunLease& lease, std::span<const RunRange> runs) {
+  const int width = lease.table_values_size() / static_cast<int>(lease.num_runs());
+  for (const RunIndex run : indices_of(runs)) {
+    const auto position = static_cast<int>(run.value - lease.first_run());
+    const auto values = lease.table_values().begin() + position * width;
+    runs_.push_back({.campaign = {lease.campaign()},
+                     .is_alone = lease.is_alone(),
+                     .batch_runs_max = lease.batch_runs_max(),
+                     .request = {.run = run, .table_values = {values, values + width}}});
   }
 }
 

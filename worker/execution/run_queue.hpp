@@ -10,6 +10,10 @@
 #include "core/campaign/campaign.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass::proto {
+class RunLease;
+}  // namespace proofmass::proto
+
 namespace proofmass::worker {
 
 /// Runs of one campaign that are to be computed together.
@@ -23,7 +27,8 @@ class RunQueue {
  public:
   using IsReady = std::function<bool(wire::CampaignId)>;
 
-  void add(const wire::RunLease& lease);
+  /// Some runs of a lease.
+  void add(const proto::RunLease& lease, std::span<const RunRange> runs);
 
   /// Removes the first run whose campaign is ready, and the next ones of that campaign, whatever
   /// lease they are of; fewer than `count_max` if there are no more, none if no campaign is ready.

@@ -10,6 +10,7 @@
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 #include "core/runs.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -20,14 +21,6 @@ Duration times(double factor, Duration duration) {
 
 std::int64_t whole_seconds(Duration duration) {
   return std::chrono::duration_cast<std::chrono::seconds>(duration).count();
-}
-
-/// The table values of some of a lease's runs.
-std::vector<double> values_of(const wire::RunLease& lease, RunRange runs, std::size_t width) {
-  const auto first =
-      lease.table_values.begin() +
-      static_cast<std::ptrdiff_t>((runs.first.value - lease.runs.first.value) * width);
-  return {first, first + static_cast<std::ptrdiff_t>(runs.count * width)};
 }
 
 /// The campaign that was received, or why it is none.
@@ -43,7 +36,7 @@ std::variant<std::shared_ptr<const Campaign>, std::string> read_definition(
 
 }  // namespace
 
-Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution& execution,
+Conversation::Conversation(wire::SessionId session, proto::Hello hello, Execution& execution,
                            Send send, TimePoint now, const ConversationConfig& config)
     : session_(session),
       hello_(std::move(hello)),
@@ -61,148 +54,148 @@ Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution
 
 // What arrives.
 
-template <>
-void Conversation::handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now) {
+void Conversation::on_welcome(const proto::Envelope& message, TimePoint now) {
   if (is_registered_) return;  // The answer to a repeated Hello.
   is_registered_ = true;
   // The coordinator process that asked for the drain has ended; this one may need the worker.
   const bool is_drained = leaving_ && leaving_->reason == wire::LossReason::drained;
-  if (is_drained && header.epoch != epoch_) leaving_.reset();
-  epoch_ = header.epoch;
-  welcome_sequence_ = header.sequence;
+  if (is_drained && message.epoch() != epoch_.value) leaving_.reset();
+  epoch_ = {message.epoch()};
+  welcome_sequence_ = message.sequence();
   noted_refusals_.clear();
   revocation_.reset();
   heartbeat_interval_ = std::chrono::duration_cast<Duration>(
-      std::chrono::duration<double>(welcome.heartbeat_interval_s));
+      std::chrono::duration<double>(message.welcome().heartbeat_interval_s()));
   send_heartbeat(now);
   send_all_results(now);
 }
 
-template <>
-void Conversation::handle(const wire::Reject& reject, const wire::Header& header, TimePoint now) {
+void Conversation::on_reject(const proto::Envelope& message, TimePoint now) {
+  const proto::Reject& reject = message.reject();
   // One that was overtaken by the Welcome after it.
-  const bool is_late = header.epoch == epoch_ && header.sequence < welcome_sequence_;
+  const bool is_late = message.epoch() == epoch_.value && message.sequence() < welcome_sequence_;
   if (is_registered_ && is_late) return;
-  switch (reject.reason) {
-    case wire::RejectReason::not_registered:
-      if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
-      return;
-    case wire::RejectReason::incompatible:
-      return end(Ending::Kind::failed, "refused by the coordinator: " + reject.text);
-    case wire::RejectReason::revoked:
-      if (!revocation_) revocation_.emplace(now, reject.text);
-      return come_again(reject, now);
-    case wire::RejectReason::malformed:
-    case wire::RejectReason::full:
-    case wire::RejectReason::quarantined:
-      return come_again(reject, now);
+  if (reject.reason() == proto::REJECT_REASON_NOT_REGISTERED) {
+    if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
+    return;
   }
+  if (reject.reason() == proto::REJECT_REASON_INCOMPATIBLE) {
+    return end(Ending::Kind::failed, "refused by the coordinator: " + reject.text());
+  }
+  const bool is_revoked = reject.reason() == proto::REJECT_REASON_REVOKED;
+  if (is_revoked && !revocation_) revocation_.emplace(now, reject.text());
+  come_again(reject, now);
 }
 
-template <>
-void Conversation::handle(const wire::DefinitionPart& part, const wire::Header&, TimePoint now) {
+void Conversation::on_definition_part(const proto::DefinitionPart& part, TimePoint now) {
   using Progress = wire::IncomingDefinition::Progress;
-  const auto wanted = wanted_.find(part.campaign);
+  const wire::CampaignId campaign{part.campaign()};
+  const auto wanted = wanted_.find(campaign);
   if (wanted == wanted_.end()) return;
   const Progress progress = wanted->second.incoming.add(part);
-  if (progress == Progress::advanced) return request(part.campaign, now);
-  if (progress == Progress::complete) define(part.campaign, now);
+  if (progress == Progress::advanced) return request(campaign, now);
+  if (progress == Progress::complete) define(campaign, now);
 }
 
-template <>
-void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimePoint) {
-  const RunRange known{{0}, forget.num_runs};
-  for (const RunIndex run : execution_.drop_waiting(forget.campaign, std::array{known})) {
-    unfinished_.erase({forget.campaign, run});
+void Conversation::on_forget(const proto::Forget& forget) {
+  const wire::CampaignId campaign{forget.campaign()};
+  const RunRange known{{0}, forget.num_runs()};
+  for (const RunIndex run : execution_.drop_waiting(campaign, std::array{known})) {
+    unfinished_.erase({campaign, run});
   }
   // What is computed from num_runs on is of an extension, and goes on.
-  const auto next = unfinished_.lower_bound({forget.campaign, RunIndex{forget.num_runs}});
-  if (next == unfinished_.end() || next->first.first != forget.campaign) {
-    std::erase_if(unfinished_,
-                  [&](const auto& entry) { return entry.first.first == forget.campaign; });
-    wanted_.erase(forget.campaign);
-    table_widths_.erase(forget.campaign);
-    execution_.forget(forget.campaign);
+  const auto next = unfinished_.lower_bound({campaign, RunIndex{forget.num_runs()}});
+  if (next == unfinished_.end() || next->first.first != campaign) {
+    std::erase_if(unfinished_, [&](const auto& entry) { return entry.first.first == campaign; });
+    wanted_.erase(campaign);
+    table_widths_.erase(campaign);
+    execution_.forget(campaign);
   }
-  if (const std::size_t count = unacknowledged_.drop(forget.campaign, known); count > 0) {
+  if (const std::size_t count = unacknowledged_.drop(campaign, known); count > 0) {
     note({.severity = wire::Severity::warning,
           .kind = "results_forgotten",
-          .fields = {{"campaign", fmt::format("{:016x}", forget.campaign.value)},
+          .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
                      {"results", count},
                      wire::Field::remark("(finished or cancelled)")}});
   }
   leave_if_done();
 }
 
-template <>
-void Conversation::handle(const wire::NotServed& not_served, const wire::Header&, TimePoint) {
-  std::vector<RunRange> ranges = not_served.ranges;
+void Conversation::on_not_served(const proto::NotServed& not_served) {
+  const wire::CampaignId campaign{not_served.campaign()};
+  std::vector<RunRange> ranges = wire::ranges_of(not_served.ranges());
   if (ranges.empty()) ranges.push_back(all_runs);
-  give_back(wire::LossReason::retracted, not_served.campaign,
-            execution_.drop_waiting(not_served.campaign, ranges));
-  set_aside(not_served.campaign, ranges);
+  give_back(wire::LossReason::retracted, campaign, execution_.drop_waiting(campaign, ranges));
+  set_aside(campaign, ranges);
 }
 
-template <>
-void Conversation::handle(const wire::RunLease& lease, const wire::Header&, TimePoint now) {
+void Conversation::on_lease(const proto::RunLease& lease, TimePoint now) {
   if (!is_registered_) return;
-  const std::size_t width = lease.table_values.size() / lease.runs.count;
+  const wire::CampaignId campaign{lease.campaign()};
   const std::vector<RunRange> ranges = new_runs(lease);
   if (leaving_) {
     if (ranges.empty()) return;
-    return send(wire::GiveBack{leaving_->reason, {{lease.campaign, lease.attempt, ranges}}});
+    proto::Envelope envelope;
+    proto::GiveBack& answer = *envelope.mutable_give_back();
+    answer.set_reason(wire::message_value(leaving_->reason));
+    proto::HeldRuns& held = *answer.add_runs();
+    held.set_campaign(lease.campaign());
+    held.set_attempt(lease.attempt());
+    wire::add_ranges(ranges, *held.mutable_ranges());
+    return send(std::move(envelope));
   }
-  if (!agrees_on_table(lease.campaign, width)) return;
-  for (const RunRange& runs : ranges) {
-    wire::RunLease part = lease;
-    part.runs = runs;
-    part.table_values = values_of(lease, runs, width);
-    execution_.submit(std::move(part));
-    for (const RunIndex run : indices_of(std::array{runs}))
-      unfinished_[{lease.campaign, run}] = lease.attempt;
-  }
-  const bool is_wanted = wanted_.contains(lease.campaign);
-  if (!execution_.is_defined(lease.campaign) && !is_wanted) request(lease.campaign, now);
+  const auto num_values = static_cast<std::size_t>(lease.table_values_size());
+  if (!agrees_on_table(campaign, num_values / lease.num_runs())) return;
+  if (!ranges.empty()) execution_.submit(lease, ranges);
+  for (const RunIndex run : indices_of(ranges)) unfinished_[{campaign, run}] = {lease.attempt()};
+  const bool is_wanted = wanted_.contains(campaign);
+  if (!execution_.is_defined(campaign) && !is_wanted) request(campaign, now);
 }
 
-template <>
-void Conversation::handle(const wire::Retract& retract, const wire::Header&, TimePoint) {
-  give_back(wire::LossReason::retracted, retract.campaign,
-            execution_.drop_waiting(retract.campaign, retract.ranges));
-}
-
-template <>
-void Conversation::handle(const wire::ResultAck& ack, const wire::Header&, TimePoint) {
-  unacknowledged_.drop(ack.campaign, ack.runs);
-  leave_if_done();
-}
-
-template <>
-void Conversation::handle(const wire::Drain&, const wire::Header&, TimePoint now) {
-  if (!leaving_) begin_to_leave({.reason = wire::LossReason::drained, .deadline = {}}, now);
-}
-
-template <>
-void Conversation::handle(const wire::Stop&, const wire::Header&, TimePoint) {
-  execution_.abandon();
-  end(Ending::Kind::done, "told to stop");
-}
-
-template <>
-void Conversation::handle(const wire::HeartbeatAck&, const wire::Header&, TimePoint) {}
-
-void Conversation::on_packet(const wire::Packet& packet, TimePoint now) {
+void Conversation::on_message(const proto::Envelope& message, TimePoint now) {
   // Who is refused before a session could be read is told so with another one.
-  const bool is_reject = std::holds_alternative<wire::Reject>(packet.message);
-  if (ending_ || (packet.header.session != session_ && !is_reject)) return;
+  if (ending_ || (message.session() != session_.value && !message.has_reject())) return;
   heard_at_ = now;
-  const bool is_about_registration =
-      is_reject || std::holds_alternative<wire::Welcome>(packet.message);
+  const bool is_about_registration = message.has_reject() || message.has_welcome();
   // What another coordinator process has said before it ended means nothing to the present one.
-  if (!is_about_registration && packet.header.epoch != epoch_) return;
-  // What only workers say is none of its business.
-  (void)wire::visit_if<wire::CoordinatorMessage>(
-      packet.message, [&](const auto& content) { handle(content, packet.header, now); });
+  if (!is_about_registration && message.epoch() != epoch_.value) return;
+  handle(message, now);
+}
+
+void Conversation::handle(const proto::Envelope& message, TimePoint now) {
+  switch (message.from_coordinator_case()) {
+    case proto::Envelope::kWelcome:
+      return on_welcome(message, now);
+    case proto::Envelope::kReject:
+      return on_reject(message, now);
+    case proto::Envelope::kDefinitionPart:
+      return on_definition_part(message.definition_part(), now);
+    case proto::Envelope::kForget:
+      return on_forget(message.forget());
+    case proto::Envelope::kNotServed:
+      return on_not_served(message.not_served());
+    case proto::Envelope::kRunLease:
+      return on_lease(message.run_lease(), now);
+    case proto::Envelope::kRetract: {
+      const wire::CampaignId campaign{message.retract().campaign()};
+      const std::vector<RunRange> ranges = wire::ranges_of(message.retract().ranges());
+      return give_back(wire::LossReason::retracted, campaign,
+                       execution_.drop_waiting(campaign, ranges));
+    }
+    case proto::Envelope::kResultAck:
+      unacknowledged_.drop({message.result_ack().campaign()}, wire::runs_of(message.result_ack()));
+      return leave_if_done();
+    case proto::Envelope::kDrain:
+      if (!leaving_) begin_to_leave({.reason = wire::LossReason::drained, .deadline = {}}, now);
+      return;
+    case proto::Envelope::kStop:
+      execution_.abandon();
+      return end(Ending::Kind::done, "told to stop");
+    case proto::Envelope::kHeartbeatAck:
+      return;
+    case proto::Envelope::FROM_COORDINATOR_NOT_SET:
+      return;  // What only workers say is none of its business.
+  }
 }
 
 // What happens here.
@@ -221,7 +214,7 @@ void Conversation::on_progress(TimePoint now) {
   if (ending_) return;
   const std::vector<RunKey> runs = keep_finished(now);
   if (const auto failure = execution_.failure()) {
-    if (is_registered_) send(wire::Bye{wire::LossReason::failed});
+    say_bye(wire::LossReason::failed);
     return end(Ending::Kind::failed, *failure);
   }
   if (is_registered_) send_results(unacknowledged_.take(runs, now));
@@ -259,12 +252,11 @@ void Conversation::on_tick(TimePoint now) {
 
 // Registration.
 
-void Conversation::send(wire::Message message) {
-  const bool is_hello = std::holds_alternative<wire::Hello>(message);
-  send_({.header = {.session = session_,
-                    .epoch = is_hello ? wire::Epoch{} : epoch_,
-                    .sequence = ++num_sent_},
-         .message = std::move(message)});
+void Conversation::send(proto::Envelope message) {
+  message.set_session(session_.value);
+  message.set_epoch(message.has_hello() ? 0 : epoch_.value);
+  message.set_sequence(++num_sent_);
+  send_(std::move(message));
 }
 
 void Conversation::register_again(TimePoint now) {
@@ -275,28 +267,30 @@ void Conversation::register_again(TimePoint now) {
 
 /// What stands in the way may pass: there are too many workers, a person releases the host, or the
 /// list of keys was cut off for a moment.
-void Conversation::come_again(const wire::Reject& reject, TimePoint now) {
+void Conversation::come_again(const proto::Reject& reject, TimePoint now) {
   if (std::exchange(is_refused_, true)) return;  // The answer to a repeated Hello.
   if (now - refused_at_ >= config_.refusal_memory) refusal_delay_ = config_.refusal_delay;
   refused_at_ = now;
   is_registered_ = false;
-  is_closed_out_ = reject.reason == wire::RejectReason::malformed || revocation_;
+  is_closed_out_ = reject.reason() == proto::REJECT_REASON_MALFORMED || revocation_;
   const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
   hello_due_at_ = now + times(1.0 + jitter, refusal_delay_);
   hello_delay_ = config_.hello_delay;
   refusal_delay_ = std::min(2 * refusal_delay_, config_.refusal_delay_max);
-  if (!noted_refusals_.insert(reject.reason).second) return;
+  if (!noted_refusals_.insert(reject.reason()).second) return;
   const std::string how =
       fmt::format("(asks again every {} to {} s)", whole_seconds(config_.refusal_delay),
                   whole_seconds(config_.refusal_delay_max));
   note({.severity = wire::Severity::error,
         .kind = "refused",
-        .fields = {wire::Field::reason(reject.text), wire::Field::remark(how)}});
+        .fields = {wire::Field::reason(reject.text()), wire::Field::remark(how)}});
 }
 
 void Conversation::say_hello(TimePoint now) {
   is_refused_ = false;
-  send(hello_);
+  proto::Envelope envelope;
+  *envelope.mutable_hello() = hello_;
+  send(std::move(envelope));
   const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
   hello_due_at_ = now + times(1.0 + jitter, hello_delay_);
   hello_delay_ = std::min(2 * hello_delay_, config_.hello_delay_max);
@@ -322,19 +316,23 @@ void Conversation::send_heartbeat(TimePoint now) {
   held.reserve(unfinished_.size() + unacknowledged_.size());
   for (const auto& [key, attempt] : unfinished_) held.push_back({key.first, attempt, key.second});
   unacknowledged_.list(held, aside);
-  wire::Heartbeat heartbeat{.num_runs_max = credit(),
-                            .num_steps_done = execution_.num_steps_done(),
-                            .held = grouped(std::move(held), wire::ranges_per_message_max),
-                            .computing = {}};
+  proto::Envelope envelope;
+  proto::Heartbeat& heartbeat = *envelope.mutable_heartbeat();
+  heartbeat.set_num_runs_max(credit());
+  heartbeat.set_num_steps_done(execution_.num_steps_done());
+  *heartbeat.mutable_held() = grouped(std::move(held), wire::ranges_per_message_max);
   // Runs that are not listed here may be lent to others as well; runs not listed above are.
-  const std::size_t room = wire::ranges_per_message_max - num_ranges(heartbeat.held);
-  heartbeat.set_aside = grouped(std::move(aside), room);
+  const std::size_t room = wire::ranges_per_message_max - num_ranges(heartbeat.held());
+  *heartbeat.mutable_set_aside() = grouped(std::move(aside), room);
   reported_batches_.clear();
-  for (RunningBatch& batch : execution_.computing()) {
+  for (const RunningBatch& batch : execution_.computing()) {
     reported_batches_.push_back(batch.number);
-    heartbeat.computing.push_back(std::move(batch.progress));
+    proto::ComputedBatch& message = *heartbeat.add_computing();
+    message.set_campaign(batch.campaign.value);
+    message.set_num_steps_done(batch.num_steps_done);
+    wire::add_ranges(batch.ranges, *message.mutable_ranges());
   }
-  send(std::move(heartbeat));
+  send(std::move(envelope));
 }
 
 /// If the process crashes, the runs that were being computed are blamed: the coordinator should
@@ -349,7 +347,10 @@ bool Conversation::computes_other_batches() const {
 void Conversation::request(wire::CampaignId campaign, TimePoint now) {
   WantedDefinition& wanted = wanted_[campaign];
   wanted.request_due_at = now + config_.request_interval;
-  send(wire::CampaignRequest{.campaign = campaign, .offset = wanted.incoming.num_bytes()});
+  proto::Envelope envelope;
+  envelope.mutable_campaign_request()->set_campaign(campaign.value);
+  envelope.mutable_campaign_request()->set_offset(wanted.incoming.num_bytes());
+  send(std::move(envelope));
 }
 
 void Conversation::request_definitions(TimePoint now) {
@@ -394,13 +395,13 @@ bool Conversation::agrees_on_table(wire::CampaignId campaign, std::size_t width)
 
 /// Those runs of the lease that are not here. Of the others, the attempt may have grown: they were
 /// taken from this worker and lent to it again.
-std::vector<RunRange> Conversation::new_runs(const wire::RunLease& lease) {
+std::vector<RunRange> Conversation::new_runs(const proto::RunLease& lease) {
   std::vector<RunIndex> runs;
-  for (const RunIndex run : indices_of(std::array{lease.runs})) {
-    const RunKey key{lease.campaign, run};
+  for (const RunIndex run : indices_of(std::array{wire::runs_of(lease)})) {
+    const RunKey key{{lease.campaign()}, run};
     const auto found = unfinished_.find(key);
     if (found != unfinished_.end()) {
-      found->second = std::max(found->second, lease.attempt);
+      found->second = std::max(found->second, wire::Attempt{lease.attempt()});
     } else if (!unacknowledged_.contains(key)) {
       runs.push_back(run);
     }
@@ -442,8 +443,12 @@ std::vector<RunKey> Conversation::keep_finished(TimePoint now) {
   return runs;
 }
 
-void Conversation::send_results(std::vector<wire::ResultBatch> batches) {
-  for (wire::ResultBatch& batch : batches) send(std::move(batch));
+void Conversation::send_results(std::vector<proto::ResultBatch> batches) {
+  for (proto::ResultBatch& batch : batches) {
+    proto::Envelope envelope;
+    *envelope.mutable_result_batch() = std::move(batch);
+    send(std::move(envelope));
+  }
 }
 
 void Conversation::send_all_results(TimePoint now) {
@@ -462,7 +467,11 @@ void Conversation::give_back(wire::LossReason reason, wire::CampaignId campaign,
   }
   // Without a registration, the next heartbeat says the same by not naming them.
   if (held.empty() || !is_registered_) return;
-  send(wire::GiveBack{reason, grouped(std::move(held), wire::ranges_per_message_max)});
+  proto::Envelope envelope;
+  proto::GiveBack& answer = *envelope.mutable_give_back();
+  answer.set_reason(wire::message_value(reason));
+  *answer.mutable_runs() = grouped(std::move(held), wire::ranges_per_message_max);
+  send(std::move(envelope));
 }
 
 }  // namespace proofmass::worker

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/proofmass.pb.h"
 #include "proto/text/event.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "proto/wire/messages.hpp"
@@ -68,18 +69,19 @@ struct ConversationConfig {
 /// and after the next Welcome a heartbeat names them all.
 class Conversation {
  public:
-  using Send = std::function<void(const wire::Packet&)>;
+  using Send = std::function<void(proto::Envelope)>;
 
   /// @param session    Random; jitter follows from it, too.
   /// @param execution  Must outlive this object.
   /// @param send       May lose messages.
-  Conversation(wire::SessionId session, wire::Hello hello, Execution& execution, Send send,
+  Conversation(wire::SessionId session, proto::Hello hello, Execution& execution, Send send,
                TimePoint now, const ConversationConfig& config = {});
 
   /// Takes over results of a process before this one, to be delivered first.
   void restore(std::vector<wire::LeasedResult> results);
 
-  void on_packet(const wire::Packet& packet, TimePoint now);
+  /// @param message  decode() has returned it.
+  void on_message(const proto::Envelope& message, TimePoint now);
   /// Messages sent before had nowhere to go.
   void on_connected(TimePoint now);
   /// True, once, if nothing more is heard on the present connection: another one is to be made.
@@ -128,25 +130,30 @@ class Conversation {
     std::optional<TimePoint> deadline;  ///< Nothing: as long as it takes.
   };
 
-  /// Has a specialisation for each of wire::CoordinatorMessage.
-  template <typename Content>
-  void handle(const Content&, const wire::Header&, TimePoint) = delete;
+  /// Does what a message of the present coordinator says.
+  void handle(const proto::Envelope& message, TimePoint now);
+  void on_welcome(const proto::Envelope& message, TimePoint now);
+  void on_reject(const proto::Envelope& message, TimePoint now);
+  void on_definition_part(const proto::DefinitionPart& part, TimePoint now);
+  void on_forget(const proto::Forget& forget);
+  void on_not_served(const proto::NotServed& not_served);
+  void on_lease(const proto::RunLease& lease, TimePoint now);
 
-  void send(wire::Message message);
+  void send(proto::Envelope message);
   void say_hello(TimePoint now);
   void register_again(TimePoint now);
-  void come_again(const wire::Reject& reject, TimePoint now);
+  void come_again(const proto::Reject& reject, TimePoint now);
   void request(wire::CampaignId campaign, TimePoint now);
   void request_definitions(TimePoint now);
   void define(wire::CampaignId campaign, TimePoint now);
   [[nodiscard]] bool agrees_on_table(wire::CampaignId campaign, std::size_t width);
-  [[nodiscard]] std::vector<RunRange> new_runs(const wire::RunLease& lease);
+  [[nodiscard]] std::vector<RunRange> new_runs(const proto::RunLease& lease);
   void send_heartbeat(TimePoint now);
   [[nodiscard]] bool computes_other_batches() const;
   [[nodiscard]] std::uint32_t credit() const;
   void set_aside(wire::CampaignId campaign, std::span<const RunRange> ranges);
   [[nodiscard]] std::vector<RunKey> keep_finished(TimePoint now);
-  void send_results(std::vector<wire::ResultBatch> batches);
+  void send_results(std::vector<proto::ResultBatch> batches);
   void send_all_results(TimePoint now);
   void watch_time(TimePoint now);
   void watch_idleness(TimePoint now);
@@ -160,11 +167,12 @@ class Conversation {
                  std::span<const RunIndex> runs);
   void leave_if_done();
   void leave(const std::string& reason);
+  void say_bye(wire::LossReason reason);
   void end(Ending::Kind kind, std::string reason);
   void note(wire::Event event);
 
   wire::SessionId session_;
-  wire::Hello hello_;
+  proto::Hello hello_;
   Execution& execution_;
   Send send_;
   ConversationConfig config_;
@@ -181,7 +189,7 @@ class Conversation {
   bool is_refused_ = false;             ///< Since the last Hello.
   Duration refusal_delay_{};
   TimePoint refused_at_;
-  std::set<wire::RejectReason> noted_refusals_;                  ///< Since the last Welcome.
+  std::set<proto::RejectReason> noted_refusals_;                 ///< Since the last Welcome.
   std::optional<std::pair<TimePoint, std::string>> revocation_;  ///< The first one since then.
   bool is_closed_out_ = false;  ///< The next Hello needs another connection.
   bool wants_connection_ = false;

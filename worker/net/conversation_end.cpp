@@ -6,6 +6,7 @@
 
 #include "core/math/hash.hpp"
 #include "core/runs.hpp"
+#include "proto/wire/conversions.hpp"
 #include "worker/net/conversation.hpp"
 
 // How a conversation ends. While it does, it takes no more runs.
@@ -90,7 +91,7 @@ void Conversation::give_back_late_batches(TimePoint now) {
     const bool is_late =
         now >= finished_by || (batch.time_left && now + *batch.time_left > finished_by);
     if (!is_late || !execution_.drop_batch(batch.number)) continue;
-    give_back(leaving_->reason, batch.progress.campaign, indices_of(batch.progress.ranges));
+    give_back(leaving_->reason, batch.campaign, indices_of(batch.ranges));
   }
 }
 
@@ -100,8 +101,15 @@ void Conversation::leave_if_done() {
 }
 
 void Conversation::leave(const std::string& reason) {
-  if (is_registered_) send(wire::Bye{leaving_->reason});
+  say_bye(leaving_->reason);
   end(Ending::Kind::done, reason);
+}
+
+void Conversation::say_bye(wire::LossReason reason) {
+  if (!is_registered_) return;
+  proto::Envelope envelope;
+  envelope.mutable_bye()->set_reason(wire::message_value(reason));
+  send(std::move(envelope));
 }
 
 /// As many as a log can take in at a time; the caller takes them at once.

@@ -45,12 +45,14 @@ class CoordinatorLink {
   [[nodiscard]] std::optional<std::string> take_refusal();
 
  private:
-  class Impl;
-  [[nodiscard]] std::unique_ptr<Impl> make_impl() const;
+  struct Connection;
+  void connect();
+  void transmit_due(TimePoint now);
+  void transmit(const std::string& bytes);
 
   std::string endpoint_;
   wire::ClientSecurity security_;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Connection> connection_;
 };
 
 }  // namespace proofmass::worker

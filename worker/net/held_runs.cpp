@@ -2,26 +2,39 @@
 
 #include <algorithm>
 
+#include "proto/wire/conversions.hpp"
+
 namespace proofmass::worker {
 
-std::vector<wire::HeldRuns> grouped(std::vector<HeldRun> runs, std::size_t num_ranges_max) {
+HeldRunsList grouped(std::vector<HeldRun> runs, std::size_t num_ranges_max) {
   std::sort(runs.begin(), runs.end());
-  std::vector<wire::HeldRuns> groups;
+  HeldRunsList groups;
+  proto::HeldRuns* group = nullptr;
+  proto::Range* range = nullptr;
   std::size_t num_ranges = 0;
   for (const HeldRun& held : runs) {
-    const bool is_of_last = !groups.empty() && groups.back().campaign == held.campaign &&
-                            groups.back().attempt == held.attempt;
-    const bool is_in_last = is_of_last && groups.back().ranges.back().end() == held.run.value;
-    if (!is_in_last && num_ranges++ == num_ranges_max) break;
-    if (!is_of_last) groups.push_back({held.campaign, held.attempt, {}});
-    append(groups.back().ranges, held.run);
+    const bool is_of_group = group != nullptr && group->campaign() == held.campaign.value &&
+                             group->attempt() == held.attempt.value;
+    if (is_of_group && range->first() + range->count() == held.run.value) {
+      range->set_count(range->count() + 1);
+      continue;
+    }
+    if (num_ranges++ == num_ranges_max) break;
+    if (!is_of_group) {
+      group = groups.Add();
+      group->set_campaign(held.campaign.value);
+      group->set_attempt(held.attempt.value);
+    }
+    range = group->add_ranges();
+    range->set_first(held.run.value);
+    range->set_count(1);
   }
   return groups;
 }
 
-std::size_t num_ranges(const std::vector<wire::HeldRuns>& held) {
+std::size_t num_ranges(const HeldRunsList& held) {
   std::size_t count = 0;
-  for (const wire::HeldRuns& runs : held) count += runs.ranges.size();
+  for (const proto::HeldRuns& runs : held) count += static_cast<std::size_t>(runs.ranges_size());
   return count;
 }
 
@@ -74,7 +87,7 @@ void UnacknowledgedResults::make_due(TimePoint now) {
   }
 }
 
-std::vector<wire::ResultBatch> UnacknowledgedResults::take_due(TimePoint now) {
+std::vector<proto::ResultBatch> UnacknowledgedResults::take_due(TimePoint now) {
   std::vector<RunKey> runs;
   for (const auto& [key, kept] : results_) {
     if (runs.size() == wire::runs_per_lease_max) break;
@@ -83,24 +96,16 @@ std::vector<wire::ResultBatch> UnacknowledgedResults::take_due(TimePoint now) {
   return take(runs, now);
 }
 
-std::vector<wire::ResultBatch> UnacknowledgedResults::take(std::span<const RunKey> runs,
-                                                           TimePoint now) {
-  std::vector<wire::ResultBatch> full;
-  std::map<std::pair<wire::CampaignId, wire::Attempt>, wire::ResultBatch> batches;
+std::vector<proto::ResultBatch> UnacknowledgedResults::take(std::span<const RunKey> runs,
+                                                            TimePoint now) {
+  wire::ResultBatches batches;
   for (const RunKey& run : runs) {
     Kept& kept = results_.at(run);
-    wire::ResultBatch& batch = batches[{run.first, kept.attempt}];
-    batch.campaign = run.first;
-    batch.attempt = kept.attempt;
-    batch.results.push_back(kept.computed);
+    batches.add(run.first, kept.attempt, kept.computed);
     kept.due_at = now + kept.resend_after;
     kept.resend_after = std::min(2 * kept.resend_after, resend_after_max_);
-    if (batch.results.size() < wire::runs_per_lease_max) continue;
-    full.push_back(std::move(batch));
-    batches.erase({run.first, kept.attempt});
   }
-  for (auto& [key, batch] : batches) full.push_back(std::move(batch));
-  return full;
+  return batches.take();
 }
 
 std::vector<wire::LeasedResult> UnacknowledgedResults::all() const {

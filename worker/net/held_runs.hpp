@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/proofmass.pb.h"
 #include "proto/wire/messages.hpp"
 #include "worker/execution/execution.hpp"
 
@@ -21,13 +22,14 @@ struct HeldRun {
   auto operator<=>(const HeldRun&) const = default;
 };
 
+using HeldRunsList = google::protobuf::RepeatedPtrField<proto::HeldRuns>;
+
 /// Runs by campaign and attempt, with the first `num_ranges_max` of their ranges.
 /// @param runs  In any order, each once.
-[[nodiscard]] std::vector<wire::HeldRuns> grouped(std::vector<HeldRun> runs,
-                                                  std::size_t num_ranges_max);
+[[nodiscard]] HeldRunsList grouped(std::vector<HeldRun> runs, std::size_t num_ranges_max);
 
 /// Number of ranges of all of them together.
-[[nodiscard]] std::size_t num_ranges(const std::vector<wire::HeldRuns>& held);
+[[nodiscard]] std::size_t num_ranges(const HeldRunsList& held);
 
 /// A run of any campaign.
 using RunKey = std::pair<wire::CampaignId, RunIndex>;
@@ -58,9 +60,9 @@ class UnacknowledgedResults {
   /// All results are to be sent at once, and then again as if for the first time.
   void make_due(TimePoint now);
   /// The results that are due, as messages; one message's worth of them at most.
-  [[nodiscard]] std::vector<wire::ResultBatch> take_due(TimePoint now);
+  [[nodiscard]] std::vector<proto::ResultBatch> take_due(TimePoint now);
   /// These results as messages. @pre All of them are here.
-  [[nodiscard]] std::vector<wire::ResultBatch> take(std::span<const RunKey> runs, TimePoint now);
+  [[nodiscard]] std::vector<proto::ResultBatch> take(std::span<const RunKey> runs, TimePoint now);
 
   [[nodiscard]] bool contains(const RunKey& run) const { return results_.contains(run); }
   [[nodiscard]] bool empty() const { return results_.empty(); }

@@ -104,8 +104,9 @@ class Service {
         wait_max_(link_.has_faults() ? fault_interval : tick_interval),
         conversation_(
             config.session, config.hello, execution,
-            [this](const wire::Packet& packet) { send(packet); }, time_now(), config.conversation),
-        keeping_(config.spool, config.hello.model_version, conversation_, log_) {}
+            [this](proto::Envelope message) { send(std::move(message)); }, time_now(),
+            config.conversation),
+        keeping_(config.spool, config.hello.model_version(), conversation_, log_) {}
 
   Ending run() {
     TimePoint tick_at = time_now();
@@ -151,22 +152,18 @@ class Service {
                    .kind = "malformed_message",
                    .fields = {Field::remark(error->text)}});
     }
-    const auto& packet = std::get<wire::Packet>(decoded);
-    if (std::holds_alternative<wire::RunLease>(packet.message)) {
-      wire::kill_point(wire::KillPoint::after_lease);
-    }
+    const auto& message = std::get<proto::Envelope>(decoded);
+    if (message.has_run_lease()) wire::kill_point(wire::KillPoint::after_lease);
     const bool was_registered = conversation_.is_registered();
-    conversation_.on_packet(packet, now);
+    conversation_.on_message(message, now);
     if (conversation_.is_registered() && !was_registered) log_({.kind = "registered"});
   }
 
-  void send(const wire::Packet& packet) {
-    const bool has_results = std::holds_alternative<wire::ResultBatch>(packet.message);
+  void send(proto::Envelope message) {
+    const bool has_results = message.has_result_batch();
     if (has_results) wire::kill_point(wire::KillPoint::before_result);
-    if (std::holds_alternative<wire::Bye>(packet.message)) {
-      wire::kill_point(wire::KillPoint::before_bye);
-    }
-    link_.send(wire::encode(packet), time_now());
+    if (message.has_bye()) wire::kill_point(wire::KillPoint::before_bye);
+    link_.send(wire::encode(std::move(message)), time_now());
     if (has_results) wire::kill_point(wire::KillPoint::after_result);
   }
 

@@ -18,7 +18,7 @@ struct ServeConfig {
   std::string endpoint;  ///< wire::check_endpoint() holds.
   wire::ClientSecurity security;
   wire::SessionId session;  ///< Random, not 0.
-  wire::Hello hello;
+  proto::Hello hello;
   ConversationConfig conversation;
   SignalSource signals = SignalSource::anyone;
   std::optional<std::filesystem::path> spool;  ///< Where results survive this process.

@@ -6,7 +6,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <map>
 #include <utility>
 #include <variant>
 
@@ -14,14 +13,13 @@
 #include "core/math/hash.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/codec.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {
 
 constexpr std::size_t size_bytes = 4;
 constexpr std::size_t checksum_bytes = 8;
-/// No message travels by this header: the conversation makes the one that does.
-constexpr wire::Header record_header{.session = {1}, .epoch = {}, .sequence = 0};
 
 std::string little_endian(std::uint64_t value, std::size_t num_bytes) {
   std::string bytes;
@@ -37,8 +35,11 @@ std::uint64_t from_little_endian(std::string_view bytes) {
   return value;
 }
 
-std::string record_of(const wire::ResultBatch& batch) {
-  const std::string payload = wire::encode({.header = record_header, .message = batch});
+std::string record_of(proto::ResultBatch batch) {
+  proto::Envelope envelope;
+  envelope.set_session(1);  // No message travels by it: the conversation makes the one that does.
+  *envelope.mutable_result_batch() = std::move(batch);
+  const std::string payload = wire::encode(std::move(envelope));
   return little_endian(payload.size(), size_bytes) + little_endian(fnv1a(payload), checksum_bytes) +
          payload;
 }
@@ -55,26 +56,11 @@ std::optional<std::string_view> payload_at(std::string_view bytes) {
   return payload;
 }
 
-std::optional<wire::ResultBatch> batch_from(std::string_view payload) {
-  const auto decoded = wire::decode(payload);
-  const auto* const packet = std::get_if<wire::Packet>(&decoded);
-  if (packet == nullptr) return std::nullopt;
-  const auto* const batch = std::get_if<wire::ResultBatch>(&packet->message);
-  return batch == nullptr ? std::nullopt : std::optional(*batch);
-}
-
-std::vector<wire::ResultBatch> batches_of(std::span<const wire::LeasedResult> results) {
-  std::vector<wire::ResultBatch> batches;
-  std::map<std::pair<wire::CampaignId, wire::Attempt>, std::size_t> open;
-  for (const wire::LeasedResult& result : results) {
-    const std::pair key(result.campaign, result.attempt);
-    const auto [entry, is_new] = open.try_emplace(key, batches.size());
-    if (is_new) batches.push_back({result.campaign, result.attempt, {}});
-    wire::ResultBatch& batch = batches[entry->second];
-    batch.results.push_back(result.computed);
-    if (batch.results.size() == wire::runs_per_lease_max) open.erase(key);
-  }
-  return batches;
+std::optional<proto::ResultBatch> batch_from(std::string_view payload) {
+  auto decoded = wire::decode(payload);
+  auto* const envelope = std::get_if<proto::Envelope>(&decoded);
+  if (envelope == nullptr || !envelope->has_result_batch()) return std::nullopt;
+  return std::move(*envelope->mutable_result_batch());
 }
 
 }  // namespace
@@ -135,8 +121,8 @@ void Spool::read_records(std::string_view content) {
   while (const auto payload = payload_at(content.substr(size_))) {
     const auto batch = batch_from(*payload);
     if (!batch) break;
-    for (const wire::ComputedRun& computed : batch->results) {
-      former_results_.push_back({batch->campaign, batch->attempt, computed});
+    for (const proto::ComputedRun& run : batch->results()) {
+      former_results_.push_back({{batch->campaign()}, {batch->attempt()}, wire::computed_run(run)});
     }
     size_ += size_bytes + checksum_bytes + payload->size();
   }
@@ -147,7 +133,11 @@ void Spool::read_records(std::string_view content) {
 
 std::optional<std::string> Spool::append(std::span<const wire::LeasedResult> results) {
   std::string records;
-  for (const wire::ResultBatch& batch : batches_of(results)) records += record_of(batch);
+  wire::ResultBatches batches;
+  for (const auto& [campaign, attempt, computed] : results) {
+    batches.add(campaign, attempt, computed);
+  }
+  for (proto::ResultBatch& batch : batches.take()) records += record_of(std::move(batch));
   return write(records);
 }
 

@@ -17,6 +17,7 @@
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -56,7 +57,7 @@ class Supervisor {
   }
 
   int run() {
-    std::optional<wire::FormerSession> former;
+    std::optional<proto::FormerSession> former;
     while (true) {
       const ChildStart start{.session = random_session(), .former = former};
       const std::uint64_t num_killed_before = wire::num_oom_kills();
@@ -110,15 +111,17 @@ class Supervisor {
 
   /// A child that somebody killed, or that hung, says nothing against its runs: the coordinator
   /// hears no more of it, or has told it to end.
-  static std::optional<wire::FormerSession> former_session(wire::SessionId session, int status,
-                                                           bool is_memory_short) {
+  static std::optional<proto::FormerSession> former_session(wire::SessionId session, int status,
+                                                            bool is_memory_short) {
     const wire::LossReason reason = wire::reason_of_end(status, is_memory_short);
     if (reason == wire::LossReason::failed || reason == wire::LossReason::preempted) {
       return std::nullopt;
     }
-    return wire::FormerSession{.session = session,
-                               .reason = reason,
-                               .signal = static_cast<std::uint32_t>(WTERMSIG(status))};
+    proto::FormerSession former;
+    former.set_session(session.value);
+    former.set_reason(wire::message_value(reason));
+    former.set_signal(static_cast<std::uint32_t>(WTERMSIG(status)));
+    return former;
   }
 
   /// False if it was asked to end meanwhile.

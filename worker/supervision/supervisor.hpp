@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "proto/proofmass.pb.h"
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -40,7 +41,7 @@ class RestartPolicy {
 /// What a child process begins with.
 struct ChildStart {
   wire::SessionId session;
-  std::optional<wire::FormerSession> former;  ///< How the child before it crashed, if it did.
+  std::optional<proto::FormerSession> former;  ///< How the child before it crashed, if it did.
 };
 
 /// Signal by which a supervisor hands on to its child that it was asked to end; the value that

@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/json_output.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {

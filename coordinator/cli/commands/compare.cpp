@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/archive/comparison.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 
 namespace proofmass::coordinator {

@@ -5,7 +5,7 @@
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "core/campaign/name.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -23,17 +23,24 @@ struct ControlOptions {
   int priority = 0;  ///< For set_priority.
 };
 
-int control_campaign(const ControlOptions& options) {
-  const wire::ControlRequest request{.action = options.action,
-                                     .campaign = checked_campaign_name(options.campaign),
-                                     .priority = options.priority};
-  return with_connection(options.client, [&](const Ask& ask) {
-    const auto done = reply_of<wire::DoneReply>(ask, request);
-    const bool is_json = options.client.format == OutputFormat::json;
-    print_lines(is_json ? done_json(wire::name_of(request.action), request.campaign, done)
-                        : done.text + "\n");
+int print_done(const ClientOptions& client, const proto::RequestEnvelope& request,
+               const ActionTaken& action) {
+  return with_connection(client, [&](const Ask& ask) {
+    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kDone);
+    print_lines(done_text(reply.done(), action, client.format));
     return exit_done;
   });
+}
+
+int control_campaign(const ControlOptions& options) {
+  proto::RequestEnvelope request;
+  proto::ControlRequest& control = *request.mutable_control();
+  control.set_action(static_cast<proto::ControlAction>(options.action));
+  control.set_campaign(checked_campaign_name(options.campaign));
+  control.set_priority(options.priority);
+  return print_done(
+      options.client, request,
+      {.name = wire::name_of(options.action), .kind = "campaign", .target = options.campaign});
 }
 
 void add_action(CLI::App& app, Command& chosen, ControlAction action,
@@ -59,13 +66,10 @@ int release_host(const ReleaseOptions& options) {
   if (!wire::is_name(options.host)) {
     throw UsageError(fmt::format("host = \"{}\" ({})", options.host, is_name_rule));
   }
-  return with_connection(options.client, [&](const Ask& ask) {
-    const auto done =
-        reply_of<wire::DoneReply>(ask, wire::ReleaseHostRequest{.host = options.host});
-    const bool is_json = options.client.format == OutputFormat::json;
-    print_lines(is_json ? released_json(options.host, done) : done.text + "\n");
-    return exit_done;
-  });
+  proto::RequestEnvelope request;
+  request.mutable_release_host()->set_host(options.host);
+  return print_done(options.client, request,
+                    {.name = "release", .kind = "host", .target = options.host});
 }
 
 }  // namespace

@@ -5,9 +5,8 @@
 #include <map>
 #include <string>
 
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -10,17 +10,15 @@
 #include <string>
 #include <thread>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/factory/batch_system.hpp"
-#include "coordinator/factory/carry_out.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -43,13 +41,11 @@ constexpr std::chrono::seconds start_margin{60};
 struct FactoryOptions {
   ClientOptions client;
   BatchSystem system;
-  FactoryConfig factory;
+  FactoryConfig factory;  ///< But for the walltime and the worker's command.
   std::string worker_endpoint;
   std::string worker_keys;
   std::string start_command;
   std::string wrap_command;
-  std::optional<unsigned> num_processors;
-  std::vector<std::string> submit_options;
   std::uint64_t walltime_min = 480;
   std::uint64_t idle_timeout_s = 300;
   std::uint64_t interval_s = 30;
@@ -79,20 +75,10 @@ std::string worker_command(const FactoryOptions& options) {
   if (!options.worker_keys.empty()) {
     command += " --keys " + wire::shell_word(checked_line("worker-keys", options.worker_keys));
   }
-  if (options.num_processors) command += fmt::format(" --threads {}", *options.num_processors);
-  return command;
-}
-
-AllocationConfig allocation_config(const FactoryOptions& options) {
-  AllocationConfig config{.name = options.factory.name,
-                          .worker_command = worker_command(options),
-                          .walltime = std::chrono::minutes(options.walltime_min),
-                          .num_processors = options.num_processors,
-                          .options = {}};
-  for (const std::string& option : options.submit_options) {
-    config.options.push_back(checked_line("submit-option", option));
+  if (const auto num_processors = options.factory.num_processors) {
+    command += fmt::format(" --threads {}", *num_processors);
   }
-  return config;
+  return command;
 }
 
 FactoryConfig checked(const FactoryOptions& options) {
@@ -108,10 +94,14 @@ FactoryConfig checked(const FactoryOptions& options) {
     throw UsageError(fmt::format("--workers-min = {} (must be at most --workers-max, {})",
                                  config.workers_min, config.workers_max));
   }
+  config.worker_command = worker_command(options);
+  for (const std::string& option : config.submit_options) {
+    (void)checked_line("submit-option", option);
+  }
   return config;
 }
 
-int show_submission(const BatchSystem& system, const AllocationConfig& config) {
+int show_submission(const BatchSystem& system, const FactoryConfig& config) {
   const BatchCommand command = system.submission(config);
   std::string text;
   for (const std::string& argument : command.arguments) text += wire::shell_word(argument) + " ";
@@ -135,10 +125,9 @@ FactoryView view_of(const wire::StatusReply& status, const wire::WorkersReply& w
 /// Keeps workers for a coordinator; one object lives as long as the command.
 class FactoryLoop {
  public:
-  FactoryLoop(const FactoryOptions& options, const wire::Log& log)
+  FactoryLoop(const FactoryOptions& options, FactoryConfig config, const wire::Log& log)
       : options_(options),
-        config_(checked(options)),
-        allocation_(allocation_config(options)),
+        config_(std::move(config)),
         log_(log),
         report_(with_constants({.name = config_.name, .batch_system = {}})) {}
 
@@ -148,7 +137,9 @@ class FactoryLoop {
   bool advance() {
     try {
       ClientConnection connection(options_.client.connection);
-      const Ask ask = [&](const wire::ClientRequest& request) { return connection.ask(request); };
+      const Ask ask = [&](const proto::RequestEnvelope& request) {
+        return connection.ask(request);
+      };
       const wire::StatusReply status = whole_status(ask);
       const bool has_looked = look_at_queue(view_of(status, all_workers(ask)));
       report(ask);
@@ -182,14 +173,14 @@ class FactoryLoop {
   /// @return Whether the queue could be listed.
   bool look_at_queue(FactoryView view) {
     try {
-      view.allocations = options_.system.allocations_of(
-          allocation_, output_of(options_.system.listing(allocation_)));
+      const BatchSystem& system = options_.system;
+      view.allocations = allocations_of(system, config_, output_of(system.listing(config_)));
     } catch (const Error& error) {
       note_unlisted(error.what());
       return false;
     }
     carry_out(on_view(state_, config_, view, std::chrono::steady_clock::now(), log_), state_,
-              options_.system, allocation_, log_);
+              options_.system, config_, log_);
     const bool was_paused = report_.phase == wire::FactoryPhase::paused;
     report_ = with_constants(report_of(state_, config_, view, std::chrono::steady_clock::now()));
     if (report_.phase == wire::FactoryPhase::paused && !was_paused) {
@@ -210,9 +201,9 @@ class FactoryLoop {
 
   /// Nothing depends on the report, which an older coordinator does not know.
   void report(const Ask& ask) {
-    const wire::ClientReply reply = ask(report_);
-    const auto* const refusal = std::get_if<wire::ErrorReply>(&reply);
-    const std::string reason = refusal == nullptr ? "" : refusal->text;
+    proto::RequestEnvelope request;
+    wire::write(report_, *request.mutable_factory_report());
+    const std::string reason = ask(request).error().text();
     if (!reason.empty() && reason != refused_because_) {
       log_({.severity = wire::Severity::warning,
             .kind = "report_refused",
@@ -223,7 +214,6 @@ class FactoryLoop {
 
   const FactoryOptions& options_;
   FactoryConfig config_;
-  AllocationConfig allocation_;
   const wire::Log& log_;
   FactoryState state_;
   wire::FactoryReport report_;   ///< After the last look.
@@ -232,8 +222,8 @@ class FactoryLoop {
 
 int keep_workers(const FactoryOptions& options) {
   wire::ignore_broken_pipes();  // Workers are wanted also when nobody reads its log.
-  (void)checked(options);
-  if (options.is_dry_run) return show_submission(options.system, allocation_config(options));
+  const FactoryConfig config = checked(options);
+  if (options.is_dry_run) return show_submission(options.system, config);
   const bool is_json = options.client.format == OutputFormat::json;
   const wire::Log log =
       wire::make_log("proofmass-factory", is_json ? wire::LogFormat::json : wire::LogFormat::text,
@@ -242,7 +232,7 @@ int keep_workers(const FactoryOptions& options) {
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   (void)ClientConnection(options.client.connection);  // Wrong addresses and keys end it at once.
   warn_if_plain(options.client);
-  FactoryLoop loop(options, log);
+  FactoryLoop loop(options, config, log);
   while (stop == StopRequest::none) {
     const bool are_all_over = loop.advance();
     if (are_all_over && options.ends_when_done) return exit_done;
@@ -298,7 +288,7 @@ void add_workers_of(CLI::App& command, FactoryOptions& options) {
       ->check(wire::in_range(std::uint64_t{1}, std::uint64_t{24 * 3600}))
       ->capture_default_str();
   command
-      .add_option("--processors", options.num_processors,
+      .add_option("--processors", options.factory.num_processors,
                   "Processors of a worker; by default it has a\nnode of its own")
       ->check(wire::in_range(1U, 256U));
   command.add_option("--worker-start-cmd", options.start_command,
@@ -306,7 +296,7 @@ void add_workers_of(CLI::App& command, FactoryOptions& options) {
   command.add_option("--worker-wrap-cmd", options.wrap_command,
                      "Words before proofmass-worker, e.g.\n'apptainer exec proofmass.sif'");
   command
-      .add_option("--submit-option", options.submit_options,
+      .add_option("--submit-option", options.factory.submit_options,
                   "Further option of sbatch or qsub, or line of a\nsubmit description; repeatable")
       ->allow_extra_args(false);
 }

@@ -15,9 +15,7 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
@@ -149,9 +147,9 @@ void require_space(const std::filesystem::path& file, std::uint64_t size) {
 
 /// Completes the part. @throws Error if it is not what the coordinator announced; then it is gone,
 /// as it is if the disk is full: nobody else shall lack the space.
-void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer) {
-  if (answer.offset != part.size()) part.clear();
-  require_space(part.path(), answer.size - std::min(answer.size, part.size()));
+void complete(ArrivedPart& part, const Ask& ask, const proto::AnswerReply& answer) {
+  if (answer.offset() != part.size()) part.clear();
+  require_space(part.path(), answer.size() - std::min(answer.size(), part.size()));
   std::error_code ignored;
   try {
     read_answer(ask, answer, [&](std::string_view bytes) { part.append(bytes); });
@@ -160,7 +158,7 @@ void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer
     throw;
   }
   part.read_again();
-  if (part.sha256() == answer.sha256) return;
+  if (part.sha256() == answer.sha256()) return;
   std::filesystem::remove(part.path(), ignored);
   throw Error("the database is not the one that was announced; fetch it again");
 }
@@ -188,12 +186,10 @@ int fetch_database(const FetchOptions& options) {
   Store::check_absence(file);
   return with_connection(options.client, [&](const Ask& ask) {
     ArrivedPart part(std::filesystem::path(file).concat(".part"));
-    const auto answer = reply_of<wire::AnswerReply>(
-        ask, wire::AnswerRequest{.campaign = name,
-                                 .question = wire::Question::database,
-                                 .known_size = part.size(),
-                                 .known_sha256 = part.size() > 0 ? part.sha256() : ""});
-    complete(part, ask, answer);
+    proto::RequestEnvelope question = question_about(name, proto::QUESTION_DATABASE);
+    question.mutable_answer()->set_known_size(part.size());
+    if (part.size() > 0) question.mutable_answer()->set_known_sha256(part.sha256());
+    complete(part, ask, reply_of(ask, question, proto::ReplyEnvelope::kAnswer).answer());
     Store::check_absence(file);  // Again: completing it may have taken long.
     if (const int error = wire::publish_file(part.path(), file, wire::IfThere::keep); error != 0) {
       throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));

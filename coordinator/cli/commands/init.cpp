@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
+#include "coordinator/cli/output.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {

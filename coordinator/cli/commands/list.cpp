@@ -3,7 +3,7 @@
 
 #include "coordinator/archive/listing.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,9 +14,7 @@
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/json_output.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/report/report.hpp"
@@ -68,7 +67,7 @@ void require_sound(const std::filesystem::path& part, const MergeOptions& option
   const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
   std::string failing;
   const auto collect = [&](const Check& check) {
-    if (check.verdict == Verdict::fails) failing += "\n" + check_text(check);
+    if (check.verdict == CheckOutcome::fails) failing += "\n" + check_text(check);
   };
   if (verify(part, how, collect, is_stopped)) return;
   while (failing.ends_with('\n')) failing.pop_back();

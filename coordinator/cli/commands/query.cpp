@@ -1,3 +1,5 @@
+#include "coordinator/query/query.hpp"
+
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -20,11 +22,10 @@
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/query/bounded_query.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
@@ -124,14 +125,14 @@ int query_remotely(const QueryOptions& options) {
   }
   const auto format = std::ranges::find(formats(), options.format,
                                         &std::map<std::string, RowFormat>::value_type::second);
-  wire::AnswerRequest question{
-      .campaign = checked_campaign_name(options.database),
-      .question = wire::Question::query,
-      .options = {"--format=" + format->first, fmt::format("--timeout={}", options.timeout_s),
-                  fmt::format("--rows-max={}", options.num_rows_max)},
-      .statement = options.sql == "-" ? read_standard_input() : options.sql};
+  proto::RequestEnvelope question = question_about(options.database, proto::QUESTION_QUERY);
+  proto::AnswerRequest& asked = *question.mutable_answer();
+  asked.add_options("--format=" + format->first);
+  asked.add_options(fmt::format("--timeout={}", options.timeout_s));
+  asked.add_options(fmt::format("--rows-max={}", options.num_rows_max));
   const std::optional<std::size_t> columns = table_columns(options);
-  if (columns) question.options.push_back(fmt::format("--columns={}", *columns));
+  if (columns) asked.add_options(fmt::format("--columns={}", *columns));
+  asked.set_statement(options.sql == "-" ? read_standard_input() : options.sql);
   const bool is_for_people = options.format == RowFormat::table;
   return print_answer(options.connection, question,
                       is_for_people ? AnswerText::lines : AnswerText::bytes);

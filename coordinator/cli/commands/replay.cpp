@@ -7,15 +7,14 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/json_output.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"

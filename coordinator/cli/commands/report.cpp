@@ -14,17 +14,15 @@
 #include "coordinator/archive/replayed_spectra.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/requirements_file.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/override_options.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_html.hpp"
-#include "coordinator/report/review_markdown.hpp"
+#include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "proto/command_line/option_checks.hpp"
 
@@ -55,11 +53,11 @@ std::vector<StatedRequirement> stated_in(const ReportOptions& options) {
 
 std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
                                           const std::vector<StatedRequirement>& stated) {
-  std::vector<std::string> texts;
-  for (const StatedRequirement& each : stated) texts.push_back(each.requirement);
   try {
-    if (!texts.empty()) require_independent(campaign, "requirement", texts.front());
-    return check_requirements(store, campaign.objectives(), texts, campaign.error_budget());
+    if (!stated.empty()) {
+      require_independent(campaign, "requirement", stated.front().requirement);
+    }
+    return check_requirements(store, campaign.objectives(), stated, campaign.error_budget());
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
@@ -79,12 +77,11 @@ int print_remote_report(const ReportOptions& options) {
                      " (must not be given with --html, --markdown and --requirements; fetch the "
                      "database first)");
   }
-  wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
-                               .question = wire::Question::report};
+  proto::RequestEnvelope question = question_about(options.database, proto::QUESTION_REPORT);
   for (const std::string& requirement : options.requirements) {
-    question.options.push_back("--requirement=" + requirement);
+    question.mutable_answer()->add_options("--requirement=" + requirement);
   }
-  if (options.format == OutputFormat::json) question.options.emplace_back("--json");
+  if (options.format == OutputFormat::json) question.mutable_answer()->add_options("--json");
   return print_answer(options.connection, question, AnswerText::lines);
 }
 
@@ -120,10 +117,10 @@ int write_documents(const ReportOptions& options, const Store& store, const Camp
     if (!options.markdown.empty()) {
       write_document(options.markdown, options.if_there, review_markdown(*review));
     }
-    const std::span<const MatrixRow> rows(review->matrix);
-    return exit_code_of(std::ranges::all_of(rows.first(stated.size()), [](const MatrixRow& row) {
-      return row.answer.check.verdict == Verdict::met;
-    }));
+    const std::span<const RequirementAnswer> rows(review->matrix);
+    return exit_code_of(std::ranges::all_of(
+        rows.first(stated.size()),
+        [](const RequirementAnswer& row) { return row.check.verdict == RequirementVerdict::met; }));
   };
   if (options.html.empty()) return write();
   return run_until_stopped([&](const IsStopped& is_stopped) {
@@ -155,7 +152,7 @@ int print_report(const ReportOptions& options) {
                                           : answers_text(answers, paint));
   }
   return exit_code_of(std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
-    return answer.check.verdict == Verdict::met;
+    return answer.check.verdict == RequirementVerdict::met;
   }));
 }
 

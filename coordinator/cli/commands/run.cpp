@@ -20,8 +20,8 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/progress_display.hpp"
-#include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/worker_processes.hpp"
 #include "coordinator/dispatch/run_set.hpp"
@@ -29,7 +29,6 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/model.hpp"

@@ -5,8 +5,7 @@
 #include <optional>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/override_options.hpp"
-#include "coordinator/cli/page_options.hpp"
+#include "coordinator/cli/shared_options.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/dispersion.hpp"
@@ -41,13 +41,12 @@ std::size_t quantity_named(std::string_view name) {
 }
 
 int print_remote_sensitivity(const SensitivityOptions& options) {
-  wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
-                               .question = wire::Question::sensitivity,
-                               .options = {}};
-  if (options.num_rows) question.options.push_back(fmt::format("--rows={}", *options.num_rows));
-  if (options.parameter) question.options.push_back("--parameter=" + *options.parameter);
-  if (options.run) question.options.push_back(fmt::format("--run={}", *options.run));
-  if (options.format == OutputFormat::json) question.options.emplace_back("--json");
+  proto::RequestEnvelope question = question_about(options.database, proto::QUESTION_SENSITIVITY);
+  proto::AnswerRequest& asked = *question.mutable_answer();
+  if (options.num_rows) asked.add_options(fmt::format("--rows={}", *options.num_rows));
+  if (options.parameter) asked.add_options("--parameter=" + *options.parameter);
+  if (options.run) asked.add_options(fmt::format("--run={}", *options.run));
+  if (options.format == OutputFormat::json) asked.add_options("--json");
   return print_answer(options.connection, question, AnswerText::lines);
 }
 

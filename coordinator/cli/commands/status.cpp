@@ -1,7 +1,7 @@
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 
 namespace proofmass::coordinator {
 namespace {

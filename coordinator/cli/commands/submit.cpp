@@ -8,8 +8,8 @@
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/watch.hpp"
-#include "coordinator/cli/override_options.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/shared_options.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -44,22 +44,26 @@ std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   return campaign;
 }
 
-wire::SubmitRequest submit_request(const SubmitOptions& options, const Campaign& campaign) {
-  return {.definition = campaign.definition(TableColumns::included),
-          .priority = options.priority,
-          .audit_fraction = options.audit_fraction,
-          .stop_rule = options.stop.rule,
-          .failures_max = options.stop.failures_max};
+proto::RequestEnvelope submit_request(const SubmitOptions& options, const Campaign& campaign) {
+  proto::RequestEnvelope request;
+  proto::SubmitRequest& submit = *request.mutable_submit();
+  wire::set_definition(campaign.definition(TableColumns::included), submit);
+  if (options.priority) submit.set_priority(*options.priority);
+  if (options.audit_fraction) submit.set_audit_fraction(*options.audit_fraction);
+  submit.set_stop_rule(options.stop.rule);
+  if (options.stop.failures_max) submit.set_failures_max(*options.stop.failures_max);
+  return request;
 }
 
 // A new campaign, or one that is there and has more runs now.
 int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
-  const wire::SubmitRequest request = submit_request(options, *campaign);
+  const proto::RequestEnvelope request = submit_request(options, *campaign);
   return with_connection(options.client, [&](const Ask& ask) {
-    const auto done = reply_of<wire::DoneReply>(ask, request);
-    const bool is_json = options.client.format == OutputFormat::json;
-    print_lines(is_json ? done_json("submit", campaign->name, done) : done.text + "\n");
+    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kDone);
+    print_lines(done_text(reply.done(),
+                          {.name = "submit", .kind = "campaign", .target = campaign->name},
+                          options.client.format));
     if (!options.waits) return static_cast<int>(exit_done);
     flush_standard_output();
     return watch_on_standard_output(ask, campaign->name, options.client.format);

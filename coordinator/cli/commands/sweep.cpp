@@ -12,13 +12,13 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/archive/comparison.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/run.hpp"
 #include "coordinator/cli/cost_estimate.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/sweep_plan.hpp"
 #include "coordinator/report/summarise.hpp"

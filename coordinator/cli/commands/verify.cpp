@@ -7,8 +7,7 @@
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/json_output.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
@@ -45,7 +44,7 @@ int verify_database(const VerifyCommandOptions& options) {
     Json checks = Json::array();
     const auto report = [&](const Check& check) {
       ++num_checks;
-      if (check.verdict == Verdict::fails) ++num_failing;
+      if (check.verdict == CheckOutcome::fails) ++num_failing;
       if (is_json) {
         checks.push_back(json_of_check(check));
         return;

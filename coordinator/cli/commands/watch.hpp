@@ -10,8 +10,7 @@
 #include <string_view>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/standard_output.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "coordinator/cli/output.hpp"
 
 namespace proofmass::coordinator {
 

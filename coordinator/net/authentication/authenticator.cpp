@@ -99,12 +99,14 @@ Authenticator::~Authenticator() = default;
 
 void* Authenticator::handle() const { return socket_->handle(); }
 
-void Authenticator::watch(Domain domain, HandshakeWatch::EventSource next_event) {
-  watches_.emplace_back(std::move(next_event), domain, refusals_);
+void Authenticator::watch(Domain domain, EventSource next_event) {
+  watched_.emplace_back(domain, std::move(next_event));
 }
 
 void Authenticator::serve(TimePoint now) {
-  for (HandshakeWatch& watch : watches_) watch.update(now);
+  for (const auto& [domain, next_event] : watched_) {
+    log_failed_handshakes(next_event, domain, refusals_, now);
+  }
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;
@@ -121,11 +123,6 @@ void Authenticator::serve(TimePoint now) {
 bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimePoint now) {
   report(list_of(domain).refresh_if_due(now));
   return list_of(domain).owner_of(public_key) != nullptr;
-}
-
-std::string Authenticator::name_of(Domain domain, std::string_view public_key) {
-  const AllowedKey* const owner = list_of(domain).owner_of(public_key);
-  return owner == nullptr ? std::string() : owner->name;
 }
 
 std::optional<Asker> Authenticator::client(std::string_view public_key, TimePoint now) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
@@ -48,7 +49,7 @@ class Authenticator {
   /// Logs peers of a socket whose handshake ends before they show a key.
   ///
   /// @param next_event  Gives the next failed handshake of a ROUTER of the same context, if any.
-  void watch(wire::Domain domain, HandshakeWatch::EventSource next_event);
+  void watch(wire::Domain domain, EventSource next_event);
 
   /// Answers all handshakes that wait; never waits itself.
   void serve(TimePoint now);
@@ -56,9 +57,6 @@ class Authenticator {
   /// True if the key is on the domain's list, which is read again when it changed, once a second at
   /// most. To be asked at every message: a revoked key keeps its connection otherwise.
   [[nodiscard]] bool is_allowed(wire::Domain domain, std::string_view public_key, TimePoint now);
-
-  /// Name of the key's owner as in the list; empty if it is not on it.
-  [[nodiscard]] std::string name_of(wire::Domain domain, std::string_view public_key);
 
   /// Name and rights of a client's key, as is_allowed(); nothing if it is not on the list.
   [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now);
@@ -79,7 +77,7 @@ class Authenticator {
   AllowList workers_;
   AllowList clients_;
   std::unique_ptr<zmq::socket_t> socket_;
-  std::vector<HandshakeWatch> watches_;
+  std::vector<std::pair<wire::Domain, EventSource>> watched_;
 };
 
 }  // namespace proofmass::coordinator

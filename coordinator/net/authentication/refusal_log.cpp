@@ -80,11 +80,12 @@ void RefusalLog::begin_minute(TimePoint now) {
 const int failed_handshakes =
     ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL;
 
-void HandshakeWatch::update(TimePoint now) {
-  while (const auto event = next_event_()) {
+void log_failed_handshakes(const EventSource& next_event, wire::Domain domain, RefusalLog& log,
+                           RefusalLog::TimePoint now) {
+  while (const auto event = next_event()) {
     if ((event->kind & failed_handshakes) == 0) continue;
-    log_.refused(
-        {.domain = to_text(domain_), .address = {}, .public_key = {}, .reason = reason_of(*event)},
+    log.refused(
+        {.domain = to_text(domain), .address = {}, .public_key = {}, .reason = reason_of(*event)},
         now);
   }
 }

@@ -8,7 +8,6 @@
 #include <set>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "proto/link/connection_monitor.hpp"
@@ -43,28 +42,16 @@ class RefusalLog {
   std::uint64_t num_left_out_ = 0;
 };
 
-/// Events that a HandshakeWatch looks for: ZMQ_EVENT_..., joined by |.
+/// Events that log_failed_handshakes() looks for: ZMQ_EVENT_..., joined by |.
 extern const int failed_handshakes;
 
-/// Notices peers whose handshake ends before they show a key: those that use none, that trust
+/// Gives the next event of a socket, if there is one.
+using EventSource = std::function<std::optional<wire::SocketEvent>()>;
+
+/// Logs peers whose handshake ended before they showed a key: those that use none, that trust
 /// another coordinator's key, or that speak another protocol. ZeroMQ does not report their address.
-class HandshakeWatch {
- public:
-  using TimePoint = std::chrono::steady_clock::time_point;
-  /// The next event of a socket, if there is one.
-  using EventSource = std::function<std::optional<wire::SocketEvent>()>;
-
-  /// @param log  Outlives the watch.
-  HandshakeWatch(EventSource next_event, wire::Domain domain, RefusalLog& log)
-      : next_event_(std::move(next_event)), domain_(domain), log_(log) {}
-
-  /// Logs what happened; never waits.
-  void update(TimePoint now);
-
- private:
-  EventSource next_event_;
-  wire::Domain domain_;
-  RefusalLog& log_;
-};
+/// Never waits.
+void log_failed_handshakes(const EventSource& next_event, wire::Domain domain, RefusalLog& log,
+                           std::chrono::steady_clock::time_point now);
 
 }  // namespace proofmass::coordinator

@@ -12,16 +12,25 @@
 #include <string_view>
 #include <variant>
 
-#include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
 constexpr std::int64_t campaign_uid_max = std::numeric_limits<std::int64_t>::max();
+
+// The schema allows no other names, but a file from elsewhere may have another one.
+wire::CampaignPhase read_phase(const Database& database, std::string_view name) {
+  using enum wire::CampaignPhase;
+  for (const wire::CampaignPhase phase : {active, paused, finished, cancelled}) {
+    if (wire::name_of(phase) == name) return phase;
+  }
+  database.refuse_as_damaged(fmt::format("phase = {}", name));
+}
 
 std::uint64_t stored_num_runs(const Database& database) {
   return database.count("SELECT num_runs FROM campaign");
@@ -221,6 +230,54 @@ void extend_campaign(Database& database, const Campaign& campaign, std::string_v
       .run(campaign.num_runs, definition);
   fix_num_runs(database);
   write_table_digest(database);
+}
+
+CampaignControl read_control(const Database& database) {
+  Statement select = database.prepare("SELECT phase, priority, audit_fraction FROM campaign");
+  if (!select.step()) database.refuse_as_damaged("it has no campaign");
+  const std::int64_t priority = select.integer(1);
+  const double audit_fraction = select.real(2);
+  if (priority < std::numeric_limits<int>::min() || priority > std::numeric_limits<int>::max()) {
+    database.refuse_as_damaged(fmt::format("priority = {}", priority));
+  }
+  if (!(audit_fraction >= 0.0 && audit_fraction <= 1.0)) {
+    database.refuse_as_damaged(fmt::format("audit_fraction = {}", audit_fraction));
+  }
+  return {.phase = read_phase(database, select.text(0)),
+          .priority = static_cast<int>(priority),
+          .audit_fraction = audit_fraction};
+}
+
+void write_control(const Database& database, const CampaignControl& control) {
+  database.prepare("UPDATE campaign SET phase = ?, priority = ?, audit_fraction = ?")
+      .run(wire::name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
+}
+
+std::optional<std::uint64_t> read_num_runs_fixed(const Database& database) {
+  Statement select = database.prepare("SELECT num_runs_fixed FROM campaign");
+  if (!select.step()) database.refuse_as_damaged("it has no campaign");
+  return select.optional_count(0);
+}
+
+void fix_num_runs(const Database& database) {
+  database
+      .prepare(
+          "UPDATE campaign SET num_runs_fixed = iif(stop_rule = '', num_runs, NULL)"
+          " WHERE NOT EXISTS (SELECT 1 FROM delivery)")
+      .run();
+}
+
+void replace_stop_check(const Database& database, std::uint64_t num_runs,
+                        std::string_view statistic, const StopCheck& check) {
+  const bool is_bounded = check.interval.has_value();
+  database
+      .prepare(
+          "INSERT OR REPLACE INTO stop_check (statistic, num_runs, estimate, lower, upper,"
+          " relative_half_width, is_reached) VALUES (?, ?, ?, ?, ?, ?, ?)")
+      .run(statistic, num_runs, check.estimate,
+           is_bounded ? std::optional(check.interval->lower) : std::nullopt,
+           is_bounded ? std::optional(check.interval->upper) : std::nullopt,
+           check.relative_half_width, std::int64_t{check.is_reached});
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/statistics/stop_rule.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -31,5 +33,19 @@ void check_extension(const Database& database, const Campaign& campaign);
 
 /// Stores number of runs, definition and the table values of the new runs. @pre check_extension().
 void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition);
+
+/// How the campaign is served: columns of `campaign`.
+[[nodiscard]] CampaignControl read_control(const Database& database);
+void write_control(const Database& database, const CampaignControl& control);
+
+/// See Store::num_runs_fixed().
+[[nodiscard]] std::optional<std::uint64_t> read_num_runs_fixed(const Database& database);
+/// While there is no result, nobody can have looked at one: the runs that are asked for now are
+/// fixed, unless a stop rule decides about their number.
+void fix_num_runs(const Database& database);
+
+/// A row of `stop_check`.
+void replace_stop_check(const Database& database, std::uint64_t num_runs,
+                        std::string_view statistic, const StopCheck& check);
 
 }  // namespace proofmass::coordinator::detail

@@ -46,10 +46,10 @@ std::string checked_path(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::size_t size = std::filesystem::weakly_canonical(absolute, ignored).native().size();
   if (size <= size_max) return absolute.string();
-  throw StoreError(fmt::format(
-      "campaign database = {} (has a path of {} bytes, and SQLite opens none of more than {}: use "
-      "directories with shorter names)",
-      path.string(), size, size_max));
+  refuse_file(path,
+              fmt::format("has a path of {} bytes, and SQLite opens none of more than {}: use "
+                          "directories with shorter names",
+                          size, size_max));
 }
 
 std::string name_of(const std::filesystem::path& path, Access access) {
@@ -153,6 +153,10 @@ int copy_all(sqlite3* from, sqlite3* to, const char* name = "main") {
 
 }  // namespace
 
+void refuse_file(const std::filesystem::path& file, std::string_view what) {
+  throw StoreError(fmt::format("campaign database = {} ({})", file.string(), what));
+}
+
 std::string file_uri(const std::filesystem::path& file, std::string_view parameter) {
   std::string uri = "file://";
   for (const char character : checked_path(file)) {
@@ -183,7 +187,7 @@ Database::Database(const std::filesystem::path& path, Access access)
   sqlite3_limit(connection, SQLITE_LIMIT_SQL_LENGTH, sql_size_max);
   const bool is_reader = access == Access::read_only || access == Access::immutable;
   if (!is_reader && sqlite3_db_readonly(connection, "main") != 0) {
-    throw StoreError(fmt::format("campaign database = {} (is not writable)", path_.string()));
+    refuse("is not writable");
   }
 }
 
@@ -220,23 +224,17 @@ Statement Database::prepare(std::string_view sql) const {
   return {*this, statement};
 }
 
-std::int64_t Database::integer(std::string_view sql) const {
+Statement Database::first_row(std::string_view sql) const {
   Statement statement = prepare(sql);
   if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
-  return statement.integer(0);
+  return statement;
 }
 
-std::string Database::text(std::string_view sql) const {
-  Statement statement = prepare(sql);
-  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
-  return statement.text(0);
-}
+std::int64_t Database::integer(std::string_view sql) const { return first_row(sql).integer(0); }
 
-std::uint64_t Database::count(std::string_view sql) const {
-  Statement statement = prepare(sql);
-  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
-  return statement.count(0);
-}
+std::string Database::text(std::string_view sql) const { return first_row(sql).text(0); }
+
+std::uint64_t Database::count(std::string_view sql) const { return first_row(sql).count(0); }
 
 std::int64_t Database::num_changes() const { return sqlite3_changes64(connection_.get()); }
 
@@ -270,22 +268,13 @@ void Database::go_on_with_private_copy() {
   if (off != SQLITE_OK) fail(off);
 }
 
-void Database::attach(const std::string& database, const std::string& name,
-                      const std::filesystem::path& file) {
+void Database::attach(const Database& other, const std::string& name) {
   try {
-    prepare("ATTACH ? AS ?").run(database, name);
+    prepare("ATTACH ? AS ?").run(other.is_private_copy_ ? std::string() : other.name_, name);
   } catch (const StoreError&) {
-    throw StoreError(fmt::format("campaign database = {} ({})", file.string(),
-                                 sqlite3_errmsg(connection_.get())));
+    refuse_file(other.path_, sqlite3_errmsg(connection_.get()));
   }
-}
-
-void Database::attach_read_only(const Database& other, const std::string& name) {
-  attach(other.name_, name, other.path_);
-}
-
-void Database::attach_copy_of(const Database& other, const std::string& name) {
-  attach("", name, other.path_);
+  if (!other.is_private_copy_) return;
   const int code = copy_all(other.connection_.get(), connection_.get(), name.c_str());
   if (code != SQLITE_OK) other.refuse_copy(code);
 }
@@ -306,18 +295,14 @@ bool Database::fold_log(Fold fold) {
   return row.integer(0) == 0 && row.integer(1) == row.integer(2);
 }
 
-void Database::leave_files_alone() {
-  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-}
-
-void Database::fold_log_at_close() {
-  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+void Database::fold_log_at_close(bool is_folded) {
+  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, is_folded ? 0 : 1,
+                    nullptr);
 }
 
 void Database::refuse(std::string_view what) const {
   // It may quote the file.
-  throw StoreError(
-      fmt::format("campaign database = {} ({})", path_.string(), wire::visible_text(what)));
+  refuse_file(path_, wire::visible_text(what));
 }
 
 void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(path_, what)); }

@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/statistics/interval.hpp"
+
 struct sqlite3;
 struct sqlite3_stmt;
 
@@ -22,6 +24,9 @@ inline constexpr int busy_timeout_ms = 5000;
 
 /// What of a write-ahead log goes into its file.
 enum class Fold { what_no_reader_needs, all_and_empty_it };
+
+/// @throws StoreError `campaign database = path (what)`.
+[[noreturn]] void refuse_file(const std::filesystem::path& file, std::string_view what);
 
 /// The URI of a database file with a parameter of SQLite's: `file:///a/b.db?mode=ro`.
 /// @throws StoreError if the path is longer than SQLite takes.
@@ -54,12 +59,16 @@ class Statement {
   /// @throws StoreError if the value is not below 2⁶³.
   void bind(int position, std::uint64_t value);
   void bind(int position, std::uint32_t value);
-  /// Binds the value, or NULL. A zero loses its sign: SQLite keeps none in a column of type REAL.
+  /// A zero loses its sign: SQLite keeps none in a column of type REAL.
   /// @throws StoreError if the value is not finite; SQLite would turn NaN into NULL.
-  void bind(int position, const std::optional<double>& value);
   void bind(int position, double value);
-  void bind(int position, const std::optional<std::uint64_t>& value);  ///< The value, or NULL.
   void bind(int position, std::string_view value);
+  template <typename Value>
+  void bind(int position, const std::optional<Value>& value) {
+    value ? bind(position, *value) : bind_null(position);
+  }
+  /// Binds what a cell of a row of another statement holds.
+  void bind_cell(int position, const Statement& row, int column);
 
   /// Goes to the next row; false, and reset, after the last.
   [[nodiscard]] bool step();
@@ -73,6 +82,8 @@ class Statement {
   [[nodiscard]] std::uint64_t count(int column) const;
   [[nodiscard]] std::optional<std::uint64_t> optional_count(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::string text(int column) const;
+  /// Bounds of 95 % in a column and the next one; empty if one of them is NULL.
+  [[nodiscard]] std::optional<Interval> interval(int column) const;
 
   /// A cell in words: numbers in the shortest text that reads back to the same bits, `NULL`.
   [[nodiscard]] std::string shown(int column) const;
@@ -85,6 +96,7 @@ class Statement {
  private:
   friend class Database;
   Statement(const Database& database, sqlite3_stmt* statement);
+  void bind_null(int position);
   void check(int code) const;
 
   const Database* database_;
@@ -134,14 +146,10 @@ class Database {
   /// @throws StoreError if the copy cannot be made, for want of space for instance.
   void go_on_with_private_copy();
 
-  [[nodiscard]] bool is_private_copy() const { return is_private_copy_; }
-
-  /// Makes the tables of the file of another database known under `name.`; the file can only be
-  /// read. @pre The other was opened read-only.
+  /// Makes the tables of another database known under `name.`: those of its file, which can only be
+  /// read, or a copy of its private copy. @pre The other was opened read-only.
   /// @throws StoreError naming that file.
-  void attach_read_only(const Database& other, const std::string& name);
-  /// Attaches a private copy of another database.
-  void attach_copy_of(const Database& other, const std::string& name);
+  void attach(const Database& other, const std::string& name);
 
   /// The connection, for what SQLite can do and this class cannot.
   [[nodiscard]] sqlite3* handle() const { return connection_.get(); }
@@ -155,12 +163,10 @@ class Database {
   /// log is empty; false if somebody reads an older state, or writes.
   [[nodiscard]] bool fold_log(Fold fold);
 
-  /// The file is not touched any more when the connection is closed, and its log stays: for a file
-  /// that has lost its name, for one that says that it needs its log, and for one that has not been
-  /// checked.
-  void leave_files_alone();
-  /// Takes that back: as usual, the last connection copies the log into the file and removes it.
-  void fold_log_at_close();
+  /// Whether the last connection copies the log into the file and removes it when it is closed, as
+  /// usual. Otherwise the file is not touched any more then, and its log stays: for a file that has
+  /// lost its name, for one that says that it needs its log, and for one that has not been checked.
+  void fold_log_at_close(bool is_folded);
 
   /// From now on messages name another file: that of which this one is a copy.
   void name_in_messages(const std::filesystem::path& file) { path_ = file; }
@@ -182,8 +188,8 @@ class Database {
   };
 
   void open(Access access);
-  void attach(const std::string& database, const std::string& name,
-              const std::filesystem::path& file);
+  /// A query at its first row, which there must be.
+  [[nodiscard]] Statement first_row(std::string_view sql) const;
   [[noreturn]] void refuse_copy(int code) const;
 
   std::filesystem::path path_;

@@ -2,15 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <ctime>
 #include <limits>
-#include <system_error>
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -41,45 +40,9 @@ std::int64_t storable(std::uint64_t value) {
   return value > static_cast<std::uint64_t>(max) ? max : static_cast<std::int64_t>(value);
 }
 
-wire::SessionId session_of(const std::string& digits) {
-  wire::SessionId session;
-  const char* const end = digits.data() + digits.size();
-  const auto [stop, error] = std::from_chars(digits.data(), end, session.value, 16);
-  if (error == std::errc() && stop == end) return session;
-  throw StoreError(fmt::format("worker.session = {} (must be hexadecimal)", digits));
-}
-
 }  // namespace
 
 std::string hexadecimal(std::uint64_t value) { return fmt::format("{:016x}", value); }
-
-std::string_view stored_name(wire::LossReason reason) {
-  switch (reason) {
-    case wire::LossReason::silent:
-      return "silent";
-    case wire::LossReason::crashed:
-      return "crashed";
-    case wire::LossReason::out_of_memory:
-      return "out_of_memory";
-    case wire::LossReason::hung:
-      return "hung";
-    case wire::LossReason::drained:
-      return "drained";
-    case wire::LossReason::walltime:
-      return "walltime";
-    case wire::LossReason::preempted:
-      return "preempted";
-    case wire::LossReason::retracted:
-      return "retracted";
-    case wire::LossReason::never_arrived:
-      return "never_arrived";
-    case wire::LossReason::protocol:
-      return "protocol";
-    case wire::LossReason::failed:
-      return "failed";
-  }
-  return "unknown";
-}
 
 WorkerRows::WorkerRows(const Database& database)
     : database_(database),
@@ -106,7 +69,7 @@ void WorkerRows::write(const WorkerEnded& ended) {
       .prepare(
           "UPDATE worker SET end_reason = ?, ended_utc = strftime('%Y-%m-%dT%H:%M:%SZ', 'now') "
           "WHERE session = ?")
-      .run(stored_name(ended.reason), hexadecimal(ended.session.value));
+      .run(wire::name_of(ended.reason), hexadecimal(ended.session.value));
 }
 
 std::optional<std::int64_t> WorkerRows::stored_key(wire::SessionId session) {
@@ -171,15 +134,6 @@ void WorkerRows::write_counts(std::int64_t now_unix_s) {
     update.run(count.num_results, count.compute_s, now_unix_s, worker);
   }
   counts_.clear();
-}
-
-std::vector<wire::SessionId> read_attached_sessions(const Database& database) {
-  Statement select = database.prepare(
-      "SELECT session FROM worker WHERE session IS NOT NULL AND ended_utc IS NULL ORDER BY "
-      "session");
-  std::vector<wire::SessionId> sessions;
-  while (select.step()) sessions.push_back(session_of(select.text(0)));
-  return sessions;
 }
 
 EntryRows::EntryRows(const Database& database)
@@ -286,9 +240,9 @@ void EntryRows::report_contradiction(const Delivery& delivery) {
                                    {"attempt", delivery.attempt.value}}}));
 }
 
-void EntryRows::write_entry(const LostRuns& lost) {
+void EntryRows::write_entry(const ReturnedRuns& lost) {
   insert_attempt_.run(lost.runs.first.value, lost.runs.count, lost.attempt.value,
-                      workers_.key_of(lost.worker), stored_name(lost.reason),
+                      workers_.key_of(lost.worker), wire::name_of(lost.reason),
                       std::int64_t{lost.is_blamed}, now_unix_s_);
   trim_attempts_.run(num_attempts_max);
   if (database_.last_row() != num_attempts_max + 1) return;

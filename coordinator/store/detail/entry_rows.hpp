@@ -19,9 +19,6 @@ namespace proofmass::coordinator::detail {
 /// 16 hexadecimal digits: SQLite's integers have a sign.
 [[nodiscard]] std::string hexadecimal(std::uint64_t value);
 
-/// How a reason stands in the database: `out_of_memory`.
-[[nodiscard]] std::string_view stored_name(wire::LossReason reason);
-
 /// Rows of `worker` that are one worker's. All further workers share one more.
 inline constexpr std::int64_t num_workers_max = 100'000;
 
@@ -67,9 +64,6 @@ class WorkerRows {
   std::map<std::int64_t, Count> counts_;
 };
 
-/// Sessions of the workers without an end.
-[[nodiscard]] std::vector<wire::SessionId> read_attached_sessions(const Database& database);
-
 /// Rows of `attempt` that are kept.
 inline constexpr std::int64_t num_attempts_max = 1'000'000;
 
@@ -89,7 +83,7 @@ class EntryRows {
  private:
   void write_entry(const Delivery& delivery);
   void write_entry(const SecondDelivery& second);
-  void write_entry(const LostRuns& lost);
+  void write_entry(const ReturnedRuns& lost);
   void write_entry(const GivenUpRun& given_up);
   void write_entry(const RetriedRuns& retried);
   void write_entry(const EventEntry& event);

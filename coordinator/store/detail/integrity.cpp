@@ -18,6 +18,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/sha256.hpp"
+#include "coordinator/store/store.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -90,17 +91,16 @@ void check_largest_errors(const Database& database) {
   WorstRunTable worst(quantities.size());
   Statement overrun =
       database.prepare("SELECT run_index, parameters FROM overrun ORDER BY run_index");
-  Statement row = select_results(database);
-  while (row.step()) {
-    const RunResult result = read_result(row);
-    const std::uint64_t exceeded = exceeded_objectives(result, objectives);
-    if (exceeded != 0 && !has_row(overrun, result.run, exceeded)) {
+  ResultReader results(database);
+  while (const std::optional<RunResult> result = results.next()) {
+    const std::uint64_t exceeded = exceeded_objectives(*result, objectives);
+    if (exceeded != 0 && !has_row(overrun, result->run, exceeded)) {
       database.refuse(fmt::format("is damaged: overrun does not follow from the result of run {}",
-                                  result.run.value));
+                                  result->run.value));
     }
-    if (!result.is_completed()) continue;
+    if (!result->is_completed()) continue;
     for (std::size_t i = 0; i < worst.size(); ++i) {
-      worst[i].offer({.magnitude = std::abs(result.error(i)), .run = result.run});
+      worst[i].offer({.magnitude = std::abs(result->error(i)), .run = result->run});
     }
   }
   if (overrun.step()) database.refuse("is damaged: overrun has a run too many");
@@ -112,70 +112,36 @@ void check_largest_errors(const Database& database) {
   }
 }
 
-/// Deliveries of a worker.
-struct Deliveries {
-  std::uint64_t count = 0;
-  double compute_s = 0.0;
-  std::optional<std::int64_t> last_unix_s;  ///< The newest of them.
-};
-
-std::map<std::int64_t, Deliveries> read_deliveries(const Database& database) {
-  Statement select =
-      database.prepare("SELECT run_index, worker_key, compute_s, received_unix_s FROM delivery");
-  std::map<std::int64_t, Deliveries> by_worker;
-  while (select.step()) {
-    const double compute_s = select.real(2);
-    if (!(std::isfinite(compute_s) && compute_s >= 0.0)) {
-      database.refuse_as_damaged(
-          fmt::format("delivery.compute_s of run {} = {} (must be finite and at least 0)",
-                      select.integer(0), compute_s));
-    }
-    Deliveries& deliveries = by_worker[select.integer(1)];
-    ++deliveries.count;
-    deliveries.compute_s += compute_s;
-    deliveries.last_unix_s =
-        std::max(deliveries.last_unix_s.value_or(select.integer(3)), select.integer(3));
-  }
-  return by_worker;
-}
-
-// Each order of adding rounds in its own way, and the worker's sum was made of those of commits.
-// Two sums of n terms that are not negative differ by n epsilon of their value at most.
-bool are_close(double stored_s, const Deliveries& deliveries) {
-  const double tolerance = static_cast<double>(deliveries.count) *
-                           std::numeric_limits<double>::epsilon() * deliveries.compute_s;
-  return std::abs(stored_s - deliveries.compute_s) <= tolerance;
-}
-
-std::string shown(std::optional<std::int64_t> time_unix_s) {
-  return time_unix_s ? fmt::to_string(*time_unix_s) : "NULL";
-}
-
 // `num_results`, `compute_s` and `last_result_unix_s` of a worker follow from its deliveries. A
-// second delivery of a run counts for nobody.
+// second delivery of a run counts for nobody. Each order of adding times rounds in its own way, and
+// the worker's sum was made of those of commits: two sums of n terms that are not negative differ
+// by n epsilon of their value at most.
 void check_workers(const Database& database) {
-  const std::map<std::int64_t, Deliveries> by_worker = read_deliveries(database);
+  Statement odd = database.prepare(
+      "SELECT run_index, compute_s FROM delivery WHERE NOT (compute_s >= 0 AND compute_s < 9e999)");
+  if (odd.step()) {
+    database.refuse_as_damaged(
+        fmt::format("delivery.compute_s of run {} = {} (must be finite and at least 0)",
+                    odd.integer(0), odd.real(1)));
+  }
   Statement select = database.prepare(
-      "SELECT worker_key, num_results, compute_s, last_result_unix_s FROM worker"
-      " ORDER BY worker_key");
+      "SELECT worker_key, w.num_results, w.compute_s, last_result_unix_s, ifnull(d.num_results, 0),"
+      " ifnull(d.compute_s, 0.0), last_unix_s FROM worker AS w LEFT JOIN"
+      " (SELECT worker_key, count(*) AS num_results, total(compute_s) AS compute_s,"
+      "  max(received_unix_s) AS last_unix_s FROM delivery GROUP BY worker_key) AS d"
+      " USING (worker_key) ORDER BY worker_key");
   while (select.step()) {
-    const auto found = by_worker.find(select.integer(0));
-    const Deliveries deliveries = found == by_worker.end() ? Deliveries{} : found->second;
-    if (select.count(1) != deliveries.count) {
-      database.refuse_as_damaged(
-          fmt::format("worker.num_results of worker_key {} = {} (must be {}, its deliveries)",
-                      select.integer(0), select.integer(1), deliveries.count));
-    }
-    if (!are_close(select.real(2), deliveries)) {
-      database.refuse_as_damaged(
-          fmt::format("worker.compute_s of worker_key {} = {} (must be {}, of its deliveries)",
-                      select.integer(0), select.real(2), deliveries.compute_s));
-    }
-    if (select.shown(3) != shown(deliveries.last_unix_s)) {
+    const auto require = [&](bool holds, int column, std::string_view whose) {
+      if (holds) return;
       database.refuse_as_damaged(fmt::format(
-          "worker.last_result_unix_s of worker_key {} = {} (must be {}, of its deliveries)",
-          select.integer(0), select.shown(3), shown(deliveries.last_unix_s)));
-    }
+          "worker.{} of worker_key {} = {} (must be {}, {} deliveries)", select.column_name(column),
+          select.integer(0), select.shown(column), select.shown(column + 3), whose));
+    };
+    const double tolerance = static_cast<double>(select.count(4)) *
+                             std::numeric_limits<double>::epsilon() * select.real(5);
+    require(select.integer(1) == select.integer(4), 1, "its");
+    require(std::abs(select.real(2) - select.real(5)) <= tolerance, 2, "of its");
+    require(select.shown(3) == select.shown(6), 3, "of its");
   }
 }
 
@@ -199,39 +165,6 @@ void check_audits(const Database& database) {
   }
 }
 
-struct Row {
-  std::string name;
-  std::vector<std::string> cells;
-};
-
-struct Content {
-  std::vector<std::string> columns;
-  std::vector<Row> rows;
-  std::map<std::string, std::size_t> places;  ///< Of the rows, by name.
-
-  [[nodiscard]] const Row* find(const std::string& name) const {
-    const auto found = places.find(name);
-    return found == places.end() ? nullptr : &rows[found->second];
-  }
-};
-
-Content content_of(const Database& database, const ComparedTable& table) {
-  Statement select = database.prepare(
-      fmt::format("SELECT {}, {} FROM {}", table.row_name, table.columns, table.name));
-  Content content;
-  for (int column = 1; column < select.num_columns(); ++column) {
-    content.columns.push_back(select.column_name(column));
-  }
-  while (select.step()) {
-    Row& row = content.rows.emplace_back(Row{.name = select.text(0), .cells = {}});
-    content.places.emplace(row.name, content.rows.size() - 1);
-    for (int column = 1; column < select.num_columns(); ++column) {
-      row.cells.push_back(select.shown(column));
-    }
-  }
-  return content;
-}
-
 /// Numbers that agree but for what another processor or another version of Boost.Math rounds.
 bool agree(const std::string& stored, const std::string& expected, double tolerance) {
   if (stored == expected) return true;
@@ -244,25 +177,32 @@ bool agree(const std::string& stored, const std::string& expected, double tolera
   return std::abs(a - b) <= tolerance * std::max(std::abs(a), std::abs(b));
 }
 
-void compare(const ComparedTable& table, const Content& stored, const Content& expected,
+void compare(const Database& stored_in, const Database& expected_in, const ComparedTable& table,
              FurtherRows further, std::vector<std::string>& differences) {
-  for (const Row& must : expected.rows) {
-    const Row* const row = stored.find(must.name);
-    if (row == nullptr) {
-      differences.push_back(fmt::format("{} lacks {}", table.name, must.name));
+  const std::string sql =
+      fmt::format("SELECT {}, {} FROM {}", table.row_name, table.columns, table.name);
+  std::map<std::string, std::vector<std::string>> stored;  // Cells by the name of the row.
+  for (Statement row = stored_in.prepare(sql); row.step();) {
+    std::vector<std::string>& cells = stored[row.text(0)];
+    for (int i = 0; i < row.num_columns(); ++i) cells.push_back(row.shown(i));
+  }
+  for (Statement must = expected_in.prepare(sql); must.step();) {
+    const auto row = stored.find(must.text(0));
+    if (row == stored.end()) {
+      differences.push_back(fmt::format("{} lacks {}", table.name, must.text(0)));
       continue;
     }
-    for (std::size_t i = 0; i < must.cells.size(); ++i) {
-      if (agree(row->cells[i], must.cells[i], table.tolerance)) continue;
+    for (int i = 1; i < must.num_columns(); ++i) {
+      const std::string& cell = row->second[static_cast<std::size_t>(i)];
+      if (agree(cell, must.shown(i), table.tolerance)) continue;
       differences.push_back(fmt::format("{}.{} of {} = {} (must be {})", table.name,
-                                        expected.columns[i], must.name, row->cells[i],
-                                        must.cells[i]));
+                                        must.column_name(i), must.text(0), cell, must.shown(i)));
     }
+    stored.erase(row);
   }
   if (further == FurtherRows::ignore) return;
-  for (const Row& row : stored.rows) {
-    if (expected.find(row.name) != nullptr) continue;
-    differences.push_back(fmt::format("{} has a row too many: {}", table.name, row.name));
+  for (const auto& [name, cells] : stored) {
+    differences.push_back(fmt::format("{} has a row too many: {}", table.name, name));
   }
 }
 
@@ -301,7 +241,7 @@ std::vector<std::string> table_differences(const Database& database,
   write(expected);
   std::vector<std::string> differences;
   for (const ComparedTable& table : tables) {
-    compare(table, content_of(database, table), content_of(expected, table), further, differences);
+    compare(database, expected, table, further, differences);
   }
   return differences;
 }

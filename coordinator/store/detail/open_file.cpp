@@ -16,7 +16,7 @@ bool is_urgent(const Entry& entry) {
 
 // What the history of a campaign can do without.
 bool is_record(const Entry& entry) {
-  return std::holds_alternative<LostRuns>(entry) || std::holds_alternative<EventEntry>(entry);
+  return std::holds_alternative<ReturnedRuns>(entry) || std::holds_alternative<EventEntry>(entry);
 }
 
 }  // namespace
@@ -54,16 +54,16 @@ void WaitingEntries::take(std::size_t num_max, std::vector<Entry>& entries, Time
                            wire::Field::remark("(the disk did not take them for too long)")}}));
 }
 
-std::optional<TimePoint> due_time(const OpenFile& file, const CommitTimes& times) {
+std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config) {
   if (file.retry_at) return file.retry_at;
   const std::optional<TimePoint> since = file.waiting.waiting_since();
   if (!since) return file.rest_at;
-  const TimePoint due = *since + times.record_after;
+  const TimePoint due = *since + config.record_after;
   const std::optional<TimePoint> urgent_since = file.waiting.urgent_since();
   if (!urgent_since) return due;
-  const bool is_complete = file.waiting.num_results() >= times.commit_runs_max;
+  const bool is_complete = file.waiting.num_results() >= config.commit_runs_max;
   if (is_complete || file.waiting.is_hurried()) return urgent_since;
-  return std::min(due, *urgent_since + times.commit_after);
+  return std::min(due, *urgent_since + config.commit_after);
 }
 
 Attempted try_to_write(OpenFile& file) {

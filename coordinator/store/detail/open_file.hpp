@@ -9,8 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/store/records.hpp"
-#include "coordinator/store/store.hpp"
+#include "coordinator/store/store_writer.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -68,15 +67,8 @@ struct OpenFile {
   bool is_log_kept = false;           ///< As was said last: a reader keeps it from that.
 };
 
-/// Times as in WriterConfig.
-struct CommitTimes {
-  std::size_t commit_runs_max;
-  std::chrono::steady_clock::duration commit_after;
-  std::chrono::steady_clock::duration record_after;
-};
-
 /// When the file wants to be written to or brought to rest; nothing if nothing waits.
-[[nodiscard]] std::optional<TimePoint> due_time(const OpenFile& file, const CommitTimes& times);
+[[nodiscard]] std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config);
 
 /// What came of one attempt to write.
 struct Attempted {

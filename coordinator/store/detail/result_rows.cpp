@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
@@ -46,17 +47,11 @@ const Columns& columns() {
 }
 
 std::string column_list() {
-  std::string truths, estimates, standard_errors, health;
-  for (const Quantity& quantity : model().results().quantities) {
-    truths += ", truth_" + quantity.column();
-    estimates += ", estimate_" + quantity.column();
-    if (quantity.has_standard_error) standard_errors += ", standard_error_" + quantity.column();
+  std::string list = "run_index, status, num_draws, num_rounds";
+  for (const ValueColumn& column : value_columns()) {
+    if (column.kind != ValueKind::error) list += ", " + column.name;
   }
-  for (const HealthQuantity& quantity : model().results().health) {
-    health += ", health_" + quantity.column();
-  }
-  return "run_index, status, num_draws, num_rounds" + truths + estimates + standard_errors +
-         health + ", loss_cause, loss_session";
+  return list + ", loss_cause, loss_session";
 }
 
 std::string insert_sql() {
@@ -158,59 +153,8 @@ Loss read_loss(const Statement& row, RunStatus status) {
           .session = read_choice(row, columns().loss_session, schema.loss_sessions.size())};
 }
 
-}  // namespace
-
-ResultRows::ResultRows(const Database& database)
-    : database_(database),
-      insert_(database.prepare(insert_sql())),
-      select_(database.prepare(select_sql("WHERE run_index = ?"))) {}
-
-bool ResultRows::insert(const RunResult& result) {
-  insert_.bind(1, result.run.value);
-  insert_.bind(2, static_cast<std::int64_t>(result.status));
-  insert_.bind(3, result.num_draws);
-  insert_.bind(4, result.num_rounds);
-  bind(columns().truth, columns().num_quantities, result.truth, result.has_truth());
-  bind(columns().estimate, columns().num_quantities, result.estimate, result.has_estimate());
-  bind(columns().standard_error, columns().num_standard_errors, result.standard_error,
-       !result.standard_error.empty());
-  bind(columns().health, columns().num_health, result.health, !result.health.empty());
-  const bool is_lost = result.status == RunStatus::lost;
-  const auto choice = [&](std::uint32_t value) {
-    return is_lost ? std::optional(std::uint64_t{value}) : std::nullopt;
-  };
-  insert_.bind(columns().loss_cause + 1, choice(result.loss.cause));
-  insert_.bind(columns().loss_session + 1, choice(result.loss.session));
-  insert_.finish();
-  return database_.num_changes() == 1;
-}
-
-void ResultRows::bind(int first, int count, const std::vector<double>& values, bool have_meaning) {
-  PROOFMASS_EXPECT(!have_meaning || values.size() == static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) {
-    insert_.bind(first + i + 1,
-                 have_meaning ? std::optional(values[static_cast<std::size_t>(i)]) : std::nullopt);
-  }
-}
-
-RunResult ResultRows::read(RunIndex run) {
-  select_.bind_all(run.value);
-  if (!select_.step()) {
-    database_.refuse_as_damaged(fmt::format("run_result lacks run {}", run.value));
-  }
-  const RunResult result = read_result(select_);
-  select_.finish();
-  return result;
-}
-
-Statement select_results(const Database& database) {
-  return database.prepare(select_sql("ORDER BY run_index"));
-}
-
-Statement select_results_in_range(const Database& database) {
-  return database.prepare(select_sql("WHERE run_index >= ? AND run_index < ? ORDER BY run_index"));
-}
-
+// The file is damaged if a number has another type than the schema gives it, or is out of the range
+// of its field.
 RunResult read_result(const Statement& row) {
   RunResult result{.run = RunIndex{row.count(0)},
                    .status = read_status(row),
@@ -224,6 +168,50 @@ RunResult read_result(const Statement& row) {
   }
   result.health = read_health(row);
   result.loss = read_loss(row, result.status);
+  return result;
+}
+
+}  // namespace
+
+Statement select_errors(const Database& database, std::size_t quantity) {
+  return database.prepare(fmt::format(
+      "SELECT error_{} FROM run_result WHERE run_index < ? AND status = {} ORDER BY run_index",
+      model().results().quantities[quantity].column(),
+      static_cast<std::int64_t>(RunStatus::completed)));
+}
+
+ResultRows::ResultRows(const Database& database)
+    : database_(database),
+      insert_(database.prepare(insert_sql())),
+      select_(database.prepare(select_sql("WHERE run_index = ?"))) {}
+
+bool ResultRows::insert(const RunResult& result) {
+  insert_.bind(1, result.run.value);
+  insert_.bind(2, static_cast<std::int64_t>(result.status));
+  insert_.bind(3, result.num_draws);
+  insert_.bind(4, result.num_rounds);
+  int position = num_leading_columns;
+  for (const ValueColumn& column : value_columns()) {
+    if (column.kind == ValueKind::error) continue;  // It is computed when it is read.
+    insert_.bind(++position, column.value_in(result));
+  }
+  const bool is_lost = result.status == RunStatus::lost;
+  const auto choice = [&](std::uint32_t value) {
+    return is_lost ? std::optional(std::uint64_t{value}) : std::nullopt;
+  };
+  insert_.bind(columns().loss_cause + 1, choice(result.loss.cause));
+  insert_.bind(columns().loss_session + 1, choice(result.loss.session));
+  insert_.finish();
+  return database_.num_changes() == 1;
+}
+
+RunResult ResultRows::read(RunIndex run) {
+  select_.bind_all(run.value);
+  if (!select_.step()) {
+    database_.refuse_as_damaged(fmt::format("run_result lacks run {}", run.value));
+  }
+  const RunResult result = read_result(select_);
+  select_.finish();
   return result;
 }
 
@@ -283,12 +271,12 @@ struct ResultReader::Impl {
   std::optional<RunIndex> last;
 };
 
-ResultReader::ResultReader(const detail::Database& database)
-    : impl_(std::make_unique<Impl>(database, detail::select_results(database))) {}
-
-ResultReader::ResultReader(const detail::Database& database, RunRange runs)
-    : impl_(std::make_unique<Impl>(database, detail::select_results_in_range(database))) {
-  impl_->row.bind_all(runs.first.value, runs.end());
+ResultReader::ResultReader(const detail::Database& database, std::optional<RunRange> runs)
+    : impl_(std::make_unique<Impl>(
+          database, database.prepare(detail::select_sql(
+                        runs ? "WHERE run_index >= ? AND run_index < ? ORDER BY run_index"
+                             : "ORDER BY run_index")))) {
+  if (runs) impl_->row.bind_all(runs->first.value, runs->end());
 }
 
 ResultReader::~ResultReader() = default;

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
@@ -21,21 +21,13 @@ class ResultRows {
   [[nodiscard]] RunResult read(RunIndex run);
 
  private:
-  void bind(int first, int count, const std::vector<double>& values, bool have_meaning);
-
   const Database& database_;
   Statement insert_;
   Statement select_;
 };
 
-/// All results in run order, or those of the runs [?1, ?2); read_result() takes one from its
-/// current row.
-[[nodiscard]] Statement select_results(const Database& database);
-[[nodiscard]] Statement select_results_in_range(const Database& database);
-
-/// @throws StoreError if a number has another type than the schema gives it, or is out of the range
-/// of its field: the file is damaged.
-[[nodiscard]] RunResult read_result(const Statement& row);
+/// estimate − truth of a quantity in the completed runs below ?1, in run order.
+[[nodiscard]] Statement select_errors(const Database& database, std::size_t quantity);
 
 /// Whether two results of one run agree in everything that means something.
 [[nodiscard]] bool are_equal(const RunResult& left, const RunResult& right);

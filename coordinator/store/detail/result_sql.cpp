@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/result_sql.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "coordinator/store/detail/schema.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 

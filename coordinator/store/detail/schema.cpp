@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/store/detail/result_sql.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/model.hpp"
 #include "proto/link/faults.hpp"
 
@@ -55,20 +53,19 @@ std::size_t step_to(std::int64_t version) {
   return static_cast<std::size_t>(version - oldest_schema_version);
 }
 
-std::int64_t version_of(const Database& database, const std::filesystem::path& path) {
+std::int64_t version_of(const Database& database) {
   const std::int64_t version = database.integer("PRAGMA user_version");
   if (version > schema_version()) {
-    throw StoreError(
-        fmt::format("campaign database = {} (is newer than this program: its user_version "
-                    "is {}, the newest known one {})",
-                    path.string(), version, schema_version()));
+    database.refuse(
+        fmt::format("is newer than this program: its user_version is {}, the newest known one {}",
+                    version, schema_version()));
   }
   if (version < 1) database.refuse_as_damaged(fmt::format("user_version = {}", version));
   if (version < oldest_schema_version) {
-    throw StoreError(fmt::format(
-        "campaign database = {} (was made before the first release: its user_version is "
-        "{}, the oldest known one {})",
-        path.string(), version, oldest_schema_version));
+    database.refuse(
+        fmt::format("was made before the first release: its user_version is {}, the oldest known "
+                    "one {}",
+                    version, oldest_schema_version));
   }
   return version;
 }
@@ -125,21 +122,20 @@ std::int64_t schema_version() {
   return oldest_schema_version + static_cast<std::int64_t>(migrations().size()) - 1;
 }
 
-void check_kind(Database& database, const std::filesystem::path& path) {
+void check_kind(Database& database) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
-    throw StoreError(fmt::format(
-        "campaign database = {} (is not a Proofmass campaign: its application_id is {}, not {})",
-        path.string(), id, application_id));
+    database.refuse(fmt::format("is not a Proofmass campaign: its application_id is {}, not {}", id,
+                                application_id));
   }
   // A coordinator that brings the file up to date changes version and schema together.
   const ReadTransaction one_state(database);
   const StepLimit limit(database, steps_of_schema_max);
-  check_schema(database, version_of(database, path));
+  check_schema(database, version_of(database));
 }
 
-void check_campaign_file(Database& database, const std::filesystem::path& path) {
-  check_kind(database, path);
+void check_campaign_file(Database& database) {
+  check_kind(database);
   check_small_tables(database);
   const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
   if (num_campaigns != 1) database.refuse_as_damaged(fmt::format("campaigns = {}", num_campaigns));

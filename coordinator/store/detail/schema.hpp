@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -22,6 +21,25 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// oldest_schema_version, each further one leads to the next version.
 [[nodiscard]] std::span<const std::string_view> schema_files();
 
+/// The schema as SQL: replaces each word in braces of a file of schema/ by the text that follows
+/// from the ResultSchema of the model.
+///
+///     {data_tables}         the tables of data that all runs share
+///     {truth_columns}       columns of run_result, one a line; also {estimate_columns},
+///                           {error_columns}; with a comma behind each {standard_error_columns},
+///                           {health_columns}
+///     {status_name}         status of r, a row of run_result, as text; also {loss_cause_name},
+///                           {loss_session_name}
+///     {health_values}       columns of r that begin with health_, without that
+///     {truth_of_parameter}  truth in r of the parameter p; also {estimate_of_parameter},
+///                           {error_of_parameter}
+///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²;
+///                           {budget_total_at_level} that of a row r at its own level
+///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
+///     {digested_tables}     names of the tables that campaign.table_digest is of
+///     {example_quantity}    its name, for comments; see example_quantity()
+[[nodiscard]] std::string with_quantities(std::string_view sql);
+
 /// The schema files as SQL, see with_quantities().
 [[nodiscard]] const std::vector<std::string>& migrations();
 
@@ -31,16 +49,14 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// Checks that a database is a campaign database, of a version that this program reads, and that
 /// its tables, views and indexes are those of its version and that there is nothing else. Nothing
 /// that the file defines is evaluated before its definition has been compared.
-/// @param path  For the message.
 /// @throws StoreError otherwise.
-void check_kind(Database& database, const std::filesystem::path& path);
+void check_kind(Database& database);
 
 /// As check_kind(), and that the file is as long as it says, that there is one campaign, and that
 /// each page of the tables that do not grow with the runs is what it should be, and the first pages
 /// of the others. Takes the same time for any number of runs.
-/// @param path  For the message.
 /// @throws StoreError otherwise.
-void check_campaign_file(Database& database, const std::filesystem::path& path);
+void check_campaign_file(Database& database);
 
 /// Rows of each table, by its name.
 using RowCounts = std::map<std::string, std::uint64_t>;

@@ -33,14 +33,6 @@ void Statement::bind(int position, std::uint32_t value) {
   bind(position, static_cast<std::int64_t>(value));
 }
 
-void Statement::bind(int position, const std::optional<double>& value) {
-  if (value) {
-    bind(position, *value);
-  } else {
-    check(sqlite3_bind_null(statement_.get(), position));
-  }
-}
-
 void Statement::bind(int position, double value) {
   if (!std::isfinite(value)) {
     database_->refuse(fmt::format("a number to be stored = {} (must be finite)", value));
@@ -48,12 +40,11 @@ void Statement::bind(int position, double value) {
   check(sqlite3_bind_double(statement_.get(), position, value));
 }
 
-void Statement::bind(int position, const std::optional<std::uint64_t>& value) {
-  if (value) {
-    bind(position, *value);
-  } else {
-    check(sqlite3_bind_null(statement_.get(), position));
-  }
+void Statement::bind_null(int position) { check(sqlite3_bind_null(statement_.get(), position)); }
+
+void Statement::bind_cell(int position, const Statement& row, int column) {
+  check(sqlite3_bind_value(statement_.get(), position,
+                           sqlite3_column_value(row.statement_.get(), column)));
 }
 
 void Statement::bind(int position, std::string_view value) {
@@ -102,6 +93,13 @@ std::string Statement::text(int column) const {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   const int size = sqlite3_column_bytes(statement_.get(), column);
   return text == nullptr ? std::string() : std::string(text, static_cast<std::size_t>(size));
+}
+
+std::optional<Interval> Statement::interval(int column) const {
+  const std::optional<double> lower = optional_real(column);
+  const std::optional<double> upper = optional_real(column + 1);
+  if (!lower || !upper) return std::nullopt;
+  return Interval{.lower = *lower, .upper = *upper, .confidence = default_confidence};
 }
 
 std::string Statement::shown(int column) const {

@@ -78,7 +78,7 @@ class StatisticRow {
   int position_ = 0;
 };
 
-bool is_worse(const WorstRun& left, const WorstRun& right) {
+bool is_worse(const RankedRun& left, const RankedRun& right) {
   if (left.magnitude != right.magnitude) return left.magnitude > right.magnitude;
   return left.run < right.run;
 }
@@ -115,18 +115,6 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
            share ? std::optional(share->upper) : std::nullopt, digests.results, digests.health);
 }
 
-namespace {
-
-/// Bounds in a column and the next one.
-std::optional<Interval> read_interval(const Statement& row, int column) {
-  const std::optional<double> lower = row.optional_real(column);
-  const std::optional<double> upper = row.optional_real(column + 1);
-  if (!lower || !upper) return std::nullopt;
-  return Interval{.lower = *lower, .upper = *upper, .confidence = default_confidence};
-}
-
-}  // namespace
-
 std::optional<Summary> read_summary(const Database& database) {
   Statement select = database.prepare(
       "SELECT num_finished, num_estimated, num_not_converged, num_not_finite, num_no_draw,"
@@ -141,7 +129,7 @@ std::optional<Summary> read_summary(const Database& database) {
                  .num_lost = select.count(8),
                  .num_given_up = select.count(5),
                  .num_within_objectives = select.count(10),
-                 .within_objectives = read_interval(select, 11),
+                 .within_objectives = select.interval(11),
                  .digests = {.results = select.text(6), .health = select.text(9)},
                  .computed_utc = select.text(7)};
 }
@@ -171,7 +159,7 @@ void replace_budgets(Database& database, const std::optional<ErrorBudget>& budge
   }
 }
 
-WorstRuns::Change WorstRuns::offer(const WorstRun& offered) {
+WorstRuns::Change WorstRuns::offer(const RankedRun& offered) {
   const bool is_full = runs_.size() == num_worst_runs;
   if (is_full && !is_worse(offered, runs_.back())) return {};
   Change change{.is_taken = true, .dropped = std::nullopt};

@@ -34,11 +34,11 @@ void replace_budgets(Database& database, const std::optional<ErrorBudget>& budge
 inline constexpr std::size_t num_worst_runs = 10;
 
 /// A run and its |error| of some parameter, SI.
-struct WorstRun {
+struct RankedRun {
   double magnitude = 0.0;
   RunIndex run;
 
-  bool operator==(const WorstRun&) const = default;
+  bool operator==(const RankedRun&) const = default;
 };
 
 /// The runs with the largest |error| of one parameter: the same ones in whatever order runs come.
@@ -51,13 +51,13 @@ class WorstRuns {
   };
 
   /// Takes a run if its |error| is among the largest; of equal ones the first run counts as larger.
-  Change offer(const WorstRun& offered);
+  Change offer(const RankedRun& offered);
 
   /// Largest first.
-  [[nodiscard]] const std::vector<WorstRun>& runs() const { return runs_; }
+  [[nodiscard]] const std::vector<RankedRun>& runs() const { return runs_; }
 
  private:
-  std::vector<WorstRun> runs_;
+  std::vector<RankedRun> runs_;
 };
 
 /// The worst runs of each parameter, by its index.

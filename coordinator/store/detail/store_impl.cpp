@@ -51,15 +51,6 @@ class ShortWait {
   Database& database_;
 };
 
-}  // namespace
-
-namespace detail {
-
-void configure(Database& database) {
-  database.distrust_content();
-  database.execute("PRAGMA foreign_keys = ON");
-}
-
 // The log comes and goes while a coordinator works, and it is there whenever a file says that it
 // needs one. So a file that says so, before and after no log was seen, lacks it.
 void check_that_log_is_there(const Database& database, const std::filesystem::path& file) {
@@ -75,12 +66,21 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 // First everything else, then the mark alone: whenever the file says that it needs no log, all is
 // in it, and whenever it says that it needs one, the log is there.
 std::optional<std::string> bring_to_rest(Database& database) {
-  if (!database.fold_log(Fold::what_no_reader_needs)) return std::string(reader_in_the_way);
+  if (!database.fold_log(detail::Fold::what_no_reader_needs)) return std::string(reader_in_the_way);
   if (!database.execute_unless_busy("UPDATE campaign SET is_log_needed = 0 WHERE is_log_needed")) {
     return std::string(writer_in_the_way);
   }
-  if (!database.fold_log(Fold::all_and_empty_it)) return std::string(reader_in_the_way);
+  if (!database.fold_log(detail::Fold::all_and_empty_it)) return std::string(reader_in_the_way);
   return std::nullopt;
+}
+
+}  // namespace
+
+namespace detail {
+
+void configure(Database& database) {
+  database.distrust_content();
+  database.execute("PRAGMA foreign_keys = ON");
 }
 
 void copy_whole(const Database& database, const std::filesystem::path& file,
@@ -98,7 +98,7 @@ void copy_whole(const Database& database, const std::filesystem::path& file,
 
 void prepare_reader(Database& database, const std::filesystem::path& file) {
   configure(database);
-  check_campaign_file(database, file);
+  check_campaign_file(database);
   if (is_older(database)) {
     migrate_privately(database);
   } else {
@@ -119,9 +119,9 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
       place(std::make_unique<detail::FilePlace>(file)),
       database(file, Access::read_write) {
   // The log may be that of another file: until all is checked, nothing of it may reach this one.
-  database.leave_files_alone();
+  database.fold_log_at_close(false);
   detail::configure(database);
-  detail::check_campaign_file(database, file);
+  detail::check_campaign_file(database);
   // Before anything is changed: a file that cannot be served is left as it is.
   const detail::RowCounts counts = detail::check_all_pages(database);
   detail::check_after_unclean_end(database);
@@ -139,7 +139,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   is_log_lost = is_perhaps_marked_ && !has_log;
   place->remember_log();
   check_place();
-  database.fold_log_at_close();
+  database.fold_log_at_close(true);
 }
 
 // Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.
@@ -159,7 +159,7 @@ Store::Impl::~Impl() {
   }
   // The file says that it needs its log, of which SQLite may think that all is in the file. Or what
   // has the name now, and the log beside it, are not ours.
-  if (is_perhaps_marked_ || place->is_lost()) database.leave_files_alone();
+  if (is_perhaps_marked_ || place->is_lost()) database.fold_log_at_close(false);
 }
 
 void Store::Impl::check_place() {
@@ -232,7 +232,7 @@ std::optional<std::string> Store::Impl::rest() {
   is_marked_ = false;
   is_perhaps_marked_ = true;
   const ShortWait nobody_is_waited_for(database);
-  const std::optional<std::string> reason = detail::bring_to_rest(database);
+  const std::optional<std::string> reason = bring_to_rest(database);
   is_perhaps_marked_ = reason.has_value();
   return reason;
 }

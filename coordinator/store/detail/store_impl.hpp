@@ -9,7 +9,6 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
@@ -18,13 +17,6 @@ namespace detail {
 
 /// Settings of every connection to a campaign database. A file from elsewhere is data.
 void configure(Database& database);
-
-/// @throws StoreError if the file says that it needs a log, and there is none.
-void check_that_log_is_there(const Database& database, const std::filesystem::path& file);
-
-/// Folds the log into the file; returns why it is still needed. @pre No coordinator serves the file
-/// but the caller.
-[[nodiscard]] std::optional<std::string> bring_to_rest(Database& database);
 
 /// Writes all that the database of a file holds to an empty file, which is whole without a log.
 /// @throws StoreError naming the file if a page of it is damaged, and else the draft.

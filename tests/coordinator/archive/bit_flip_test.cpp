@@ -11,7 +11,6 @@
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/listing.hpp"
-#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/summarise.hpp"
@@ -31,11 +30,11 @@ class BitFlips : public test::StoreTest {
     std::vector<RunResult> results = test::results_of_each_status(20);
     results.pop_back();
     Store store = test::store_of(file(), test::campaign_of(20), results);
-    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{19}, 1},
-                                              .attempt = {1},
-                                              .worker = test::session_1,
-                                              .reason = wire::LossReason::crashed,
-                                              .is_blamed = true},
+    const std::vector<Entry> entries{ReturnedRuns{.runs = {RunIndex{19}, 1},
+                                                  .attempt = {1},
+                                                  .worker = test::session_1,
+                                                  .reason = wire::LossReason::crashed,
+                                                  .is_blamed = true},
                                      GivenUpRun{.run = RunIndex{19}}};
     (void)store.write(entries);
     store.set_stop_plan(

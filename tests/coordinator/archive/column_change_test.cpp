@@ -86,11 +86,11 @@ class ColumnChange : public test::VerificationTest {
     store.record_event("kind", "text");
     const Delivery again{.result = results_[5], .worker = test::session_1, .attempt = {2}};
     const std::vector<Entry> entries{SecondDelivery{again},
-                                     LostRuns{.runs = {RunIndex{17}, 1},
-                                              .attempt = {1},
-                                              .worker = test::session_1,
-                                              .reason = wire::LossReason::crashed,
-                                              .is_blamed = true},
+                                     ReturnedRuns{.runs = {RunIndex{17}, 1},
+                                                  .attempt = {1},
+                                                  .worker = test::session_1,
+                                                  .reason = wire::LossReason::crashed,
+                                                  .is_blamed = true},
                                      GivenUpRun{.run = RunIndex{17}},
                                      WorkerEnded{.session = test::session_1}};
     (void)store.write(entries);
@@ -109,7 +109,7 @@ class ColumnChange : public test::VerificationTest {
     for (const RunResult& result : results_) {
       errors.push_back(std::abs(result.error(index(Parameter::k2c))));
     }
-    return test::check_of(parse_stop_rule("mean(k2c) within 90%"), errors);
+    return check_stop_rule(parse_stop_rule("mean(k2c) within 90%"), errors);
   }
 
   /// Other values of a column of this type, as SQL.
@@ -156,7 +156,7 @@ class ColumnChange : public test::VerificationTest {
     (void)verify(
         file(), {.model_version = "none"},
         [&](const Check& check) { checks_.emplace(check.name, check); }, test::never_stopped);
-    std::vector<std::string> failing = names(Verdict::fails);
+    std::vector<std::string> failing = names(CheckOutcome::fails);
     std::erase(failing, "model");
     return failing;
   }

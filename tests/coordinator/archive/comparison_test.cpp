@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/error_change.hpp"
@@ -28,14 +27,12 @@ struct Side {
   std::string model_version = "model";
   std::string build = "build";
   std::vector<RunResult> results = {};
-  std::uint64_t num_given_up = 0;
 };
 
 ComparedCampaign compared(const Side& side) {
   return {.campaign = side.campaign.clone(),
           .model_version = side.model_version,
           .build = side.build,
-          .num_given_up = side.num_given_up,
           .open_results = [results = side.results] {
             return [&results, next = std::size_t{0}]() mutable -> std::optional<RunResult> {
               if (next == results.size()) return std::nullopt;
@@ -45,7 +42,10 @@ ComparedCampaign compared(const Side& side) {
 }
 
 CampaignComparison compare_campaigns(const Side& first, const Side& second) {
-  return coordinator::compare_campaigns(compared(first), compared(second));
+  std::vector<ComparedMember> members(2);
+  members[1].comparison = coordinator::compare_campaigns(compared(first), compared(second));
+  adjust_together(members);
+  return *members[1].comparison;
 }
 
 /// Runs [0, count), whose error of parameter i is ±(i + 1)·(run + 1), by turns.
@@ -76,8 +76,6 @@ std::vector<ComparedMember> both(const CampaignComparison& comparison) {
   ComparedMember first, second;
   first.file = "a.db";
   second.file = "b.db";
-  first.missing = comparison.missing_in_first;
-  second.missing = comparison.missing_in_second;
   second.comparison = comparison;
   first.objectives = second.objectives =
       std::vector<double>(num_parameters, std::numeric_limits<double>::infinity());
@@ -298,35 +296,27 @@ TEST(Comparison, ReadsEachCampaignTwice) {
 
 using ComparedFile = test::StoreTest;
 
-// Results that were changed are refused before anything is made of them.
-TEST_F(ComparedFile, IsHeldAgainstItsDigestWhenItIsReadFirst) {
-  const MicroscopeCampaign campaign = test::campaign_of(5);
+TEST_F(ComparedFile, IsReadWithAllThatCountsAndHeldAgainstItsDigest) {
+  const MicroscopeCampaign campaign = test::campaign_of(9);
   {
     Store store = test::store_of(file(), campaign, test::results_of_each_status(5));
+    const Entry given_up = GivenUpRun{.run = RunIndex{7}};
+    (void)store.write({&given_up, 1});
     update_statistics(store, campaign);
   }
-  test::change(file(), "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 0");
-  const Store store = Store::open_read_only(file());
-  const auto compare = [&] {
-    (void)compare_campaigns(read_compared(store, test::never_stopped),
-                            read_compared(store, test::never_stopped));
-  };
-  EXPECT_THAT(test::error_of(compare), HasSubstr("the digest of its 5 results is "));
-}
-
-TEST_F(ComparedFile, IsReadWithAllThatCounts) {
-  const auto results = test::results_of_each_status(5);
-  const Store store = test::store_of(file(), test::campaign_of(9), results);
-  const ComparedCampaign read = read_compared(store, test::never_stopped);
-  EXPECT_EQ(read.campaign->num_runs, 9U);
-  EXPECT_EQ(read.model_version, model_version);
-  EXPECT_EQ(read.build, store.build());
-  for (int walk = 0; walk < 2; ++walk) {
-    const ResultStream next = read.open_results();
-    for (const RunResult& result : results) EXPECT_EQ(next()->run, result.run);
-    EXPECT_EQ(next(), std::nullopt);
+  const std::vector<std::filesystem::path> files{file(), file()};
+  for (const ComparedMember& member : compare_several(files, test::never_stopped)) {
+    EXPECT_EQ(member.num_runs, 9U);
+    EXPECT_EQ(member.statistics.num_estimated, 2U);
+    EXPECT_EQ(
+        member.missing,
+        (MissingEstimates{
+            .num_not_converged = 1, .num_not_finite = 1, .num_no_draw = 1, .num_given_up = 1}));
   }
-  EXPECT_THROW((void)read_compared(store, [] { return true; }), Interrupted);
+  EXPECT_THROW((void)compare_several(files, [] { return true; }), Interrupted);
+  test::change(file(), "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 0");
+  EXPECT_THAT(test::error_of([&] { (void)compare_several(files, test::never_stopped); }),
+              HasSubstr("the digest of its 5 results is "));
 }
 
 TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
@@ -354,17 +344,13 @@ TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
   EXPECT_EQ(num_marks, 1U);
 }
 
-// The worst runs of B fail: what is left of it looks no worse than A.
 TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
-  Side second = side(8);
-  worsen(second, Parameter::k2c, 1.0);
-  for (std::size_t run = 6; run < 8; ++run) second.results[run].status = RunStatus::not_finite;
-  second.num_given_up = 1;
-  const CampaignComparison comparison = compare_campaigns(side(8), second);
-  EXPECT_THAT(text_of(comparison),
+  std::vector<ComparedMember> members = both(compare_campaigns(side(8), side(6)));
+  members[1].missing = {.num_not_finite = 2, .num_given_up = 1};
+  EXPECT_THAT(comparison_text(members, lettered(2)),
               HasSubstr("6 runs of the same draws\n"
                         "Left out of B, without an estimate: 2 not finite, 1 given up.\n"));
-  const auto json = nlohmann::json::parse(comparison_json(both(comparison)));
+  const auto json = nlohmann::json::parse(comparison_json(members));
   EXPECT_EQ(json["num_first_without_estimate"], 0);
   EXPECT_EQ(json["num_second_without_estimate"], 3);
 }

@@ -3,11 +3,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <sstream>
+#include <system_error>
 
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/coordinator/archive/csv_cells.hpp"
 #include "tests/coordinator/archive/series_reading.hpp"
 
 namespace proofmass::coordinator {
@@ -19,6 +20,27 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+
+/// The cells of a line of CSV in which nothing is quoted.
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells(1);
+  for (const char character : line) {
+    if (character == ',') {
+      cells.emplace_back();
+    } else {
+      cells.back() += character;
+    }
+  }
+  return cells;
+}
+
+/// The number that a cell is; anything else fails the test.
+double number(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  EXPECT_TRUE(error == std::errc() && end == text.data() + text.size()) << text;
+  return value;
+}
 
 class ReplayTest : public test::StoreTest {
  protected:
@@ -66,7 +88,7 @@ TEST_F(ReplayTest, NamesEachValueThatDiffersAndWritesNothing) {
   ASSERT_EQ(differences.size(), 2U);
   EXPECT_EQ(differences[0].column, "num_rounds");
   EXPECT_EQ(differences[1].column, "estimate_a_c13_rad");
-  EXPECT_EQ(test::bits_of(test::number(differences[1].computed)), test::bits_of(sound));
+  EXPECT_EQ(test::bits_of(number(differences[1].computed)), test::bits_of(sound));
   expect_no_output();
   EXPECT_THAT(replay(store, 0), IsEmpty());
 }
@@ -182,10 +204,10 @@ TEST_F(ReplayTest, WritesTheSameBitsAsCsv) {
   std::size_t num_rows = 0;
   for (; std::getline(csv, line); ++num_rows) {
     line.pop_back();
-    const std::vector<std::string> cells = test::cells_of(line);
+    const std::vector<std::string> cells = cells_of(line);
     ASSERT_EQ(cells.size(), 11U);
-    ASSERT_EQ(test::number(cells[0]), static_cast<double>(num_rows));
-    ASSERT_EQ(test::bits_of(test::number(cells[7])), test::bits_of(expected.at(num_rows)));
+    ASSERT_EQ(number(cells[0]), static_cast<double>(num_rows));
+    ASSERT_EQ(test::bits_of(number(cells[7])), test::bits_of(expected.at(num_rows)));
   }
   EXPECT_EQ(num_rows, expected.size());
 }

@@ -190,10 +190,10 @@ TEST_F(ReplayedSpectra, EndWhenAsked) {
 }
 
 /// A review that knows of the worst run alone.
-Review review_of_worst(std::optional<WorstRun> worst) {
+Review review_of_worst(std::optional<RunValue> worst) {
   Review review;
-  MatrixRow& row = review.matrix.emplace_back();
-  row.answer.requirement.subject = Requirement::Subject::all_objectives;
+  RequirementAnswer& row = review.matrix.emplace_back();
+  row.requirement.subject = Requirement::Subject::all_objectives;
   row.worst = worst;
   return review;
 }
@@ -201,7 +201,7 @@ Review review_of_worst(std::optional<WorstRun> worst) {
 TEST_F(ReplayedSpectra, AreOfTheWorstRun) {
   const Store store = store_with(test::quick_campaign(3));
   const RunSpectra spectra =
-      worst_run_spectra(store, review_of_worst(WorstRun{RunIndex{2}, 0.9}), test::never_stopped);
+      worst_run_spectra(store, review_of_worst(RunValue{RunIndex{2}, 0.9}), test::never_stopped);
   EXPECT_EQ(spectra.run, RunIndex{2});
   const RunSpectra own = replayed_spectra(Replay(store), RunIndex{2}, test::never_stopped);
   ASSERT_EQ(spectra.sessions.size(), 11U);
@@ -215,7 +215,7 @@ TEST_F(ReplayedSpectra, SayWhyThereAreNone) {
   EXPECT_THAT(worst_run_spectra(store, review_of_worst({}), test::never_stopped).reasons,
               ElementsAre("No run has an estimate, or no quantity an objective."));
   EXPECT_THAT(
-      worst_run_spectra(store, review_of_worst(WorstRun{RunIndex{0}, 0.9}), test::never_stopped)
+      worst_run_spectra(store, review_of_worst(RunValue{RunIndex{0}, 0.9}), test::never_stopped)
           .reasons,
       ElementsAre("Run 0 cannot be replayed: model_version = hardy2013-2 (must be "
                   "hardy2013-4, the model of this program: others compute other bits)."));

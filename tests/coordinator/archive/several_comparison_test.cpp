@@ -1,5 +1,3 @@
-#include "coordinator/archive/several_comparison.hpp"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/archive/comparison.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/error_change.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"

@@ -16,7 +16,7 @@ namespace proofmass::test {
 class VerificationTest : public StoreTest {
  protected:
   using Check = coordinator::Check;
-  using Verdict = coordinator::Verdict;
+  using CheckOutcome = coordinator::CheckOutcome;
 
   VerificationTest() : campaign_(quick_campaign(18)) {
     static const std::vector<RunResult> results = simulated(campaign_);
@@ -39,7 +39,7 @@ class VerificationTest : public StoreTest {
   [[nodiscard]] const Check& check(const std::string& name) const { return checks_.at(name); }
 
   /// Names of the checks with a verdict, in alphabetical order.
-  [[nodiscard]] std::vector<std::string> names(Verdict verdict) const {
+  [[nodiscard]] std::vector<std::string> names(CheckOutcome verdict) const {
     std::vector<std::string> found;
     for (const auto& [name, check] : checks_) {
       if (check.verdict == verdict) found.push_back(name);

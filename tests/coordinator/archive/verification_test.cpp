@@ -39,7 +39,7 @@ TEST_F(Verification, SaysWhatItCannotCheckWhileTheFileIsServed) {
   EXPECT_EQ(check("digest").finding, "none is stored: a coordinator has the file, or was killed");
   update_statistics(store, campaign_);
   EXPECT_TRUE(verify_all());
-  EXPECT_EQ(check("digest").verdict, Verdict::holds);
+  EXPECT_EQ(check("digest").verdict, CheckOutcome::holds);
   const Delivery third{.result = results_[2], .worker = test::session_1, .attempt = {1}};
   (void)store.commit({&third, 1});
   EXPECT_TRUE(verify_all());
@@ -51,7 +51,7 @@ TEST_F(Verification, SaysWhatItCannotCheckWhileTheFileIsServed) {
 TEST_F(Verification, OfAFileWithoutResultsSimulatesNone) {
   (void)test::store_of(file(), campaign_, {});
   EXPECT_TRUE(verify_all());
-  EXPECT_EQ(check("simulation").verdict, Verdict::not_checked);
+  EXPECT_EQ(check("simulation").verdict, CheckOutcome::not_checked);
   EXPECT_EQ(check("simulation").finding, "no run is finished");
 }
 
@@ -78,7 +78,7 @@ TEST(CheckText, IsALineAndItsDetails) {
   EXPECT_EQ(check_text({.name = "digest", .finding = "of 18 runs", .details = {"abc"}}),
             "digest      ok           of 18 runs\n  abc\n");
   EXPECT_EQ(
-      check_text({.name = "model", .verdict = Verdict::fails, .finding = "no", .details = {}}),
+      check_text({.name = "model", .verdict = CheckOutcome::fails, .finding = "no", .details = {}}),
       "model       FAILS        no\n");
 }
 
@@ -86,7 +86,7 @@ TEST(CheckText, BreaksLinesBetweenWords) {
   std::string finding;
   for (int i = 0; i < 40; ++i) finding += "seven77 ";
   std::istringstream lines(check_text(
-      {.name = "digest", .verdict = Verdict::not_checked, .finding = finding, .details = {}}));
+      {.name = "digest", .verdict = CheckOutcome::not_checked, .finding = finding, .details = {}}));
   std::size_t num_lines = 0, num_words = 0;
   for (std::string line; std::getline(lines, line); ++num_lines) {
     EXPECT_LE(display_width(line), 80U);

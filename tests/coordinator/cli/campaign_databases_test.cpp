@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "coordinator/cli/program.hpp"
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/directory_look.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
@@ -49,11 +49,11 @@ class CampaignFolderTest : public testing::Test {
     std::vector<std::string> names;
     KnownCampaigns known;
     const CoordinatorStart start{.epoch = {7}, .host = "h", .version = "0"};
-    for (const FileOutcome& outcome : look_at_all(folder, known, start)) {
-      if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
-        names.push_back(prepared->campaign.definition->name);
+    for (const FileLook& look : look_at_all(folder, known, start)) {
+      if (look.store) {
+        names.push_back(look.record.status.name);
       } else {
-        warnings.push_back(std::get<FileFailure>(outcome).reason);
+        warnings.push_back(look.failure);
       }
     }
     return names;

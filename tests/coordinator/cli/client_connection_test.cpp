@@ -78,7 +78,9 @@ class ClientOfAPlayedCoordinator : public testing::Test {
   std::future<std::string> ask(ClientConnection& client) {
     return std::async(std::launch::async, [&client] {
       try {
-        return std::get<wire::DoneReply>(client.ask(wire::StatusRequest{})).text;
+        proto::RequestEnvelope request;
+        request.mutable_status();
+        return client.ask(request).done().text();
       } catch (const Error& error) {
         return std::string(error.what());
       }
@@ -102,7 +104,7 @@ TEST_F(ClientOfAPlayedCoordinator, GetsTheReplyToItsRequest) {
   ClientConnection client(config());
   for (const std::string text : {"first", "second"}) {
     auto reply = ask(client);
-    coordinator.answer(coordinator.receive().id, text);
+    coordinator.answer(coordinator.receive().request_id(), text);
     EXPECT_EQ(reply.get(), text);
   }
 }
@@ -111,11 +113,11 @@ TEST_F(ClientOfAPlayedCoordinator, PassesOverTheReplyToAnEarlierRequest) {
   PlayedCoordinator coordinator(endpoint_.address());
   ClientConnection client(config());
   auto first = ask(client);
-  const std::uint64_t id = coordinator.receive().id;
+  const std::uint64_t id = coordinator.receive().request_id();
   coordinator.answer(id, "first");
   EXPECT_EQ(first.get(), "first");
   auto second = ask(client);
-  const std::uint64_t next_id = coordinator.receive().id;
+  const std::uint64_t next_id = coordinator.receive().request_id();
   coordinator.answer(id, "first again");
   coordinator.answer(next_id, "second");
   EXPECT_EQ(second.get(), "second");
@@ -125,7 +127,7 @@ TEST_F(ClientOfAPlayedCoordinator, RefusesAReplyToNoRequestOfIts) {
   PlayedCoordinator coordinator(endpoint_.address());
   ClientConnection client(config());
   auto reply = ask(client);
-  coordinator.answer(coordinator.receive().id + 1, "x");
+  coordinator.answer(coordinator.receive().request_id() + 1, "x");
   EXPECT_EQ(reply.get(), failed("answers what was not asked"));
 }
 
@@ -162,10 +164,10 @@ TEST_F(ClientOfAPlayedCoordinator, AsksAgainWhenTheCoordinatorWasAway) {
   auto coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
   ClientConnection client(config());
   auto reply = ask(client);
-  const std::uint64_t id = coordinator->receive().id;
+  const std::uint64_t id = coordinator->receive().request_id();
   coordinator.reset();
   coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
-  EXPECT_EQ(coordinator->receive().id, id);
+  EXPECT_EQ(coordinator->receive().request_id(), id);
   coordinator->answer(id, "after all");
   EXPECT_EQ(reply.get(), "after all");
 }
@@ -174,11 +176,11 @@ TEST_F(ClientOfAPlayedCoordinator, AsksAgainThroughATunnelWhenTheCoordinatorWasA
   auto coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
   ClientConnection client(config());
   auto reply = ask(client);
-  const std::uint64_t id = coordinator->receive().id;
+  const std::uint64_t id = coordinator->receive().request_id();
   coordinator.reset();
   Tunnel(endpoint_.address()).break_off(5);
   coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
-  EXPECT_EQ(coordinator->receive().id, id);
+  EXPECT_EQ(coordinator->receive().request_id(), id);
   coordinator->answer(id, "after all");
   EXPECT_EQ(reply.get(), "after all");
 }
@@ -188,7 +190,7 @@ TEST_F(ClientOfAPlayedCoordinator, SaysWhatItMetWhenItsTimeRunsOut) {
   auto coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
   ClientConnection client(config(0.5));
   auto reply = ask(client);
-  coordinator->answer(coordinator->receive().id, "x");
+  coordinator->answer(coordinator->receive().request_id(), "x");
   EXPECT_EQ(reply.get(), "x");
   coordinator.reset();
   Tunnel(endpoint_.address()).break_off(3);
@@ -212,7 +214,7 @@ TEST_F(ClientOfAPlayedCoordinator, GivesUpOnACoordinatorThatIsSilent) {
   PlayedCoordinator coordinator(endpoint_.address());
   ClientConnection patient(config());
   auto reply = ask(patient);
-  coordinator.answer(coordinator.receive().id, "x");
+  coordinator.answer(coordinator.receive().request_id(), "x");
   EXPECT_EQ(reply.get(), "x");
   // Connecting takes less than this, so the silence is what ends it.
   ClientConnection client(config(0.5));

@@ -143,14 +143,6 @@ TEST(StatusTable, SaysThatThereIsNoCampaign) {
             "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
 }
 
-TEST(StatusTable, SaysWhyNothingCanBeStored) {
-  wire::CampaignStatus status = campaign("a", 0);
-  status.storage_failure = "a.db: disk full";
-  EXPECT_NE(status_text(status_with({status}), {.line_width_max = 79})
-                .find("\na: nothing can be stored: a.db: disk full\n"),
-            std::string::npos);
-}
-
 TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
   wire::CampaignStatus status = campaign("a", 100);
   status.phase = wire::CampaignPhase::finished;
@@ -418,9 +410,12 @@ TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
   EXPECT_TRUE(Json::parse(workers_json({}))["workers"].is_array());
 }
 
-TEST(DoneJson, SaysWhatWasDoneToWhat) {
-  EXPECT_EQ(Json::parse(done_json("pause", "a", {"campaign a: paused"})),
+TEST(DoneText, SaysWhatWasDoneToWhat) {
+  const proto::DoneReply done = wire::done_reply("campaign a: paused").done();
+  const ActionTaken action{.name = "pause", .kind = "campaign", .target = "a"};
+  EXPECT_EQ(Json::parse(done_text(done, action, OutputFormat::json)),
             Json({{"action", "pause"}, {"campaign", "a"}, {"text", "campaign a: paused"}}));
+  EXPECT_EQ(done_text(done, action, OutputFormat::text), "campaign a: paused\n");
 }
 
 }  // namespace

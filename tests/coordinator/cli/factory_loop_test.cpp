@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <future>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
@@ -15,6 +14,7 @@
 #include "coordinator/net/private_endpoint.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/played_coordinator.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -44,13 +44,10 @@ wire::StatusReply status_with(wire::CampaignPhase phase) {
 
 /// Answers one look as a coordinator does that does not know reports.
 void answer_look(test::PlayedCoordinator& coordinator, wire::CampaignPhase phase) {
-  const auto answer = [&](std::uint64_t id, const wire::ClientReply& reply) {
-    coordinator.answer(wire::encode(wire::ReplyPacket{id, reply}));
-  };
-  answer(coordinator.receive().id, status_with(phase));
-  answer(coordinator.receive().id, wire::WorkersReply{});
-  EXPECT_TRUE(std::holds_alternative<wire::FactoryReport>(coordinator.receive().request));
-  answer(0, wire::ErrorReply{"request = none (must be of a known kind)"});
+  coordinator.answer(coordinator.receive().request_id(), test::reply_with(status_with(phase)));
+  coordinator.answer(coordinator.receive().request_id(), test::reply_with(wire::WorkersReply{}));
+  EXPECT_TRUE(coordinator.receive().has_factory_report());
+  coordinator.answer(0, wire::error_reply("request = none (must be of a known kind)"));
 }
 
 TEST(FactoryLoop, GoesOnWithACoordinatorThatDoesNotKnowReports) {

@@ -1,8 +1,6 @@
 // Questions about results that a coordinator answers. A script takes the place of the program that
 // it asks: what that program answers is tested in tests/system/remote_results_test.cpp.
 
-#include "coordinator/cli/remote_answer.hpp"
-
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/file.h>
@@ -16,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/cli/client.hpp"
 #include "coordinator/net/answers.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/cli/program.hpp"
@@ -26,13 +25,10 @@
 namespace proofmass::coordinator {
 namespace {
 
+using proto::AnswerReply;
+using test::question;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-using wire::AnswerPartReply;
-using wire::AnswerPartRequest;
-using wire::AnswerReply;
-using wire::AnswerRequest;
-using wire::Question;
 
 // Of "hello\n", by sha256sum.
 constexpr const char* sha256_of_hello =
@@ -54,12 +50,13 @@ class Answering : public test::ServiceTest {
     client.emplace(service->clients_endpoint());
   }
 
-  [[nodiscard]] AnswerReply answer_to(const AnswerRequest& request) {
-    return std::get<AnswerReply>(client->ask(request));
+  [[nodiscard]] AnswerReply answer_to(const proto::RequestEnvelope& request) {
+    const proto::ReplyEnvelope reply = client->ask(request);
+    EXPECT_TRUE(reply.has_answer()) << reply.error().text();
+    return reply.answer();
   }
   [[nodiscard]] std::string part(const AnswerReply& answer, std::uint64_t offset) {
-    const AnswerPartRequest request{.answer_id = answer.answer_id, .offset = offset};
-    return std::get<AnswerPartReply>(client->ask(request)).content;
+    return client->ask(test::answer_part(answer.answer_id(), offset)).answer_part().content();
   }
 
   std::optional<test::PlayingClient> client;
@@ -67,12 +64,12 @@ class Answering : public test::ServiceTest {
 
 TEST_F(Answering, GivesOutputErrorsAndExitCodeOfTheCommand) {
   start_with("echo hello; echo wrong >&2; exit 3");
-  const AnswerReply answer = answer_to({.campaign = "a", .question = Question::report});
-  EXPECT_EQ(answer.size, 6U);
-  EXPECT_EQ(answer.sha256, sha256_of_hello);
-  EXPECT_EQ(answer.offset, 0U);
-  EXPECT_EQ(answer.exit_code, 3);
-  EXPECT_EQ(answer.error_text, "wrong\n");
+  const AnswerReply answer = answer_to(question());
+  EXPECT_EQ(answer.size(), 6U);
+  EXPECT_EQ(answer.sha256(), sha256_of_hello);
+  EXPECT_EQ(answer.offset(), 0U);
+  EXPECT_EQ(answer.exit_code(), 3U);
+  EXPECT_EQ(answer.error_text(), "wrong\n");
   EXPECT_EQ(part(answer, 0), "hello\n");
   EXPECT_EQ(part(answer, 4), "o\n");
   EXPECT_EQ(part(answer, 6), "");
@@ -82,15 +79,14 @@ TEST_F(Answering, GivesOutputErrorsAndExitCodeOfTheCommand) {
 TEST_F(Answering, TellsTheCommandFileOptionsAndStatement) {
   start_with("printf '<%s>' \"$@\"");
   const std::string file = (directory / "a.db").string();
-  const auto command = [&](const AnswerRequest& request) { return part(answer_to(request), 0); };
-  EXPECT_EQ(command({.campaign = "a",
-                     .question = Question::report,
-                     .options = {"--json", "--requirement=a b; \"$(c)\""}}),
+  const auto command = [&](const proto::RequestEnvelope& request) {
+    return part(answer_to(request), 0);
+  };
+  EXPECT_EQ(command(question(proto::QUESTION_REPORT, {"--json", "--requirement=a b; \"$(c)\""})),
             "<report><--json><--requirement=a b; \"$(c)\"><--><" + file + ">");
-  EXPECT_EQ(
-      command({.campaign = "a", .question = Question::query, .statement = "--json SELECT 'x'"}),
-      "<query><--><" + file + "><--json SELECT 'x'>");
-  EXPECT_EQ(command({.campaign = "a", .question = Question::sensitivity, .options = {"--run=3"}}),
+  EXPECT_EQ(command(question(proto::QUESTION_QUERY, {}, "--json SELECT 'x'")),
+            "<query><--><" + file + "><--json SELECT 'x'>");
+  EXPECT_EQ(command(question(proto::QUESTION_SENSITIVITY, {"--run=3"})),
             "<sensitivity><--run=3><--><" + file + ">");
 }
 
@@ -98,32 +94,33 @@ TEST_F(Answering, HasNoSettingsOfTheCoordinator) {
   setenv("PROOFMASS_CONFIG", "/somewhere", 1);
   start_with("env");
   unsetenv("PROOFMASS_CONFIG");
-  const std::string environment = part(answer_to({.campaign = "a"}), 0);
+  const std::string environment = part(answer_to(question()), 0);
   EXPECT_THAT(environment, HasSubstr("PATH="));
   EXPECT_THAT(environment, Not(HasSubstr("PROOFMASS")));
 }
 
 TEST_F(Answering, RefusesOptionsThatReadOrWriteOtherFiles) {
   start_with("echo never");
-  const auto error_of = [&](Question question, const std::string& option) {
-    return client->error(AnswerRequest{.campaign = "a",
-                                       .question = question,
-                                       .options = {option},
-                                       .statement = question == Question::query ? "x" : ""});
+  const auto error_of = [&](proto::Question kind, const std::string& option) {
+    return client->error(question(kind, {option}, kind == proto::QUESTION_QUERY ? "x" : ""));
   };
-  EXPECT_EQ(error_of(Question::query, "--attach=b=/etc/shadow"),
+  EXPECT_EQ(error_of(proto::QUESTION_QUERY, "--attach=b=/etc/shadow"),
             "option = --attach (must be one of those of query that a coordinator knows: --format "
             "--timeout --rows-max --columns)");
-  EXPECT_THAT(error_of(Question::query, "--json"), StartsWith("option = --json (must be"));
-  EXPECT_THAT(error_of(Question::report, "--html=/tmp/x"), StartsWith("option = --html (must be"));
-  EXPECT_THAT(error_of(Question::report, "/etc/shadow"), StartsWith("option = /etc/shadow (must"));
-  EXPECT_THAT(error_of(Question::report, "--jso"), StartsWith("option = --jso (must be"));
-  EXPECT_THAT(error_of(Question::database, "--json"), StartsWith("option = --json (must be"));
+  EXPECT_THAT(error_of(proto::QUESTION_QUERY, "--json"), StartsWith("option = --json (must be"));
+  EXPECT_THAT(error_of(proto::QUESTION_REPORT, "--html=/tmp/x"),
+              StartsWith("option = --html (must be"));
+  EXPECT_THAT(error_of(proto::QUESTION_REPORT, "/etc/shadow"),
+              StartsWith("option = /etc/shadow (must"));
+  EXPECT_THAT(error_of(proto::QUESTION_REPORT, "--jso"), StartsWith("option = --jso (must be"));
+  EXPECT_THAT(error_of(proto::QUESTION_DATABASE, "--json"), StartsWith("option = --json (must be"));
 }
 
 TEST_F(Answering, NeedsACampaignThatIsServed) {
   start_with("echo never");
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "b"}), "campaign = b (is not served)");
+  proto::RequestEnvelope elsewhere = question();
+  elsewhere.mutable_answer()->set_campaign("b");
+  EXPECT_EQ(client->error(elsewhere), "campaign = b (is not served)");
 }
 
 // The coordinator still has the campaign's own file open, which has lost its name.
@@ -131,9 +128,9 @@ TEST_F(Answering, IsNotThatOfACampaignWhoseFileTookTheName) {
   start_with("echo never");
   (void)files.open(test::campaign_of("b", 5), {}, {});
   std::filesystem::rename(directory / "b.db", directory / "a.db");
-  for (const Question question : {Question::report, Question::database}) {
+  for (const proto::Question kind : {proto::QUESTION_REPORT, proto::QUESTION_DATABASE}) {
     EXPECT_EQ(
-        client->error(AnswerRequest{.campaign = "a", .question = question}),
+        client->error(question(kind)),
         "campaign database = a.db (took the place of the file that is being served, and is of "
         "another campaign; move it away)");
   }
@@ -144,7 +141,7 @@ TEST_F(Answering, IsRefusedWhereThereIsNoProgram) {
   start({test::campaign_of("a", 5)});
   client.emplace(service->clients_endpoint());
   EXPECT_EQ(
-      client->error(AnswerRequest{.campaign = "a"}),
+      client->error(question()),
       "this coordinator cannot answer questions about results, as the program proofmass is not "
       "beside proofmass-coordinator; install it there");
 }
@@ -152,55 +149,31 @@ TEST_F(Answering, IsRefusedWhereThereIsNoProgram) {
 TEST_F(Answering, SaysWhyAProgramCannotBeStarted) {
   start_with("echo never");
   std::filesystem::remove(config.answer_program);
-  EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}),
+  EXPECT_THAT(client->error(question()),
               HasSubstr("program: cannot be started: No such file or directory"));
 }
 
 TEST_F(Answering, SaysThatItsOutputHasNoPlace) {
   config.answer_directory = directory / "missing" / "answers";
   start_with("echo never");
-  EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}),
-              HasSubstr("answers: No such file or directory"));
-}
-
-TEST_F(Answering, EndsAnOutputThatIsTooLarge) {
-  start_with("exec head -c 70000000 /dev/zero");
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "the answer has more than 67108864 bytes; ask for less, or fetch the database");
+  EXPECT_THAT(client->error(question()), HasSubstr("answers: No such file or directory"));
 }
 
 TEST_F(Answering, EndsAProgramThatTakesTooLong) {
   config.answer_duration_max = std::chrono::milliseconds(300);
   start_with("exec sleep 1000");
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "there was no answer within 0.3 s; ask for less");
+  EXPECT_EQ(client->error(question()), "there was no answer within 0.3 s; ask for less");
 }
 
 TEST_F(Answering, SaysThatAProgramCrashed) {
   start_with("kill -TERM $$");
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "answer: the process was killed by signal 15 (Terminated)");
+  EXPECT_EQ(client->error(question()), "answer: the process was killed by signal 15 (Terminated)");
 }
 
-// The programs wait until the service ends, which ends them.
-TEST_F(Answering, AnswersSoManyQuestionsAtATime) {
-  start_with("exec sleep 1000");
-  for (std::size_t i = 0; i < Answers::num_computing_max; ++i) {
-    client->send(100 + i, AnswerRequest{.campaign = "a",
-                                        .question = Question::sensitivity,
-                                        .options = {"--run=" + std::to_string(i)}});
-  }
-  client->send(200, AnswerRequest{.campaign = "a"});
-  const wire::ReplyPacket reply = client->receive_final();
-  EXPECT_EQ(reply.id, 200U);
-  EXPECT_EQ(std::get<wire::ErrorReply>(reply.reply).text,
-            "4 questions are being answered, which is the limit; try again later");
-}
-
-// Others do not wait for one that takes long.
+// Others do not wait for one that takes long, and which the end of the service ends.
 TEST_F(Answering, LeavesTheServiceToOthers) {
   start_with("exec sleep 1000");
-  client->send(1, AnswerRequest{.campaign = "a"});
+  client->send(1, question());
   test::PlayingClient other(service->clients_endpoint());
   EXPECT_EQ(other.status().campaigns.at(0).name, "a");
 }
@@ -208,10 +181,9 @@ TEST_F(Answering, LeavesTheServiceToOthers) {
 TEST_F(Answering, KeepsNoMoreAnswersThanItMay) {
   start_with("echo $2");
   for (std::size_t i = 0; i < Answers::num_kept_max; ++i) {
-    EXPECT_EQ(answer_to({.campaign = "a", .options = {"--json"}}).size, 7U) << i;
+    EXPECT_EQ(answer_to(question(proto::QUESTION_REPORT, {"--json"})).size(), 7U) << i;
   }
-  EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}),
-              StartsWith("16 questions are being answered"));
+  EXPECT_THAT(client->error(question()), StartsWith("16 questions are being answered"));
 }
 
 // Their requests have the same bytes, so one process answers both. A client's requests are taken in
@@ -221,24 +193,25 @@ TEST_F(Answering, GivesOneAnswerToAllWhoAskTheSameAtTheSameTime) {
   start_with("until [ -e '" + gate.string() + "' ]; do :; done; echo hello");
   test::PlayingClient other(service->clients_endpoint());
   for (test::PlayingClient* const asking : {&*client, &other}) {
-    asking->send(100, AnswerRequest{.campaign = "a"});
+    asking->send(100, question());
     (void)asking->status();
   }
   std::ofstream{gate};
-  const auto answer = std::get<AnswerReply>(client->receive_final().reply);
-  EXPECT_EQ(std::get<AnswerReply>(other.receive_final().reply).answer_id, answer.answer_id);
+  const std::uint64_t answer_id = client->receive_final().answer().answer_id();
+  EXPECT_NE(answer_id, 0U);
+  EXPECT_EQ(other.receive_final().answer().answer_id(), answer_id);
   for (test::PlayingClient* const reading : {&*client, &other}) {
     for (const auto& [offset, content] : {std::pair(0U, "hello\n"), std::pair(6U, "")}) {
-      const AnswerPartRequest request{.answer_id = answer.answer_id, .offset = offset};
-      EXPECT_EQ(std::get<AnswerPartReply>(reading->ask(request)).content, content);
+      const proto::ReplyEnvelope reply = reading->ask(test::answer_part(answer_id, offset));
+      EXPECT_TRUE(reply.has_answer_part());
+      EXPECT_EQ(reply.answer_part().content(), content);
     }
   }
 }
 
 TEST_F(Answering, KnowsNoAnswerThatItDidNotGive) {
   start_with("echo never");
-  EXPECT_EQ(client->error(AnswerPartRequest{.answer_id = 1}),
-            "this answer is not kept any more; ask again");
+  EXPECT_EQ(client->error(test::answer_part(1)), "this answer is not kept any more; ask again");
 }
 
 TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
@@ -263,19 +236,18 @@ TEST(Fetch, LeavesNoFileIfNobodyIsThere) {
 // The script copies the file that it is to back up.
 TEST_F(Answering, SendsOfADatabaseOnlyWhatTheClientLacks) {
   start_with("[ \"$1 $2\" = 'backup --' ] && printf 'hello\\nworld' >\"$4\"");
-  const AnswerRequest all{.campaign = "a", .question = Question::database};
-  EXPECT_EQ(answer_to(all).offset, 0U);
-  const AnswerRequest rest{.campaign = "a",
-                           .question = Question::database,
-                           .known_size = 6,
-                           .known_sha256 = sha256_of_hello};
+  const proto::RequestEnvelope all = question(proto::QUESTION_DATABASE);
+  EXPECT_EQ(answer_to(all).offset(), 0U);
+  proto::RequestEnvelope rest = all;
+  rest.mutable_answer()->set_known_size(6);
+  rest.mutable_answer()->set_known_sha256(sha256_of_hello);
   const AnswerReply answer = answer_to(rest);
-  EXPECT_EQ(answer.offset, 6U);
+  EXPECT_EQ(answer.offset(), 6U);
   EXPECT_EQ(part(answer, 6), "world");
   for (const std::uint64_t other_size : {5U, 7U, 1000U}) {
-    AnswerRequest other = rest;
-    other.known_size = other_size;
-    EXPECT_EQ(answer_to(other).offset, 0U) << other_size;
+    proto::RequestEnvelope other = rest;
+    other.mutable_answer()->set_known_size(other_size);
+    EXPECT_EQ(answer_to(other).offset(), 0U) << other_size;
   }
   EXPECT_TRUE(std::filesystem::is_empty(config.answer_directory));
 }
@@ -299,8 +271,7 @@ TEST_F(Answering, IsFetchedByOneProcessAtATime) {
 
 TEST_F(Answering, SaysWhyThereIsNoCopy) {
   start_with("echo 'database = x (is damaged)' >&2; exit 1");
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a", .question = Question::database}),
-            "database = x (is damaged)\n");
+  EXPECT_EQ(client->error(question(proto::QUESTION_DATABASE)), "database = x (is damaged)\n");
 }
 
 TEST_F(Answering, GivesAnAnswerToTheKeyThatAskedOnly) {
@@ -316,11 +287,10 @@ TEST_F(Answering, GivesAnAnswerToTheKeyThatAskedOnly) {
   start({test::campaign_of("a", 5)});
   ClientConnection owner({.endpoint = service->clients_endpoint(), .keys = directory / "keys"});
   ClientConnection other({.endpoint = service->clients_endpoint(), .keys = directory / "eve"});
-  const auto answer = std::get<AnswerReply>(owner.ask(AnswerRequest{.campaign = "a"}));
-  const AnswerPartRequest request{.answer_id = answer.answer_id};
-  EXPECT_THAT(std::get<wire::ErrorReply>(other.ask(request)).text,
-              HasSubstr("is not kept any more"));
-  EXPECT_EQ(std::get<AnswerPartReply>(owner.ask(request)).content, "hello\n");
+  const proto::RequestEnvelope request =
+      test::answer_part(owner.ask(question()).answer().answer_id());
+  EXPECT_THAT(other.ask(request).error().text(), HasSubstr("is not kept any more"));
+  EXPECT_EQ(owner.ask(request).answer_part().content(), "hello\n");
 }
 
 /// A coordinator of which a test makes up the replies.
@@ -330,14 +300,16 @@ class MadeUpAnswer : public testing::Test {
   [[nodiscard]] std::string read(std::vector<std::string> parts, std::uint64_t size) {
     std::string taken;
     std::size_t next = 0;
-    const Ask ask = [&](const wire::ClientRequest& request) -> wire::ClientReply {
-      EXPECT_EQ(std::get<AnswerPartRequest>(request).offset, taken.size());
+    const Ask ask = [&](const proto::RequestEnvelope& request) {
+      EXPECT_EQ(request.answer_part().offset(), taken.size());
       ++num_asked_;
-      return AnswerPartReply{next < parts.size() ? parts[next++] : ""};
+      proto::ReplyEnvelope reply;
+      reply.mutable_answer_part()->set_content(next < parts.size() ? parts[next++] : "");
+      return reply;
     };
     AnswerReply answer;
-    answer.answer_id = 1;
-    answer.size = size;
+    answer.set_answer_id(1);
+    answer.set_size(size);
     read_answer(ask, answer, [&](std::string_view text) { taken += text; });
     return taken;
   }

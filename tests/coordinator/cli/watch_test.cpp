@@ -9,11 +9,11 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/display_output.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -133,8 +133,9 @@ namespace {
 
 using wire::CampaignPhase;
 
-wire::StatusReply status_of(const std::vector<std::pair<std::string, CampaignPhase>>& campaigns) {
-  wire::StatusReply status;
+proto::ReplyEnvelope status_reply(
+    const std::vector<std::pair<std::string, CampaignPhase>>& campaigns) {
+  wire::StatusReply status{.version = "v", .model_version = "m", .campaigns = {}};
   for (const auto& [name, phase] : campaigns) {
     wire::CampaignStatus campaign;
     campaign.name = name;
@@ -142,7 +143,7 @@ wire::StatusReply status_of(const std::vector<std::pair<std::string, CampaignPha
     campaign.num_runs = 10;
     status.campaigns.push_back(campaign);
   }
-  return status;
+  return test::reply_with(status);
 }
 
 /// How a watch went whose questions are answered with the replies, one after the other.
@@ -152,13 +153,13 @@ struct Watched {
   std::size_t num_pauses = 0;
 };
 
-Watched watch(const std::vector<wire::ClientReply>& replies,
+Watched watch(const std::vector<proto::ReplyEnvelope>& replies,
               const std::optional<std::string>& campaign = std::nullopt) {
   std::FILE* const file = std::tmpfile();
   WatchDisplay display(WatchMode::lines, file);
   Watched watched;
-  const Ask ask = [&](const wire::ClientRequest& request) {
-    EXPECT_TRUE(std::holds_alternative<wire::StatusRequest>(request));
+  const Ask ask = [&](const proto::RequestEnvelope& request) {
+    EXPECT_TRUE(request.has_status());
     return replies.at(watched.num_questions++);
   };
   watched.exit_code =
@@ -169,36 +170,36 @@ Watched watch(const std::vector<wire::ClientReply>& replies,
 
 TEST(Watch, EndsWhenAllCampaignsAreFinished) {
   const Watched watched =
-      watch({status_of({{"a", CampaignPhase::active}, {"b", CampaignPhase::active}}),
-             status_of({{"a", CampaignPhase::finished}, {"b", CampaignPhase::paused}}),
-             status_of({{"a", CampaignPhase::finished}, {"b", CampaignPhase::finished}})});
+      watch({status_reply({{"a", CampaignPhase::active}, {"b", CampaignPhase::active}}),
+             status_reply({{"a", CampaignPhase::finished}, {"b", CampaignPhase::paused}}),
+             status_reply({{"a", CampaignPhase::finished}, {"b", CampaignPhase::finished}})});
   EXPECT_EQ(watched.exit_code, exit_done);
   EXPECT_EQ(watched.num_questions, 3U);
   EXPECT_EQ(watched.num_pauses, 2U);
 }
 
 TEST(Watch, EndsWhenTheNamedCampaignIsFinished) {
-  const Watched watched = watch({status_of({{"a", CampaignPhase::cancelled},
-                                            {"b", CampaignPhase::finished},
-                                            {"c", CampaignPhase::active}})},
+  const Watched watched = watch({status_reply({{"a", CampaignPhase::cancelled},
+                                               {"b", CampaignPhase::finished},
+                                               {"c", CampaignPhase::active}})},
                                 "b");
   EXPECT_EQ(watched.exit_code, exit_done);
   EXPECT_EQ(watched.num_questions, 1U);
 }
 
 TEST(Watch, FailsIfACampaignIsCancelled) {
-  EXPECT_EQ(watch({status_of({{"a", CampaignPhase::finished}, {"b", CampaignPhase::cancelled}})})
+  EXPECT_EQ(watch({status_reply({{"a", CampaignPhase::finished}, {"b", CampaignPhase::cancelled}})})
                 .exit_code,
             exit_cannot_be_done);
 }
 
 TEST(Watch, EndsAtOnceWithoutCampaigns) {
-  const Watched watched = watch({wire::StatusReply{}});
+  const Watched watched = watch({status_reply({})});
   EXPECT_EQ(watched.exit_code, exit_done);
   EXPECT_EQ(watched.num_pauses, 0U);
 }
 
-std::string error_of(const wire::ClientReply& reply, const std::string& campaign) {
+std::string error_of(const proto::ReplyEnvelope& reply, const std::string& campaign) {
   try {
     (void)watch({reply}, campaign);
   } catch (const Error& error) {
@@ -209,18 +210,18 @@ std::string error_of(const wire::ClientReply& reply, const std::string& campaign
 
 TEST(Watch, SaysWhichCampaignsThereAre) {
   EXPECT_EQ(
-      error_of(status_of({{"a", CampaignPhase::active}, {"b", CampaignPhase::active}}), "hardy"),
+      error_of(status_reply({{"a", CampaignPhase::active}, {"b", CampaignPhase::active}}), "hardy"),
       "campaign = hardy (there is a, b)");
-  EXPECT_EQ(error_of(wire::StatusReply{}, "hardy"), "campaign = hardy (there is none)");
+  EXPECT_EQ(error_of(status_reply({}), "hardy"), "campaign = hardy (there is none)");
 }
 
 TEST(Reply, OfAnotherKindIsAnError) {
-  EXPECT_EQ(error_of(wire::DoneReply{"x"}, "a"),
+  EXPECT_EQ(error_of(wire::done_reply("x"), "a"),
             "reply = of another kind (must be that of the request)");
 }
 
 TEST(Reply, ThatRefusesIsAnErrorInTheCoordinatorsWords) {
-  EXPECT_EQ(error_of(wire::ErrorReply{"a = b (c)"}, "a"), "a = b (c)");
+  EXPECT_EQ(error_of(wire::error_reply("a = b (c)"), "a"), "a = b (c)");
 }
 
 }  // namespace

@@ -12,7 +12,6 @@ using coordinator::is_audited;
 class AuditTest : public DispatchFixture {
  protected:
   void SetUp() override {
-    begin();
     add_campaign(one, 1, 0, 1.0);
     add_worker(first);
     outbox.forget();
@@ -47,14 +46,14 @@ TEST_F(AuditTest, GoesToAnotherWorker) {
   outbox.forget();
   deliver(first, one, {0});
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
-  const auto lease = outbox.take_sent<wire::RunLease>(second);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(lease.attempt, Attempt{2});
+  (void)outbox.take_sent<proto::ResultAck>(first);
+  const auto lease = outbox.take_sent<proto::RunLease>(second);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt(), 2U);
   EXPECT_FALSE(is_finished(campaign(one)));
 
   deliver(second, one, {0}, 2);
-  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::ResultAck>(second)), Runs{{0}});
   EXPECT_EQ(outbox.take_compared(), Runs{{0}});
   EXPECT_TRUE(state.leases.empty());
   EXPECT_FALSE(is_finished(campaign(one)));
@@ -77,13 +76,14 @@ TEST_F(AuditTest, IsNotDoneByAFirstWorkerThatRepeatsItself) {
   outbox.forget();
 }
 
-TEST_F(AuditTest, CountsWhatDiffersAmongWhatItCompared) {
+TEST_F(AuditTest, ReportsAndCountsWhatDiffersAmongWhatItCompared) {
   add_worker(second);
   deliver(first, one, {0});
   commit(one);
   deliver(second, one, {0}, 2);
   outbox.forget();
   on_compared(state, one, {0}, second, false, now, outbox);
+  EXPECT_EQ(outbox.take_events().at(0), "result_mismatch run=0 worker=2");
   EXPECT_EQ(campaign(one).num_audited, 1U);
   EXPECT_EQ(campaign(one).num_mismatches, 1U);
   EXPECT_EQ(campaign(one).phase, coordinator::Phase::finished);
@@ -96,23 +96,23 @@ TEST_F(AuditTest, WaitsForAnotherWorkerThatIsBusy) {
   outbox.forget();
   deliver(first, one, {0});
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
+  (void)outbox.take_sent<proto::ResultAck>(first);
   outbox.expect_nothing_more();
   heartbeat(second);
-  (void)outbox.take_sent<wire::RunLease>(second);
+  (void)outbox.take_sent<proto::RunLease>(second);
 }
 
 TEST_F(AuditTest, GoesToTheSameWorkerIfThereIsNoOther) {
   deliver(first, one, {0});
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+  (void)outbox.take_sent<proto::ResultAck>(first);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).attempt(), 2U);
 }
 
 TEST_F(AuditTest, ThatIsLostIsLentAgain) {
   add_worker(second);
   complete(first, one, {0});
-  on_bye(state, second, {}, now, outbox);
+  on_bye(state, second, LossReason::preempted, now, outbox);
   outbox.forget();
   add_worker(third);
   EXPECT_EQ(state.workers.at(third).num_lent + state.workers.at(first).num_lent, 1U);
@@ -141,7 +141,7 @@ TEST_F(AuditTest, ThatCrashesEveryWorkerIsGivenUp) {
 
 TEST_F(AuditTest, OfWhatWasStoredBeforeTheRestartIsDoneByAnybody) {
   StoredCampaign stored = stored_campaign(3);
-  stored.audit_fraction = 1.0;
+  stored.control.audit_fraction = 1.0;
   stored.finished = {{{0}, 3}};
   stored.compared = {{{1}, 1}};
   on_campaign(state, two, stored, now, outbox);
@@ -152,8 +152,8 @@ TEST_F(AuditTest, OfWhatWasStoredBeforeTheRestartIsDoneByAnybody) {
 
 TEST_F(AuditTest, OfAFinishedCampaignIsNotDoneAgain) {
   StoredCampaign stored = stored_campaign(3);
-  stored.audit_fraction = 1.0;
-  stored.phase = coordinator::Phase::finished;
+  stored.control.audit_fraction = 1.0;
+  stored.control.phase = coordinator::Phase::finished;
   stored.finished = {{{0}, 3}};
   on_campaign(state, two, stored, now, outbox);
   EXPECT_TRUE(is_finished(campaign(two)));

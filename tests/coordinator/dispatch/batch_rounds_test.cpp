@@ -21,7 +21,9 @@
 #include "coordinator/dispatch/results.hpp"
 #include "coordinator/dispatch/workers.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "core/runs.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -97,18 +99,12 @@ class PlayedFleet final : public Outbox {
     if (plan.workers == Workers::expected) config.num_slots_expected = plan.num_workers * num_slots;
     state_ = initial_state(config, {}, {});
     if (plan.workers != Workers::registered) begin_campaign(plan.num_runs, std::move(finished));
-    const wire::Hello hello{.worker_name = "w",
-                            .host = "h",
-                            .process_id = 1,
-                            .num_slots = static_cast<std::uint32_t>(num_slots),
-                            .model_version = std::string(model_version),
-                            .build = "test",
-                            .former = {}};
+    const auto hello =
+        test::make_hello("w", "h", static_cast<std::uint32_t>(num_slots), model_version);
     for (std::uint64_t i = 1; i <= plan.num_workers; ++i) {
       workers_[WorkerId{i}].threads.resize(plan.num_threads);
       on_hello(state_, WorkerId{i}, SessionId{i}, {}, hello, {}, *this);
-      on_heartbeat(state_, WorkerId{i},
-                   {.num_runs_max = wire::runs_per_lease_max, .held = {}, .computing = {}}, 1, {},
+      on_heartbeat(state_, WorkerId{i}, test::make_heartbeat(wire::runs_per_lease_max), 1, {},
                    *this);
     }
     if (plan.workers == Workers::registered) begin_campaign(plan.num_runs, std::move(finished));
@@ -139,16 +135,14 @@ class PlayedFleet final : public Outbox {
                                  [&](double begins) { return begins < time; });
   }
 
-  void send(WorkerId id, wire::Message message) override {
-    const auto* const lease = std::get_if<wire::RunLease>(&message);
-    if (lease == nullptr) return;
-    PlayedWorker& worker = workers_.at(id);
-    for (std::uint64_t run = lease->runs.first.value; run < lease->runs.end(); ++run) {
-      worker.queue.push_back(
-          {.attempt = lease->attempt, .run = {run}, .batch_runs_max = lease->batch_runs_max});
+  void send(WorkerId id, proto::Envelope message) override {
+    const proto::RunLease& lease = message.run_lease();  // Without runs if it is none.
+    for (const RunIndex run : indices_of(std::array{wire::runs_of(lease)})) {
+      workers_.at(id).queue.push_back(
+          {.attempt = {lease.attempt()}, .run = run, .batch_runs_max = lease.batch_runs_max()});
     }
   }
-  void send_definition(WorkerId, const wire::CampaignRequest&,
+  void send_definition(WorkerId, CampaignId, std::uint64_t,
                        const std::shared_ptr<const Campaign>&) override {}
   void store(WorkerId, wire::LeasedResult result) override {
     stored_.push_back(result.computed.result.run);
@@ -156,7 +150,9 @@ class PlayedFleet final : public Outbox {
   void compare(WorkerId, wire::LeasedResult) override {
     ADD_FAILURE() << "a run was computed twice";
   }
-  void record(const Loss&) override { ADD_FAILURE() << "runs were lost"; }
+  void record(CampaignId, WorkerId, const ReturnedRuns&) override {
+    ADD_FAILURE() << "runs were lost";
+  }
   void give_up(CampaignId, RunIndex) override { ADD_FAILURE() << "a run was given up"; }
   void log(Event, CampaignId) override {}
 
@@ -166,9 +162,7 @@ class PlayedFleet final : public Outbox {
     campaign.num_runs = num_runs;
     on_campaign(state_, id_,
                 {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
-                 .finished = std::move(finished),
-                 .given_up = {},
-                 .blamed = {}},
+                 .finished = std::move(finished)},
                 {}, *this);
   }
 
@@ -187,21 +181,19 @@ class PlayedFleet final : public Outbox {
   void deliver(WorkerId id, std::size_t thread, const BatchTime& batch_time) {
     const PlayedBatch batch = std::exchange(workers_.at(id).threads[thread], {});
     if (batch.runs.size() < batch_lanes) partial_batches_begin_.push_back(batch.begins);
-    std::map<wire::Attempt, wire::ResultBatch> messages;
+    std::map<wire::Attempt, std::vector<wire::ComputedRun>> messages;
     for (const HeldRun& held : batch.runs) {
       wire::ComputedRun computed;
       computed.result.run = held.run;
       computed.result.num_draws = 1;
       computed.elapsed_s = batch.ends - batch.begins;
-      messages[held.attempt].campaign = id_;
-      messages[held.attempt].attempt = held.attempt;
-      messages[held.attempt].results.push_back(computed);
+      messages[held.attempt].push_back(computed);
     }
     workers_.at(id).take_batches(batch.ends, batch_time);
     const TimePoint now = TimePoint{} + std::chrono::duration_cast<Duration>(
                                             std::chrono::duration<double>(batch.ends));
-    for (const auto& [attempt, message] : messages) {
-      on_results(state_, id, message, now, *this);
+    for (const auto& [attempt, results] : messages) {
+      on_results(state_, id, id_, attempt, results, now, *this);
       on_committed(state_, id_, std::exchange(stored_, {}), now, *this);
     }
   }

@@ -8,18 +8,15 @@ namespace {
 using coordinator::Phase;
 using Ranges = std::vector<RunRange>;
 
-class CampaignTest : public DispatchFixture {
- protected:
-  void SetUp() override { begin(); }
-};
+class CampaignTest : public DispatchFixture {};
 
 TEST_F(CampaignTest, OfHigherPriorityIsLentFirst) {
   add_campaign(one, 1);
   add_campaign(two, 1, 5);
   add_worker(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, two);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
   deliver(first, two, {0});
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, one);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), one.value);
   outbox.forget();
 }
 
@@ -27,13 +24,13 @@ TEST_F(CampaignTest, TheOlderOfEqualPriorityIsLentFirst) {
   add_campaign(two, 1);
   add_campaign(one, 1);
   add_worker(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, two);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
 }
 
 TEST_F(CampaignTest, WorkersThatWaitAreLentItsRunsAtOnce) {
   add_worker(first);
   add_campaign(one, 1);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
 }
 
 TEST_F(CampaignTest, OnlyWhatIsNotFinishedIsLent) {
@@ -42,7 +39,7 @@ TEST_F(CampaignTest, OnlyWhatIsNotFinishedIsLent) {
   stored.given_up = {{{9}, 1}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{4}, 1}));
 }
 
 TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
@@ -52,7 +49,7 @@ TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
   stored.blamed = {{.run = {7}, .num_crashes = 1, .attempt = {1}}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 2}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{4}, 2}));
   deliver(first, one, {4, 5});
   commit(one);
   EXPECT_EQ(campaign(one).phase, Phase::finished);
@@ -103,9 +100,9 @@ TEST_F(CampaignTest, ThatIsRetriedLendsTheRunsThatWereGivenUpAsSuspects) {
   EXPECT_EQ(campaign(one).phase, Phase::active);
   EXPECT_TRUE(campaign(one).given_up.empty());
   add_worker(first, 4);
-  const auto lease = outbox.take_sent<wire::RunLease>(first);
-  EXPECT_EQ(lease.runs, (RunRange{{1}, 1}));
-  EXPECT_TRUE(lease.is_alone);
+  const auto lease = outbox.take_sent<proto::RunLease>(first);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{1}, 1}));
+  EXPECT_TRUE(lease.is_alone());
   outbox.forget();
 }
 
@@ -114,14 +111,15 @@ TEST_F(CampaignTest, ThatIsPausedIsNotLentAndAskedBack) {
   add_worker(first, 2);
   outbox.forget();
   on_pause(state, one, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 2}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{0}, 2}}));
   on_pause(state, one, outbox);
   outbox.expect_nothing_more();
 
   // The one that is computed is not asked back again.
-  heartbeat(first, {held(one, {{0}, 2})}, {{.campaign = one, .ranges = {{{0}, 1}}}});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 1}}));
-  on_give_back(state, first, {.runs = {held(one, {{1}, 1})}}, now, outbox);
+  heartbeat(first, {held(one, {{0}, 2})}, {make_computed_batch(one, {{{0}, 1}})});
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{1}, 1}}));
+  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{1}, 1})}), now,
+               outbox);
   EXPECT_EQ(outbox.num_sent(), 0U);
   deliver(first, one, {0});
   EXPECT_EQ(outbox.take_stored(), Runs{{0}});
@@ -129,7 +127,7 @@ TEST_F(CampaignTest, ThatIsPausedIsNotLentAndAskedBack) {
 
   outbox.forget();
   on_resume(state, one, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 1}));
   outbox.forget();
 }
 
@@ -138,7 +136,7 @@ TEST_F(CampaignTest, ThatIsPausedIsAskedBackFromAWorkerThatOutlivedTheCoordinato
   on_pause(state, one, outbox);
   add_worker(first);
   heartbeat(first, {held(one, {{0}, 2})});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 2}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{0}, 2}}));
   EXPECT_EQ(state.workers.at(first).num_lent, 2U);
 }
 
@@ -157,8 +155,9 @@ TEST_F(CampaignTest, ThatIsPausedLetsOthersGoOn) {
   add_worker(first);
   on_pause(state, one, outbox);
   outbox.forget();
-  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, two);
+  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
+               outbox);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
   outbox.forget();
 }
 
@@ -178,13 +177,13 @@ TEST_F(CampaignTest, ThatIsCancelledIsForgotten) {
   add_worker(first, 2);
   outbox.forget();
   on_cancel(state, one, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
   EXPECT_TRUE(state.leases.empty());
   outbox.forget();
   deliver(first, one, {0});
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
-  on_campaign_request(state, first, {.campaign = one}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
+  on_campaign_request(state, first, one, 0, now, outbox);
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
   on_cancel(state, one, outbox);
 }
 
@@ -208,7 +207,7 @@ TEST_F(CampaignTest, ThatWasCancelledGoesOnUnderAHigherAttempt) {
   on_cancel(state, one, outbox);
   outbox.forget();
   on_resume(state, one, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).attempt(), 2U);
 }
 
 TEST_F(CampaignTest, ThatIsExtendedGoesOn) {
@@ -218,7 +217,7 @@ TEST_F(CampaignTest, ThatIsExtendedGoesOn) {
   ASSERT_EQ(campaign(one).phase, Phase::finished);
   on_extended(state, one, stored_campaign(3).definition, now, outbox);
   EXPECT_EQ(campaign(one).phase, Phase::active);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 1}));
 }
 
 TEST_F(CampaignTest, ThatIsRemovedIsForgottenIfItHasEnded) {
@@ -230,9 +229,9 @@ TEST_F(CampaignTest, ThatIsRemovedIsForgottenIfItHasEnded) {
   outbox.forget();
   for (const CampaignId id : {one, two}) {
     on_removed(state, id, outbox);
-    EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, id);
+    EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), id.value);
     deliver(first, id, {0});
-    EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, id);
+    EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), id.value);
   }
 }
 
@@ -241,7 +240,7 @@ TEST_F(CampaignTest, ThatIsRemovedBeforeItsEndLeavesOnlyResultsOfWorkers) {
   add_worker(first);
   outbox.forget();
   on_removed(state, one, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::NotServed>(first).campaign, one);
+  EXPECT_EQ(outbox.take_sent<proto::NotServed>(first).campaign(), one.value);
   EXPECT_TRUE(state.campaigns.empty());
   EXPECT_TRUE(state.leases.empty());
   outbox.forget();

@@ -42,9 +42,13 @@ class DispatchFixture : public testing::Test {
   static constexpr CampaignId two{102};
 
   /// The run times of computed() are believed.
-  DispatchFixture() { config.lease_duration_max = std::chrono::hours(1); }
+  DispatchFixture() {
+    config.lease_duration_max = std::chrono::hours(1);
+    begin();
+  }
 
-  /// The coordinator before this one has lent runs to all of them.
+  /// To be called again by a test that changes `config`. The coordinator before this one has lent
+  /// runs to all workers.
   void begin(std::set<SessionId> awaited = {}) {
     state = coordinator::initial_state(config, std::move(awaited), now);
     state.attached = {session_of(first), session_of(second), session_of(third)};
@@ -53,61 +57,49 @@ class DispatchFixture : public testing::Test {
   static StoredCampaign stored_campaign(std::uint64_t num_runs) {
     MicroscopeCampaign campaign;
     campaign.num_runs = num_runs;
-    return {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
-            .finished = {},
-            .given_up = {},
-            .blamed = {}};
+    return {.definition = std::make_shared<const MicroscopeCampaign>(campaign)};
   }
 
   /// A campaign of which nothing is known yet.
   void add_campaign(CampaignId id, std::uint64_t num_runs, int priority = 0,
                     double audit_fraction = 0.0) {
     StoredCampaign stored = stored_campaign(num_runs);
-    stored.priority = priority;
-    stored.audit_fraction = audit_fraction;
+    stored.control.priority = priority;
+    stored.control.audit_fraction = audit_fraction;
     on_campaign(state, id, stored, now, outbox);
   }
 
   static SessionId session_of(WorkerId id) { return {1000 + id.value}; }
 
-  static wire::Hello hello(std::uint32_t num_slots = 1, const std::string& host = "host") {
-    return {.worker_name = "w",
-            .host = host,
-            .process_id = 100,
-            .num_slots = num_slots,
-            .model_version = std::string(model_version),
-            .build = "test",
-            .former = {}};
+  static proto::Hello hello(std::uint32_t num_slots = 1, const std::string& host = "host") {
+    proto::Hello hello = make_hello("w", host, num_slots, model_version);
+    hello.set_process_id(100);
+    return hello;
   }
 
   /// Each host has an address of that name.
-  void say_hello(WorkerId id, const wire::Hello& hello, const std::string& key = "") {
-    on_hello(state, id, session_of(id), {.key = key, .address = hello.host}, hello, now, outbox);
+  void say_hello(WorkerId id, const proto::Hello& hello, const std::string& key = "") {
+    on_hello(state, id, session_of(id), {.key = key, .address = hello.host()}, hello, now, outbox);
   }
 
   /// A worker that is registered and takes what it is lent.
   void add_worker(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
     say_hello(id, hello(num_slots, host));
-    outbox.drop_sent<wire::Welcome>(id);
+    outbox.drop_sent<proto::Welcome>(id);
     (void)outbox.take_events();
     heartbeat(id);
   }
 
   /// Its acknowledgement is taken; what else follows is not.
-  void heartbeat(WorkerId id, std::vector<wire::HeldRuns> held = {},
-                 std::vector<wire::ComputedBatch> computing = {},
+  void heartbeat(WorkerId id, const std::vector<proto::HeldRuns>& held = {},
+                 const std::vector<proto::ComputedBatch>& computing = {},
                  std::uint32_t num_runs_max = 4096) {
-    on_heartbeat(state, id,
-                 {.num_runs_max = num_runs_max,
-                  .num_steps_done = 0,
-                  .held = std::move(held),
-                  .computing = std::move(computing)},
-                 ++sequence, now, outbox);
-    outbox.drop_sent<wire::HeartbeatAck>(id);
+    on_heartbeat(state, id, make_heartbeat(num_runs_max, held, computing), ++sequence, now, outbox);
+    outbox.drop_sent<proto::HeartbeatAck>(id);
   }
 
-  static wire::HeldRuns held(CampaignId id, RunRange runs, std::uint32_t attempt = 1) {
-    return {.campaign = id, .attempt = {attempt}, .ranges = {runs}};
+  static proto::HeldRuns held(CampaignId id, RunRange runs, std::uint32_t attempt = 1) {
+    return make_held(id, {attempt}, {runs});
   }
 
   /// So long that no more than two rounds are lent.
@@ -126,9 +118,9 @@ class DispatchFixture : public testing::Test {
 
   void deliver(WorkerId id, CampaignId campaign, const std::vector<std::uint64_t>& runs,
                std::uint32_t attempt = 1) {
-    wire::ResultBatch batch{.campaign = campaign, .attempt = {attempt}, .results = {}};
-    for (const std::uint64_t run : runs) batch.results.push_back(computed(run));
-    on_results(state, id, batch, now, outbox);
+    std::vector<wire::ComputedRun> results;
+    for (const std::uint64_t run : runs) results.push_back(computed(run));
+    on_results(state, id, campaign, {attempt}, std::move(results), now, outbox);
   }
 
   /// All runs that were handed to the store become durable.

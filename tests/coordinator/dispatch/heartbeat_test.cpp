@@ -12,7 +12,6 @@ class HeartbeatTest : public DispatchFixture {
  protected:
   /// The first worker has been lent run 0 of three.
   void lend_one() {
-    begin();
     add_campaign(one, 3);
     add_worker(first);
     outbox.forget();
@@ -30,9 +29,9 @@ TEST_F(HeartbeatTest, ALeaseThatNeverArrivedIsLentAgain) {
   EXPECT_EQ(outbox.take_events(),
             Strings{"runs_lost worker=1 runs=0 attempt=1 reason=never_arrived"});
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::never_arrived);
-  const auto again = outbox.take_sent<wire::RunLease>(first);
-  EXPECT_EQ(again.runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(again.attempt, Attempt{2});
+  const auto again = outbox.take_sent<proto::RunLease>(first);
+  EXPECT_EQ(wire::runs_of(again), (RunRange{{0}, 1}));
+  EXPECT_EQ(again.attempt(), 2U);
 }
 
 TEST_F(HeartbeatTest, ALeaseIsNotMissedInAHeartbeatThatHasWaited) {
@@ -73,23 +72,23 @@ TEST_F(HeartbeatTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) 
   heartbeat(first, {held(one, {{0}, 1}, 1)}, {}, 1);
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).attempt, Attempt{2});
 
-  on_give_back(state, first, {.reason = LossReason::walltime, .runs = {held(one, {{0}, 1}, 2)}},
-               now, outbox);
+  on_give_back(state, first, make_give_back(LossReason::walltime, {held(one, {{0}, 1}, 2)}), now,
+               outbox);
   outbox.expect_nothing_more();
-  on_give_back(state, first, {.reason = LossReason::walltime, .runs = {held(one, {{0}, 1}, 1)}},
-               now, outbox);
+  on_give_back(state, first, make_give_back(LossReason::walltime, {held(one, {{0}, 1}, 1)}), now,
+               outbox);
   EXPECT_EQ(outbox.take_losses().at(0).attempt, Attempt{2});
   outbox.forget();
 }
 
 TEST_F(HeartbeatTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
-  begin();
   add_campaign(one, 1'000'000);
   add_worker(first);
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 1'000'000})});
   EXPECT_EQ(state.workers.at(first).num_lent, 1U);
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 999'999}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()),
+            (Ranges{{{1}, 999'999}}));
 }
 
 TEST_F(HeartbeatTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
@@ -97,9 +96,10 @@ TEST_F(HeartbeatTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
   add_worker(second);
   outbox.forget();
   heartbeat(second, {held(one, {{0}, 2})});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(second).ranges, (Ranges{{{0}, 1}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(second).ranges()), (Ranges{{{0}, 1}}));
   EXPECT_TRUE(state.workers.at(second).unleased.at(one).contains({0}));
-  on_give_back(state, second, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  on_give_back(state, second, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
+               outbox);
   EXPECT_TRUE(state.workers.at(second).unleased.empty());
 }
 
@@ -107,7 +107,7 @@ TEST_F(HeartbeatTest, AStoredRunThatStillWaitsIsAskedBack) {
   lend_one();
   complete(first, one, {0});
   heartbeat(first, {held(one, {{0}, 3})});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 1}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{0}, 1}}));
 }
 
 TEST_F(HeartbeatTest, ADeliveredRunNeedsNothing) {
@@ -121,35 +121,37 @@ TEST_F(HeartbeatTest, ADeliveredRunNeedsNothing) {
 TEST_F(HeartbeatTest, ACampaignThatIsNotServedIsKept) {
   lend_one();
   heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
-  const auto not_served = outbox.take_sent<wire::NotServed>(first);
-  EXPECT_EQ(not_served.campaign, two);
-  EXPECT_TRUE(not_served.ranges.empty());
+  const auto not_served = outbox.take_sent<proto::NotServed>(first);
+  EXPECT_EQ(not_served.campaign(), two.value);
+  EXPECT_TRUE(wire::ranges_of(not_served.ranges()).empty());
 }
 
 TEST_F(HeartbeatTest, ACampaignThatHasEndedIsForgotten) {
   lend_one();
   on_ended(state, two, 5);
   heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
-  const auto forget = outbox.take_sent<wire::Forget>(first);
-  EXPECT_EQ(forget.campaign, two);
-  EXPECT_EQ(forget.num_runs, 5U);
+  const auto forget = outbox.take_sent<proto::Forget>(first);
+  EXPECT_EQ(forget.campaign(), two.value);
+  EXPECT_EQ(forget.num_runs(), 5U);
 }
 
 TEST_F(HeartbeatTest, RunsThatAreGivenBackAreLentAgain) {
   lend_one();
-  on_give_back(state, first, {.reason = LossReason::preempted, .runs = {held(one, {{0}, 1})}}, now,
+  on_give_back(state, first, make_give_back(LossReason::preempted, {held(one, {{0}, 1})}), now,
                outbox);
   EXPECT_EQ(outbox.take_events(), Strings{"runs_lost worker=1 runs=0 attempt=1 reason=preempted"});
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::preempted);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).attempt(), 2U);
 }
 
 // A message that was long under way must not take back what has been lent anew since.
 TEST_F(HeartbeatTest, AGiveBackOfAnOlderAttemptIsIgnored) {
   lend_one();
-  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
+               outbox);
   outbox.forget();
-  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
+               outbox);
   EXPECT_TRUE(campaign(one).lent.find({0}).has_value());
 }
 
@@ -163,8 +165,8 @@ TEST_F(HeartbeatTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
   outbox.forget();
   heartbeat(second, {held(one, {{0}, 1})});
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).worker, second);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{2}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(third)), (RunRange{{2}, 1}));
 }
 
 TEST_F(HeartbeatTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {
@@ -176,18 +178,18 @@ TEST_F(HeartbeatTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {
   outbox.expect_nothing_more();
   now += 1s;
   heartbeat(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
 }
 
 TEST_F(HeartbeatTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
   begin({session_of(second)});
   add_campaign(one, 3);
-  wire::Hello successor = hello();
-  successor.former = wire::FormerSession{session_of(second), LossReason::crashed, 11};
+  proto::Hello successor = hello();
+  *successor.mutable_former() = make_former(session_of(second));
   say_hello(first, successor);
   outbox.forget();
   heartbeat(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
 }
 
 // What was finished before the restart is not computed again.

@@ -14,8 +14,6 @@ constexpr std::uint32_t attempt_max = std::numeric_limits<std::uint32_t>::max();
 
 class HostileTest : public DispatchFixture {
  protected:
-  HostileTest() { begin(); }
-
   void TearDown() override {
     outbox.forget();
     DispatchFixture::TearDown();
@@ -40,7 +38,7 @@ TEST_F(HostileTest, TheLargestAttemptFollowsItself) {
   now += 16s;
   heartbeat(second);
   on_tick(state, now, outbox);  // The first is silent: its runs are copied.
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).attempt, Attempt{attempt_max});
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(second).attempt(), attempt_max);
   outbox.forget();
   crash(first);
   deliver(second, one, {0, 1}, attempt_max);
@@ -54,7 +52,8 @@ TEST_F(HostileTest, ARunIsListedTwice) {
   check_invariants(state);
   EXPECT_EQ(state.workers.at(first).num_lent, 10U);
   heartbeat(first, {held(one, {{5}, 1}), held(one, {{5}, 1}, 9)},
-            {{one, {{{5}, 1}, {{5}, 1}}, 1}, {one, {{{0}, 10}}, 2}});
+            {make_computed_batch(one, {{{5}, 1}, {{5}, 1}}, 1),
+             make_computed_batch(one, {{{0}, 10}}, 2)});
   check_invariants(state);
   now += 20s;
   heartbeat(first, {held(one, {{5}, 1}, 9)});
@@ -63,9 +62,11 @@ TEST_F(HostileTest, ARunIsListedTwice) {
 TEST_F(HostileTest, WhatIsSetAsideIsHeldAndComputedAsWell) {
   add_campaign(one, 10);
   say_hello(first, hello());
-  wire::Heartbeat heartbeat{
-      .num_runs_max = 4096, .held = {held(one, {{0}, 6})}, .computing = {{one, {{{0}, 6}}, 1}}};
-  heartbeat.set_aside = {held(one, {{3}, 6}, 4), held(one, {{3}, 1}, 5), held(two, {{0}, 1})};
+  proto::Heartbeat heartbeat =
+      make_heartbeat(4096, {held(one, {{0}, 6})}, {make_computed_batch(one, {{{0}, 6}}, 1)});
+  for (const auto& runs : {held(one, {{3}, 6}, 4), held(one, {{3}, 1}, 5), held(two, {{0}, 1})}) {
+    *heartbeat.add_set_aside() = runs;
+  }
   on_heartbeat(state, first, heartbeat, 1, now, outbox);
   check_invariants(state);
   crash(first);
@@ -74,13 +75,13 @@ TEST_F(HostileTest, WhatIsSetAsideIsHeldAndComputedAsWell) {
 TEST_F(HostileTest, RunsAreGivenBackThatAreNotLent) {
   add_campaign(one, 10);
   add_worker(first);
-  on_give_back(state, first,
-               {.reason = LossReason::failed,
-                .runs = {held(one, {{0}, num_runs_max}), held(one, {{0}, 1}), held(two, {{0}, 1}),
-                         held(one, {{5}, 5}, attempt_max)}},
-               now, outbox);
+  on_give_back(
+      state, first,
+      make_give_back(LossReason::failed, {held(one, {{0}, num_runs_max}), held(one, {{0}, 1}),
+                                          held(two, {{0}, 1}), held(one, {{5}, 5}, attempt_max)}),
+      now, outbox);
   check_invariants(state);
-  on_bye(state, first, {.reason = LossReason::failed}, now, outbox);
+  on_bye(state, first, LossReason::failed, now, outbox);
   deliver(first, one, {0});
   EXPECT_TRUE(outbox.take_stored().empty()) << "it is not registered any more";
 }
@@ -101,8 +102,8 @@ TEST_F(HostileTest, RunsTakeForEver) {
   add_worker(first);
   wire::ComputedRun slow = computed(0);
   slow.elapsed_s = 1e300;
-  on_results(state, first, {.campaign = one, .attempt = {1}, .results = {slow}}, now, outbox);
-  heartbeat(first, {held(one, {{1}, 1})}, {{one, {{{1}, 1}}, 1}});
+  on_results(state, first, one, {1}, {slow}, now, outbox);
+  heartbeat(first, {held(one, {{1}, 1})}, {make_computed_batch(one, {{{1}, 1}}, 1)});
   now += 5s;
   on_tick(state, now, outbox);
   EXPECT_TRUE(state.workers.contains(first));
@@ -113,8 +114,8 @@ TEST_F(HostileTest, RunsAreClaimedThatWereNeverLent) {
   add_campaign(one, 2000);
   const WorkerId stranger{7};
   say_hello(stranger, hello(1, "elsewhere"));
-  wire::Heartbeat heartbeat{.held = {held(one, {{0}, 2000})}, .computing = {}};
-  heartbeat.set_aside = {held(one, {{0}, 2000}, 2)};
+  proto::Heartbeat heartbeat = make_heartbeat(0, {held(one, {{0}, 2000})});
+  *heartbeat.add_set_aside() = held(one, {{0}, 2000}, 2);
   on_heartbeat(state, stranger, heartbeat, 1, now, outbox);
   EXPECT_TRUE(state.leases.empty());
   on_removed(state, one, outbox);
@@ -128,7 +129,7 @@ TEST_F(HostileTest, WhatWasLentBeforeMayBeClaimedAndNoMore) {
   add_worker(stranger, 4, "elsewhere");
   on_gone(state, stranger, LossReason::silent, now, outbox);
   say_hello(stranger, hello(4, "elsewhere"));
-  on_heartbeat(state, stranger, {.held = {held(one, {{0}, 10})}, .computing = {}}, 9, now, outbox);
+  on_heartbeat(state, stranger, make_heartbeat(0, {held(one, {{0}, 10})}), 9, now, outbox);
   EXPECT_EQ(runs_held_text(state, stranger), "0..3");
 }
 
@@ -145,7 +146,7 @@ TEST_F(HostileTest, RunsAreHeldAndNeverFinished) {
   std::uint32_t num_steps = 0;
   while (runs_held_text(state, second) == "none" && now - lent_at < 10min) {
     now += 5s;
-    heartbeat(first, {held(one, {{0}, 8})}, {{one, {{{0}, 8}}, ++num_steps}});
+    heartbeat(first, {held(one, {{0}, 8})}, {make_computed_batch(one, {{{0}, 8}}, ++num_steps)});
     heartbeat(second);
     on_tick(state, now, outbox);
   }
@@ -166,7 +167,7 @@ TEST_F(HostileTest, AnAuditIsHeldForEver) {
   while (runs_held_text(state, first) == "none" && now - lent_at < 10h) {
     now += 5s;
     heartbeat(first);
-    heartbeat(second, {held(one, {{0}, 1}, 2)}, {{one, {{{0}, 1}}, 1}});
+    heartbeat(second, {held(one, {{0}, 1}, 2)}, {make_computed_batch(one, {{{0}, 1}}, 1)});
     on_tick(state, now, outbox);
   }
   EXPECT_EQ(runs_held_text(state, first), "0") << "better than nothing";
@@ -176,10 +177,10 @@ TEST_F(HostileTest, ATruthIsMadeUpOfARunThatWasNotLent) {
   add_campaign(one, 10);
   add_worker(first);
   outbox.forget();
-  wire::ResultBatch batch{.campaign = one, .attempt = {1}, .results = {computed(7)}};
-  batch.results[0].result.truth[3] += 1e-9;
-  on_results(state, first, batch, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Reject>(first).reason, wire::RejectReason::malformed);
+  wire::ComputedRun made_up = computed(7);
+  made_up.result.truth[3] += 1e-9;
+  on_results(state, first, one, {1}, {made_up}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<proto::Reject>(first).reason(), proto::REJECT_REASON_MALFORMED);
   EXPECT_EQ(outbox.take_events().at(0),
             "results_refused worker=1 name=w reason=\"run 7: truth (must be what the run draws)\"");
   EXPECT_FALSE(state.workers.contains(first));

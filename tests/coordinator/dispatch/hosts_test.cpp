@@ -34,8 +34,8 @@ class HostsTest : public DispatchFixture {
   /// A new process says that the one before it crashed.
   void succeed(WorkerId id, WorkerId former, const std::string& key,
                const std::string& host = "host") {
-    wire::Hello successor = hello(1, host);
-    successor.former = wire::FormerSession{session_of(former), LossReason::crashed, 11};
+    proto::Hello successor = hello(1, host);
+    *successor.mutable_former() = make_former(session_of(former));
     say_hello(id, successor, key);
     outbox.forget();
   }
@@ -93,9 +93,9 @@ TEST_F(HostsTest, AKeyQuarantinesAHostForItselfAlone) {
   EXPECT_EQ(state.quarantined.size(), 1U);
   EXPECT_TRUE(state.quarantined.contains(HostId{other_key, "host"}));
   say_hello(second, hello(), other_key);
-  EXPECT_EQ(outbox.take_sent<wire::Reject>(second).reason, wire::RejectReason::quarantined);
+  EXPECT_EQ(outbox.take_sent<proto::Reject>(second).reason(), proto::REJECT_REASON_QUARANTINED);
   say_hello(third, hello(), some_key);
-  EXPECT_EQ(outbox.take_sent<wire::Welcome>(third).worker, third);
+  EXPECT_EQ(outbox.take_sent<proto::Welcome>(third).worker_id(), third.value);
   outbox.forget();
 }
 
@@ -130,12 +130,12 @@ TEST_F(HostsTest, ARegistrationThatIsSilentMakesRoomForAnother) {
   now += 14s;  // The first has been silent for 15 s, the second for 14 s.
   say_hello(third, hello(), some_key);
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::silent);
-  EXPECT_EQ(outbox.take_sent<wire::Welcome>(third).worker, third);
+  EXPECT_EQ(outbox.take_sent<proto::Welcome>(third).worker_id(), third.value);
   EXPECT_FALSE(state.workers.contains(first));
   EXPECT_TRUE(state.workers.contains(second));
   outbox.forget();
   say_hello(first, hello(), some_key);
-  EXPECT_EQ(outbox.take_sent<wire::Reject>(first).reason, wire::RejectReason::full);
+  EXPECT_EQ(outbox.take_sent<proto::Reject>(first).reason(), proto::REJECT_REASON_FULL);
   outbox.forget();
 }
 

@@ -44,7 +44,6 @@ class LateResult : public DispatchFixture,
                    public testing::WithParamInterface<std::pair<Order, bool>> {
  protected:
   void SetUp() override {
-    begin();
     add_campaign(one, 3);
     add_worker(first);
     outbox.forget();
@@ -54,7 +53,7 @@ class LateResult : public DispatchFixture,
     switch (step) {
       case Step::expire:
         now += 60s;
-        if (state.workers.contains(second)) heartbeat(second, held_by_second());
+        if (state.workers.contains(second)) heartbeat_of(second, held_by_second());
         on_tick(state, now, outbox);
         break;
       case Step::reassign:
@@ -91,19 +90,17 @@ class LateResult : public DispatchFixture,
     return lease && state.leases.at(*lease).worker == second;
   }
 
-  std::vector<wire::HeldRuns> held_by_second() {
-    std::vector<wire::HeldRuns> all;
+  std::vector<proto::HeldRuns> held_by_second() {
+    std::vector<proto::HeldRuns> all;
     for (const LeaseId id : state.workers.at(second).leases) {
       const auto& lease = state.leases.at(id);
-      all.push_back({one, lease.attempt, lease.remaining.ranges()});
+      all.push_back(make_held(one, lease.attempt, lease.remaining.ranges()));
     }
     return all;
   }
 
-  void heartbeat(WorkerId id, std::vector<wire::HeldRuns> all) { heartbeat_of(id, std::move(all)); }
-  void heartbeat_of(WorkerId id, std::vector<wire::HeldRuns> all) {
-    on_heartbeat(state, id, {.num_runs_max = 4096, .held = std::move(all), .computing = {}},
-                 ++sequence, now, outbox);
+  void heartbeat_of(WorkerId id, const std::vector<proto::HeldRuns>& all) {
+    on_heartbeat(state, id, make_heartbeat(4096, all), ++sequence, now, outbox);
   }
 
   Runs waiting;  ///< On their way to the store.
@@ -148,84 +145,6 @@ TEST_P(LateResult, IsStoredOnceAndBothWorkersGoOn) {
 }
 
 INSTANTIATE_TEST_SUITE_P(InEveryOrder, LateResult, testing::ValuesIn(all_orders()), name_of);
-
-/// The three cases by name; run 0 has been lent to the first worker, which then falls silent.
-class TrickIssue : public DispatchFixture {
- protected:
-  void SetUp() override {
-    begin();
-    add_campaign(one, 2);
-    add_worker(first);
-    outbox.forget();
-    now += 50s;
-    add_worker(second);
-    now += 10s;
-    outbox.forget();
-  }
-  void come_back(WorkerId id) {
-    say_hello(id, hello());
-    heartbeat(id);
-  }
-  void heartbeat(WorkerId id) {
-    on_heartbeat(state, id, {.num_runs_max = 4096, .held = {}, .computing = {}}, ++sequence, now,
-                 outbox);
-  }
-};
-
-TEST_F(TrickIssue, Number569AResultAfterItsTimeOutIsTaken) {
-  on_tick(state, now, outbox);
-  EXPECT_FALSE(state.workers.contains(first));
-  EXPECT_TRUE(campaign(one).pending.contains(Attempt{2}));
-  outbox.forget();
-
-  deliver(first, one, {0});
-  EXPECT_EQ(outbox.take_sent<wire::Reject>(first).reason, wire::RejectReason::not_registered);
-  outbox.expect_nothing_more();
-  come_back(first);
-  outbox.forget();
-  deliver(first, one, {0});
-  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
-  EXPECT_TRUE(campaign(one).pending.empty());
-  outbox.forget();
-}
-
-TEST_F(TrickIssue, Number1192OfTwoResultsOneIsStoredAndOneCompared) {
-  complete(second, one, {1});
-  on_tick(state, now, outbox);
-  ASSERT_TRUE(campaign(one).lent.find({0}).has_value());
-  EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).worker, second);
-  come_back(first);
-  outbox.forget();
-
-  deliver(first, one, {0});
-  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(second).ranges, (std::vector<RunRange>{{{0}, 1}}));
-  deliver(second, one, {0}, 2);
-  EXPECT_EQ(outbox.take_compared(), Runs{{0}});
-  EXPECT_EQ(campaign(one).num_duplicates, 1U);
-  outbox.expect_nothing_more();
-
-  on_committed(state, one, Runs{{0}}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});
-  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
-  on_compared(state, one, {0}, second, true, now, outbox);
-  EXPECT_TRUE(is_finished(campaign(one)));
-  outbox.forget();
-}
-
-TEST_F(TrickIssue, Number1369AWorkerWithALateResultIsLentRunsAgain) {
-  on_tick(state, now, outbox);
-  come_back(first);
-  outbox.forget();
-  deliver(first, one, {0});
-  outbox.forget();
-  crash(second);
-  ASSERT_TRUE(campaign(one).lent.find({1}).has_value() || !campaign(one).suspects.empty());
-  heartbeat(first);
-  ASSERT_TRUE(campaign(one).lent.find({1}).has_value());
-  EXPECT_EQ(state.leases.at(*campaign(one).lent.find({1})).worker, first);
-  outbox.forget();
-}
 
 }  // namespace
 }  // namespace proofmass::test

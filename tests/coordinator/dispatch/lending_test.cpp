@@ -8,50 +8,35 @@ namespace {
 
 class LendingTest : public DispatchFixture {
  protected:
-  void SetUp() override { begin(); }
-
   /// Runs that a worker holds after it delivered the first run.
   std::string lent_after_first_run(std::uint64_t num_runs, double run_time_s,
                                    std::uint32_t num_runs_max = 4096) {
+    begin();
+    state.config.uncommitted_max = uncommitted_max;
     add_campaign(one, num_runs);
     add_worker(first);
-    EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}))
+    EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 1}))
         << "how long a run takes is not known yet";
     heartbeat(first, {held(one, {{0}, 1})}, {}, num_runs_max);
     wire::ComputedRun result = computed(0);
     result.elapsed_s = run_time_s;
-    on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
+    on_results(state, first, one, {1}, {result}, now, outbox);
     outbox.forget();
+    check_invariants(state);
     return runs_held_text(state, first);
   }
+
+  std::uint64_t uncommitted_max = config.uncommitted_max;
 };
 
-TEST_F(LendingTest, GivesASecondAndAHalfOfWork) {
+TEST_F(LendingTest, GivesASecondAndAHalfOfWorkWithinItsLimits) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
-}
-
-TEST_F(LendingTest, GivesOneRunToComputeAndOneToWaitIfRunsAreLong) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), "1..2");
-}
-
-TEST_F(LendingTest, GivesNoMoreThanALeaseMayHave) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.0), "1..4096");
-}
-
-TEST_F(LendingTest, GivesNoMoreThanTheCredit) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 20), "1..20");
-}
-
-TEST_F(LendingTest, GivesNothingWithoutCredit) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 0), "none");
-}
-
-TEST_F(LendingTest, GivesHalfOfAFairShareNearTheEnd) {
-  EXPECT_EQ(lent_after_first_run(101, 0.001), "1..50");
-}
-
-TEST_F(LendingTest, GivesLessWhenMuchIsNotStoredYet) {
-  state.config.uncommitted_max = 200;
+  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), "1..2") << "one to compute and one to wait";
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.0), "1..4096") << "what a lease may have";
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 20), "1..20") << "the credit";
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 0), "none") << "no credit";
+  EXPECT_EQ(lent_after_first_run(101, 0.001), "1..50") << "half of a fair share near the end";
+  uncommitted_max = 200;
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..99") << "half of the room, after one result";
 }
 
@@ -59,12 +44,12 @@ TEST_F(LendingTest, GivesNothingWhileTooManyResultsWaitForTheStore) {
   state.config.uncommitted_max = 4;
   add_campaign(one, 100);
   add_worker(first, 2);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 2}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 2}));
   deliver(first, one, {0, 1});
   EXPECT_EQ(runs_held_text(state, first), "none");
   commit(one);
-  outbox.drop_sent<wire::ResultAck>(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{2}, 4}))
+  outbox.drop_sent<proto::ResultAck>(first);
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{2}, 4}))
       << "two rounds, however small the room";
 }
 
@@ -74,22 +59,23 @@ TEST_F(LendingTest, GivesLessThanARoundIfResultsWouldComeFasterThanTheyCanBeTake
   state.config.run_time_s_expected = 0.5;
   add_campaign(one, 1'000'000);
   add_worker(first, 64);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 10}))
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 10}))
       << "two rounds' time";
   wire::ComputedRun result = computed(0);
   result.elapsed_s = 2.0;
-  on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
+  on_results(state, first, one, {1}, {result}, now, outbox);
   (void)outbox.take_stored();
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{10}, 31}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{10}, 31}));
   EXPECT_EQ(runs_held_text(state, first), "1..40");
   add_worker(second, 64);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{41}, 20})) << "half of it";
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{41}, 20}))
+      << "half of it";
 }
 
 TEST_F(LendingTest, TakesNothingFromOthersForAWorkerThatWaitsForTheStore) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
   add_worker(second);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{151}, 150}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{151}, 150}));
   state.config.uncommitted_max = 2;
   for (std::uint64_t run = 151; run <= 300; ++run) deliver(second, one, {run});
   (void)outbox.take_stored();
@@ -100,48 +86,48 @@ TEST_F(LendingTest, TakesNothingFromOthersForAWorkerThatWaitsForTheStore) {
 TEST_F(LendingTest, GivesNothingMoreWhenCreditIsRepeated) {
   add_campaign(one, 100);
   add_worker(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
   heartbeat(first, {held(one, {{0}, 1})});
 }
 
 TEST_F(LendingTest, FillsAllSlotsOfAWorker) {
   add_campaign(one, 10);
   add_worker(first, 4);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 4}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 4}));
 }
 
 TEST_F(LendingTest, SharesTheLastRunsAmongAllWorkers) {
   for (const WorkerId id : {first, second, third}) add_worker(id, 32);
   add_campaign(one, 40);
-  const auto lease = outbox.take_sent<wire::RunLease>(first);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 14}));
-  EXPECT_EQ(lease.batch_runs_max, 7U) << "as there are two threads";
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{14}, 13}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{27}, 13}));
+  const auto lease = outbox.take_sent<proto::RunLease>(first);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 14}));
+  EXPECT_EQ(lease.batch_runs_max(), 7U) << "as there are two threads";
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{14}, 13}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(third)), (RunRange{{27}, 13}));
 }
 
 TEST_F(LendingTest, SharesNoRunsThatFillMoreThanHalfOfTheSlots) {
   for (const WorkerId id : {first, second, third}) add_worker(id, 16);
   add_campaign(one, 25);
-  const auto lease = outbox.take_sent<wire::RunLease>(first);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 16}));
-  EXPECT_EQ(lease.batch_runs_max, 0U);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{16}, 5}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{21}, 4}));
+  const auto lease = outbox.take_sent<proto::RunLease>(first);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 16}));
+  EXPECT_EQ(lease.batch_runs_max(), 0U);
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{16}, 5}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(third)), (RunRange{{21}, 4}));
 }
 
 TEST_F(LendingTest, GivesAnEighthOfARoundOfTheLastRunsAtLeast) {
   for (const WorkerId id : {first, second, third}) add_worker(id, 16);
   add_campaign(one, 3);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 2}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{2}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 2}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{2}, 1}));
 }
 
 TEST_F(LendingTest, LeavesTheLastRunsToWorkersThatAreStillToCome) {
   state.num_slots_expected = 64;
   add_campaign(one, 20);
   add_worker(first, 16);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 5}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 5}));
 }
 
 // One wants nothing, one is silent, and one is on a host where workers crash.
@@ -157,13 +143,13 @@ TEST_F(LendingTest, LeavesNoneOfTheLastRunsToWorkersThatAreLentNothing) {
   heartbeat(second, {}, {}, 0);
   on_tick(state, now, outbox);
   add_campaign(one, 40);
-  const auto lease = outbox.take_sent<wire::RunLease>(first);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 16}));
-  EXPECT_EQ(lease.batch_runs_max, 0U);
+  const auto lease = outbox.take_sent<proto::RunLease>(first);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 16}));
+  EXPECT_EQ(lease.batch_runs_max(), 0U);
   heartbeat(third);
-  const auto second_lease = outbox.take_sent<wire::RunLease>(third);
-  EXPECT_EQ(second_lease.runs, (RunRange{{16}, 24}));
-  EXPECT_EQ(second_lease.batch_runs_max, 3U) << "its ten threads count again, as it is heard";
+  const auto second_lease = outbox.take_sent<proto::RunLease>(third);
+  EXPECT_EQ(wire::runs_of(second_lease), (RunRange{{16}, 24}));
+  EXPECT_EQ(second_lease.batch_runs_max(), 3U) << "its ten threads count again, as it is heard";
 }
 
 TEST_F(LendingTest, ExpectsNoMoreSlotsOnceAWorkerIsLost) {
@@ -171,11 +157,11 @@ TEST_F(LendingTest, ExpectsNoMoreSlotsOnceAWorkerIsLost) {
   add_worker(first, 16);
   add_worker(second, 16);
   EXPECT_EQ(state.num_slots_expected, 32U);
-  on_bye(state, second, {}, now, outbox);
+  on_bye(state, second, LossReason::preempted, now, outbox);
   outbox.forget();
   EXPECT_EQ(state.num_slots_expected, 0U);
   add_campaign(one, 20);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 16}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 16}));
 }
 
 TEST_F(LendingTest, SharesNothingWhileAnotherCampaignHasRuns) {
@@ -185,12 +171,12 @@ TEST_F(LendingTest, SharesNothingWhileAnotherCampaignHasRuns) {
   add_campaign(two, 100);
   state.is_lending = true;
   heartbeat(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 8}));
-  const auto lease = outbox.take_sent<wire::RunLease>(first);
-  EXPECT_EQ(lease.campaign, two);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 8}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 8}));
+  const auto lease = outbox.take_sent<proto::RunLease>(first);
+  EXPECT_EQ(lease.campaign(), two.value);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 8}));
   heartbeat(second);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{8}, 16}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{8}, 16}));
 }
 
 // The other thread of the worker computes eight runs and has no room for more.
@@ -202,7 +188,7 @@ TEST_F(LendingTest, GivesTheLastRunsToAnIdleThread) {
   EXPECT_EQ(runs_held_text(state, first), "0..15");
   deliver(first, one, {0, 1, 2, 3, 4, 5, 6, 7});
   EXPECT_EQ(state.num_idle_slots, 16U);
-  on_bye(state, second, {}, now, outbox);
+  on_bye(state, second, LossReason::preempted, now, outbox);
   outbox.forget();
   EXPECT_EQ(runs_held_text(state, first), "8..22");
   EXPECT_EQ(state.num_idle_slots, 0U);
@@ -228,12 +214,12 @@ TEST_F(LendingTest, LearnsTheTimeOfARunFromBatchesThatAreNotShort) {
   add_campaign(one, 18);
   outbox.forget();
   const auto deliver_after = [&](std::uint64_t begin, std::uint64_t end, double elapsed_s) {
-    wire::ResultBatch batch{.campaign = one, .attempt = {1}, .results = {}};
+    std::vector<wire::ComputedRun> results;
     for (std::uint64_t run = begin; run < end; ++run) {
-      batch.results.push_back(computed(run));
-      batch.results.back().elapsed_s = elapsed_s;
+      results.push_back(computed(run));
+      results.back().elapsed_s = elapsed_s;
     }
-    on_results(state, first, batch, now, outbox);
+    on_results(state, first, one, {1}, std::move(results), now, outbox);
     outbox.forget();
   };
   deliver_after(0, 16, 1000.0);
@@ -242,9 +228,9 @@ TEST_F(LendingTest, LearnsTheTimeOfARunFromBatchesThatAreNotShort) {
   EXPECT_EQ(campaign(one).run_time_s, 1000.0);
   add_campaign(two, 2);
   outbox.forget();
-  wire::ResultBatch only{.campaign = two, .attempt = {1}, .results = {computed(0)}};
-  only.results[0].elapsed_s = 300.0;
-  on_results(state, first, only, now, outbox);
+  wire::ComputedRun only = computed(0);
+  only.elapsed_s = 300.0;
+  on_results(state, first, two, {1}, {only}, now, outbox);
   outbox.forget();
   EXPECT_EQ(campaign(two).run_time_s, 300.0) << "nothing else is known";
 }
@@ -260,7 +246,7 @@ TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {
   stored.finished = {{{0}, 1}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 2);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).table_values,
+  EXPECT_EQ(vector_of(outbox.take_sent<proto::RunLease>(first).table_values()),
             (std::vector<double>{2.0, 20.0, 3.0, 30.0}));
 }
 
@@ -268,15 +254,15 @@ TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {
 TEST_F(LendingTest, GivesRunsThatWereLentBeforeFirst) {
   add_campaign(one, 10);
   add_worker(first, 3);
-  on_bye(state, first, {}, now, outbox);
+  on_bye(state, first, LossReason::preempted, now, outbox);
   outbox.forget();
   add_worker(second, 4);
-  const auto again = outbox.take_sent<wire::RunLease>(second);
-  EXPECT_EQ(again.runs, (RunRange{{0}, 3}));
-  EXPECT_EQ(again.attempt, Attempt{2});
-  const auto fresh = outbox.take_sent<wire::RunLease>(second);
-  EXPECT_EQ(fresh.runs, (RunRange{{3}, 1}));
-  EXPECT_EQ(fresh.attempt, Attempt{1});
+  const auto again = outbox.take_sent<proto::RunLease>(second);
+  EXPECT_EQ(wire::runs_of(again), (RunRange{{0}, 3}));
+  EXPECT_EQ(again.attempt(), 2U);
+  const auto fresh = outbox.take_sent<proto::RunLease>(second);
+  EXPECT_EQ(wire::runs_of(fresh), (RunRange{{3}, 1}));
+  EXPECT_EQ(fresh.attempt(), 1U);
 }
 
 // Ranges that do not touch are one lease to the dispatch, and a message each.
@@ -285,9 +271,9 @@ TEST_F(LendingTest, GivesSeveralRangesAtATime) {
   stored.finished = {{{1}, 1}, {{3}, 1}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{2}, 1}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 2}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{2}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{4}, 2}));
   EXPECT_EQ(state.leases.size(), 1U);
 }
 

@@ -11,15 +11,13 @@ using Ranges = std::vector<RunRange>;
 
 class NotServedTest : public DispatchFixture {
  protected:
-  NotServedTest() { begin(); }
-
   /// The acknowledgement is taken; what else follows is not.
-  void heartbeat_with_set_aside(WorkerId id, std::vector<wire::HeldRuns> set_aside,
-                                std::vector<wire::HeldRuns> held_runs = {}) {
-    wire::Heartbeat heartbeat{.num_runs_max = 4096, .held = std::move(held_runs), .computing = {}};
-    heartbeat.set_aside = std::move(set_aside);
+  void heartbeat_with_set_aside(WorkerId id, const std::vector<proto::HeldRuns>& set_aside,
+                                const std::vector<proto::HeldRuns>& held_runs = {}) {
+    proto::Heartbeat heartbeat = make_heartbeat(4096, held_runs);
+    heartbeat.mutable_set_aside()->Assign(set_aside.begin(), set_aside.end());
     on_heartbeat(state, id, heartbeat, ++sequence, now, outbox);
-    outbox.drop_sent<wire::HeartbeatAck>(id);
+    outbox.drop_sent<proto::HeartbeatAck>(id);
   }
 };
 
@@ -29,9 +27,9 @@ TEST_F(NotServedTest, ResultsBeyondTheCampaignAreKeptAndTheOthersTaken) {
   add_worker(first);
   outbox.forget();
   deliver(first, one, {8, 10, 9, 12, 11, 20});
-  const auto not_served = outbox.take_sent<wire::NotServed>(first);
-  EXPECT_EQ(not_served.campaign, one);
-  EXPECT_EQ(not_served.ranges, (Ranges{{{10}, 3}, {{20}, 1}}));
+  const auto not_served = outbox.take_sent<proto::NotServed>(first);
+  EXPECT_EQ(not_served.campaign(), one.value);
+  EXPECT_EQ(wire::ranges_of(not_served.ranges()), (Ranges{{{10}, 3}, {{20}, 1}}));
   EXPECT_EQ(outbox.take_stored(), (Runs{{8}, {9}}));
   EXPECT_EQ(state.workers.at(first).num_results, 2U);
   outbox.forget();
@@ -42,8 +40,8 @@ TEST_F(NotServedTest, RunsBeyondTheCampaignAreNotLentToTheirHolder) {
   add_worker(first);
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 5}), held(one, {{3}, 1}, 2)});
-  const auto not_served = outbox.take_sent<wire::NotServed>(first);
-  EXPECT_EQ(not_served.ranges, (Ranges{{{3}, 2}}));
+  const auto not_served = outbox.take_sent<proto::NotServed>(first);
+  EXPECT_EQ(wire::ranges_of(not_served.ranges()), (Ranges{{{3}, 2}}));
   EXPECT_EQ(runs_held_text(state, first), "0..2");
   outbox.forget();
 }
@@ -55,8 +53,9 @@ TEST_F(NotServedTest, RunsBeyondAFinishedCampaignAreKept) {
   complete(first, one, {0});
   ASSERT_EQ(campaign(one).phase, Phase::finished);
   heartbeat(first, {held(one, {{0}, 2})});
-  EXPECT_EQ(outbox.take_sent<wire::NotServed>(first).ranges, (Ranges{{{1}, 1}}));
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).num_runs, 1U);
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::NotServed>(first).ranges()),
+            (Ranges{{{1}, 1}}));
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).num_runs(), 1U);
 }
 
 TEST_F(NotServedTest, WhatIsSetAsideIsLentToItsHolderOnceTheCampaignIsServed) {
@@ -103,12 +102,12 @@ TEST_F(NotServedTest, WhatIsSetAsideIsForgottenOnceTheCampaignHasEnded) {
   add_worker(first);
   on_ended(state, one, 5);
   heartbeat_with_set_aside(first, {held(one, {{0}, 2})});
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).num_runs, 5U);
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).num_runs(), 5U);
   add_campaign(two, 5);
   on_cancel(state, two, outbox);
   outbox.forget();
   heartbeat_with_set_aside(first, {held(two, {{0}, 2})});
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), two.value);
 }
 
 // Otherwise one campaign whose file cannot be opened would keep another from its end.
@@ -120,7 +119,7 @@ TEST_F(NotServedTest, AWorkerWithResultsThatAreSetAsideTriesSuspects) {
   say_hello(second, hello());
   outbox.forget();
   heartbeat_with_set_aside(second, {held(two, {{0}, 3})});
-  EXPECT_TRUE(outbox.take_sent<wire::RunLease>(second).is_alone);
+  EXPECT_TRUE(outbox.take_sent<proto::RunLease>(second).is_alone());
   outbox.forget();
 }
 
@@ -133,16 +132,16 @@ TEST_F(NotServedTest, AWorkerWithOtherRunsOfACampaignThatIsNotServedTriesNoSuspe
   say_hello(second, hello());
   outbox.forget();
   heartbeat(second, {held(two, {{0}, 3})});
-  EXPECT_EQ(outbox.take_sent<wire::NotServed>(second).campaign, two);
+  EXPECT_EQ(outbox.take_sent<proto::NotServed>(second).campaign(), two.value);
 }
 
 TEST_F(NotServedTest, ALateResultOfARunThatWasGivenUpReopensAFinishedCampaign) {
   StoredCampaign stored = stored_campaign(2);
   stored.finished = {{{1}, 1}};
   stored.given_up = {{{0}, 1}};
-  stored.audit_fraction = 1.0;
+  stored.control.audit_fraction = 1.0;
   stored.compared = {{{1}, 1}};
-  stored.phase = Phase::finished;
+  stored.control.phase = Phase::finished;
   on_campaign(state, one, stored, now, outbox);
   add_worker(first);
   outbox.forget();

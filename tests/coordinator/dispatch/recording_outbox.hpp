@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::test {
 
@@ -21,16 +21,22 @@ struct RecordedResult : wire::LeasedResult {
   wire::WorkerId worker;
 };
 
+/// Runs that came back without a result.
+struct RecordedLoss : coordinator::ReturnedRuns {
+  wire::CampaignId campaign;
+  wire::WorkerId by;
+};
+
 /// Writes down what the dispatch does. Everything must be taken before the next event: what nobody
 /// expected is found by expect_nothing_more().
 class RecordingOutbox final : public coordinator::Outbox {
  public:
-  void send(wire::WorkerId worker, wire::Message message) override {
+  void send(wire::WorkerId worker, proto::Envelope message) override {
     sent_.emplace_back(worker, std::move(message));
   }
-  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(wire::WorkerId worker, wire::CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override {
-    definitions_.push_back({worker, request, definition});
+    definitions_.push_back({worker, campaign, offset, definition});
   }
   void store(wire::WorkerId worker, wire::LeasedResult result) override {
     stored_.push_back({std::move(result), worker});
@@ -38,7 +44,10 @@ class RecordingOutbox final : public coordinator::Outbox {
   void compare(wire::WorkerId worker, wire::LeasedResult result) override {
     compared_.push_back({std::move(result), worker});
   }
-  void record(const coordinator::Loss& loss) override { losses_.push_back(loss); }
+  void record(wire::CampaignId campaign, wire::WorkerId worker,
+              const coordinator::ReturnedRuns& returned) override {
+    losses_.push_back({returned, campaign, worker});
+  }
   void give_up(wire::CampaignId, RunIndex run) override { given_up_.push_back(run); }
   void log(coordinator::Event event, wire::CampaignId) override {
     events_.push_back(to_text(event));
@@ -51,13 +60,14 @@ class RecordingOutbox final : public coordinator::Outbox {
     const auto [to, message] = sent_.front();
     sent_.erase(sent_.begin());
     EXPECT_EQ(to, worker);
-    return std::get<Content>(message);
+    return content_of<Content>(message);
   }
 
   /// A part of a definition that was to be sent.
   struct SentDefinition {
     wire::WorkerId worker;
-    wire::CampaignRequest request;
+    wire::CampaignId campaign;
+    std::uint64_t offset;
     std::shared_ptr<const Campaign> definition;
   };
   SentDefinition take_definition() {
@@ -71,7 +81,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   template <typename Content>
   void drop_sent(wire::WorkerId worker) {
     const auto found = std::find_if(sent_.begin(), sent_.end(), [&](const auto& item) {
-      return item.first == worker && std::holds_alternative<Content>(item.second);
+      return item.first == worker && holds<Content>(item.second);
     });
     if (found == sent_.end()) throw std::logic_error("no such message was sent");
     sent_.erase(found);
@@ -81,7 +91,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   std::vector<RunIndex> take_stored() { return runs_of(std::exchange(stored_, {})); }
   /// Runs handed over to be compared since the last call.
   std::vector<RunIndex> take_compared() { return runs_of(std::exchange(compared_, {})); }
-  std::vector<coordinator::Loss> take_losses() { return std::exchange(losses_, {}); }
+  std::vector<RecordedLoss> take_losses() { return std::exchange(losses_, {}); }
   std::vector<RunIndex> take_given_up() { return std::exchange(given_up_, {}); }
   std::vector<std::string> take_events() { return std::exchange(events_, {}); }
 
@@ -101,7 +111,7 @@ class RecordingOutbox final : public coordinator::Outbox {
 
   void expect_nothing_more() {
     for (const auto& [to, message] : sent_) {
-      ADD_FAILURE() << "message of kind " << message.index() << " to worker " << to.value;
+      ADD_FAILURE() << message.ShortDebugString() << " to worker " << to.value;
     }
     EXPECT_EQ(definitions_.size(), 0U);
     EXPECT_EQ(take_stored().size(), 0U);
@@ -120,11 +130,11 @@ class RecordingOutbox final : public coordinator::Outbox {
     return runs;
   }
 
-  std::vector<std::pair<wire::WorkerId, wire::Message>> sent_;
+  std::vector<std::pair<wire::WorkerId, proto::Envelope>> sent_;
   std::vector<SentDefinition> definitions_;
   std::vector<RecordedResult> stored_;
   std::vector<RecordedResult> compared_;
-  std::vector<coordinator::Loss> losses_;
+  std::vector<RecordedLoss> losses_;
   std::vector<RunIndex> given_up_;
   std::vector<std::string> events_;
 };

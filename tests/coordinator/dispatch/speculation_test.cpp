@@ -12,13 +12,11 @@ class TailTest : public DispatchFixture {
  protected:
   /// The first worker has all runs that are left, 1 to 4; two of them wait. The second is idle.
   void begin_tail() {
-    begin();
     add_campaign(one, 5);
     add_worker(first, 2);
     complete(first, one, {0});
     campaign(one).run_time_s = 10.0;
-    heartbeat(first, {held(one, {{1}, 4})},
-              {{.campaign = one, .ranges = {{{1}, 2}}, .num_steps_done = 0}});
+    heartbeat(first, {held(one, {{1}, 4})}, {make_computed_batch(one, {{{1}, 2}})});
     outbox.forget();
     ASSERT_EQ(runs_held_text(state, first), "1..4");
     add_worker(second, 2);
@@ -33,9 +31,9 @@ class TailTest : public DispatchFixture {
   }
 
   /// The second worker's copies, with the attempt.
-  wire::RunLease take_copies() {
-    const auto lease = outbox.take_sent<wire::RunLease>(second);
-    EXPECT_EQ(lease.runs, (RunRange{{1}, 2}));
+  proto::RunLease take_copies() {
+    const auto lease = outbox.take_sent<proto::RunLease>(second);
+    EXPECT_EQ(wire::runs_of(lease), (RunRange{{1}, 2}));
     return lease;
   }
 
@@ -52,11 +50,12 @@ class TailTest : public DispatchFixture {
 TEST_F(TailTest, AnIdleWorkerGetsWhatWaitsAtOthers) {
   begin_tail();
   on_tick(state, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{3}, 2}}));
-  on_give_back(state, first, {.runs = {held(one, {{3}, 2})}}, now, outbox);
-  const auto lease = outbox.take_sent<wire::RunLease>(second);
-  EXPECT_EQ(lease.runs, (RunRange{{3}, 2}));
-  EXPECT_EQ(lease.attempt, Attempt{2});
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{3}, 2}}));
+  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{3}, 2})}), now,
+               outbox);
+  const auto lease = outbox.take_sent<proto::RunLease>(second);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{3}, 2}));
+  EXPECT_EQ(lease.attempt(), 2U);
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::retracted);
   EXPECT_EQ(
       outbox.take_events(),
@@ -72,7 +71,7 @@ TEST_F(TailTest, ItIsAskedForOnlyOnceInAWhile) {
   outbox.expect_nothing_more();
   now += 1s;
   on_tick(state, now, outbox);
-  (void)outbox.take_sent<wire::Retract>(first);
+  (void)outbox.take_sent<proto::Retract>(first);
 }
 
 TEST_F(TailTest, NothingIsAskedBackWhileRunsArePending) {
@@ -91,7 +90,7 @@ TEST_F(TailTest, ARunThatTakesTooLongIsCopied) {
   outbox.expect_nothing_more();
   now += 1s;
   on_tick(state, now, outbox);
-  EXPECT_EQ(take_copies().attempt, Attempt{2});
+  EXPECT_EQ(take_copies().attempt(), 2U);
   EXPECT_EQ(campaign(one).copies.size(), 2U);
   on_tick(state, now, outbox);
 }
@@ -138,7 +137,7 @@ TEST_F(TailTest, ARunOfASuspectWorkerIsCopied) {
 
 TEST_F(TailTest, TheCopyOfALostRunTakesItsPlace) {
   begin_copies();
-  on_bye(state, first, {.reason = LossReason::preempted}, now, outbox);
+  on_bye(state, first, LossReason::preempted, now, outbox);
   EXPECT_EQ(outbox.num_sent(), 0U);
   const auto& lease = state.leases.at(*campaign(one).lent.find({1}));
   EXPECT_EQ(lease.worker, second);
@@ -149,8 +148,8 @@ TEST_F(TailTest, TheCopyOfALostRunTakesItsPlace) {
 
 TEST_F(TailTest, TheAttemptGrowsAlsoAfterCopiesThatWereLost) {
   begin_copies();
-  on_bye(state, second, {}, now, outbox);
-  on_bye(state, first, {}, now, outbox);
+  on_bye(state, second, LossReason::preempted, now, outbox);
+  on_bye(state, first, LossReason::preempted, now, outbox);
   EXPECT_TRUE(campaign(one).pending.contains(Attempt{3}));
   EXPECT_TRUE(campaign(one).copies.empty());
   outbox.forget();
@@ -160,7 +159,7 @@ TEST_F(TailTest, TheFirstResultCountsAndTheOtherWorkerIsAskedBack) {
   begin_copies();
   deliver(second, one, {1}, 2);
   EXPECT_EQ(outbox.take_stored(), Runs{{1}});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 1}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{1}, 1}}));
   deliver(first, one, {1});
   EXPECT_EQ(outbox.take_compared(), Runs{{1}});
   EXPECT_EQ(campaign(one).num_duplicates, 1U);
@@ -197,7 +196,7 @@ TEST_F(TailTest, ACopyThatMayStillArriveKeepsSuspectsAway) {
   outbox.expect_nothing_more();
   now += 1s;
   heartbeat(second);
-  EXPECT_TRUE(outbox.take_sent<wire::RunLease>(second).is_alone);
+  EXPECT_TRUE(outbox.take_sent<proto::RunLease>(second).is_alone());
 }
 
 }  // namespace

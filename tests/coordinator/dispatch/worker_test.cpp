@@ -9,50 +9,47 @@ using namespace std::chrono_literals;
 
 class WorkerTest : public DispatchFixture {
  protected:
-  void refuse(const wire::Hello& said, wire::RejectReason reason, const std::string& text) {
+  void refuse(const proto::Hello& said, proto::RejectReason reason, const std::string& text) {
     say_hello(second, said);
-    const auto reject = outbox.take_sent<wire::Reject>(second);
-    EXPECT_EQ(reject.reason, reason);
-    EXPECT_EQ(reject.text, text);
+    const auto reject = outbox.take_sent<proto::Reject>(second);
+    EXPECT_EQ(reject.reason(), reason);
+    EXPECT_EQ(reject.text(), text);
     EXPECT_EQ(outbox.take_events(), Strings{"worker_refused name=w " + text});
     EXPECT_FALSE(state.workers.contains(second));
   }
 };
 
 TEST_F(WorkerTest, IsWelcomed) {
-  begin();
   say_hello(first, hello(3));
-  const auto welcome = outbox.take_sent<wire::Welcome>(first);
-  EXPECT_EQ(welcome.worker, first);
-  EXPECT_EQ(welcome.heartbeat_interval_s, 5.0);
+  const auto welcome = outbox.take_sent<proto::Welcome>(first);
+  EXPECT_EQ(welcome.worker_id(), first.value);
+  EXPECT_EQ(welcome.heartbeat_interval_s(), 5.0);
   EXPECT_EQ(outbox.take_events(),
             Strings{"worker_registered worker=1 name=w host=host pid=100 slots=3"});
   EXPECT_EQ(state.num_slots, 3U);
 }
 
 TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
-  begin();
   add_campaign(one, 10);
   add_worker(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
   say_hello(first, hello());
-  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_sent<proto::Welcome>(first);
   EXPECT_EQ(state.leases.size(), 1U);
   EXPECT_EQ(state.num_slots, 1U);
 }
 
 TEST_F(WorkerTest, IsRefusedWithAnotherModel) {
-  begin();
-  wire::Hello other = hello();
-  other.model_version = "older";
-  refuse(other, wire::RejectReason::incompatible,
+  proto::Hello other = hello();
+  other.set_model_version("older");
+  refuse(other, proto::REJECT_REASON_INCOMPATIBLE,
          "model_version = older (must be " + std::string(model_version) + ", the coordinator's)");
 }
 
 TEST_F(WorkerTest, IsRefusedIfItComputesOtherBits) {
   config.reference_digest = 0xabcdef;
   begin();
-  refuse(hello(), wire::RejectReason::incompatible,
+  refuse(hello(), proto::REJECT_REASON_INCOMPATIBLE,
          "reference_digest = 0000000000000000 (must be 0000000000abcdef, the coordinator's)");
 }
 
@@ -60,7 +57,7 @@ TEST_F(WorkerTest, IsRefusedBeyondTheNumberThatIsServed) {
   config.num_workers_max = 1;
   begin();
   add_worker(first);
-  refuse(hello(), wire::RejectReason::full, "number of workers = 1 (no more are served)");
+  refuse(hello(), proto::REJECT_REASON_FULL, "number of workers = 1 (no more are served)");
 }
 
 TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
@@ -69,91 +66,85 @@ TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
   for (int i = 0; i < 5; ++i) {
     say_hello(first, hello());
   }
-  (void)outbox.take_sent<wire::Welcome>(first);
-  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_sent<proto::Welcome>(first);
+  (void)outbox.take_sent<proto::Welcome>(first);
   (void)outbox.take_events();
   outbox.expect_nothing_more();
   now += 500ms;
   say_hello(first, hello());
-  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_sent<proto::Welcome>(first);
 }
 
 TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
-  begin();
   add_campaign(one, 1);
   const auto expect_reject = [&] {
-    const auto reject = outbox.take_sent<wire::Reject>(first);
-    EXPECT_EQ(reject.reason, wire::RejectReason::not_registered);
-    EXPECT_EQ(reject.text, "this worker is not registered");
+    const auto reject = outbox.take_sent<proto::Reject>(first);
+    EXPECT_EQ(reject.reason(), proto::REJECT_REASON_NOT_REGISTERED);
+    EXPECT_EQ(reject.text(), "this worker is not registered");
     outbox.expect_nothing_more();
   };
-  on_heartbeat(state, first, {.num_runs_max = 1, .held = {}, .computing = {}}, 1, now, outbox);
+  on_heartbeat(state, first, make_heartbeat(1), 1, now, outbox);
   expect_reject();
   deliver(first, one, {0});
   expect_reject();
-  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
+               outbox);
   expect_reject();
-  on_campaign_request(state, first, {.campaign = one}, now, outbox);
+  on_campaign_request(state, first, one, 0, now, outbox);
   expect_reject();
   reject_unregistered(first, outbox);
   expect_reject();
-  on_bye(state, first, {}, now, outbox);
+  on_bye(state, first, LossReason::preempted, now, outbox);
   crash(first);
 }
 
 TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
-  on_campaign_request(state, first, {.campaign = one, .offset = 7}, now, outbox);
+  on_campaign_request(state, first, one, 7, now, outbox);
   const auto sent = outbox.take_definition();
   EXPECT_EQ(sent.worker, first);
-  EXPECT_EQ(sent.request.campaign, one);
-  EXPECT_EQ(sent.request.offset, 7U);
+  EXPECT_EQ(sent.campaign, one);
+  EXPECT_EQ(sent.offset, 7U);
   EXPECT_EQ(sent.definition, campaign(one).definition);
 }
 
 TEST_F(WorkerTest, IsToldWhichCampaignsAreNotServed) {
-  begin();
   add_worker(first);
-  on_campaign_request(state, first, {.campaign = one}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::NotServed>(first).campaign, one);
+  on_campaign_request(state, first, one, 0, now, outbox);
+  EXPECT_EQ(outbox.take_sent<proto::NotServed>(first).campaign(), one.value);
   on_ended(state, one, 1);
-  on_campaign_request(state, first, {.campaign = one}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  on_campaign_request(state, first, one, 0, now, outbox);
+  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
 }
 
 TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
-  begin();
   add_campaign(one, 1);
   say_hello(first, hello());
-  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_sent<proto::Welcome>(first);
   (void)outbox.take_events();
   on_tick(state, now, outbox);
   outbox.expect_nothing_more();
   heartbeat(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 1}));
 }
 
 TEST_F(WorkerTest, AnOlderHeartbeatChangesNothing) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
   now += 1h;
-  on_heartbeat(state, first, {.num_runs_max = 0, .held = {}, .computing = {}}, sequence, now,
-               outbox);
-  (void)outbox.take_sent<wire::HeartbeatAck>(first);
+  on_heartbeat(state, first, make_heartbeat(0), sequence, now, outbox);
+  (void)outbox.take_sent<proto::HeartbeatAck>(first);
   EXPECT_EQ(state.workers.at(first).num_runs_max, 4096U);
   EXPECT_EQ(state.leases.size(), 1U);
 }
 
 TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
   now += 59s;
   on_tick(state, now, outbox);
   outbox.expect_nothing_more();
@@ -163,16 +154,15 @@ TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt)
   EXPECT_FALSE(state.workers.contains(first));
   outbox.forget();
   add_worker(second);
-  const auto lease = outbox.take_sent<wire::RunLease>(second);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(lease.attempt, Attempt{2});
+  const auto lease = outbox.take_sent<proto::RunLease>(second);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt(), 2U);
 }
 
 TEST_F(WorkerTest, ThatSeemsSilentMayWaitToBeHeard) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
   state.is_behind = true;
   now += 599s;
   on_tick(state, now, outbox);
@@ -184,7 +174,6 @@ TEST_F(WorkerTest, ThatSeemsSilentMayWaitToBeHeard) {
 }
 
 TEST_F(WorkerTest, ThatSeemsSilentIsLostOnceAllIsHeard) {
-  begin();
   add_worker(first);
   state.is_behind = true;
   now += 60s;
@@ -197,7 +186,6 @@ TEST_F(WorkerTest, ThatSeemsSilentIsLostOnceAllIsHeard) {
 }
 
 TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
@@ -210,50 +198,47 @@ TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
   EXPECT_EQ(losses[0].campaign, one);
   EXPECT_EQ(losses[0].runs, (RunRange{{0}, 1}));
   EXPECT_EQ(losses[0].attempt, Attempt{1});
-  EXPECT_EQ(losses[0].worker, first);
+  EXPECT_EQ(losses[0].by, first);
+  EXPECT_EQ(losses[0].worker, session_of(first));
   EXPECT_EQ(losses[0].reason, LossReason::silent);
   EXPECT_FALSE(losses[0].is_blamed);
 }
 
 TEST_F(WorkerTest, AnyMessageIsASignOfLife) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
   for (int i = 0; i < 3; ++i) {
     now += 50s;
-    on_campaign_request(state, first, {.campaign = one}, now, outbox);
+    on_campaign_request(state, first, one, 0, now, outbox);
     (void)outbox.take_definition();
     on_tick(state, now, outbox);
   }
 }
 
 TEST_F(WorkerTest, ThatIsSuspectIsLentNothing) {
-  begin();
   add_worker(first);
   now += 15s;
   add_campaign(one, 1);
   on_tick(state, now, outbox);
   outbox.expect_nothing_more();
   heartbeat(first);
-  (void)outbox.take_sent<wire::RunLease>(first);
+  (void)outbox.take_sent<proto::RunLease>(first);
 }
 
 TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
   add_worker(second);
-  on_bye(state, first, {.reason = LossReason::walltime}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).attempt, Attempt{2});
+  on_bye(state, first, LossReason::walltime, now, outbox);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(second).attempt(), 2U);
   EXPECT_EQ(outbox.take_events(), (Strings{"worker_left worker=1 name=w reason=walltime",
                                            "runs_lost worker=1 runs=0 attempt=1 reason=walltime"}));
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::walltime);
 }
 
 TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
-  begin();
   add_campaign(one, 3);
   add_worker(first, 2);
   outbox.forget();
@@ -267,46 +252,43 @@ TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
 }
 
 TEST_F(WorkerTest, DrainsUntilWhatItHoldsIsStored) {
-  begin();
   add_campaign(one, 5);
   add_worker(first);
   outbox.forget();
   on_drain(state, outbox);
-  (void)outbox.take_sent<wire::Drain>(first);
+  (void)outbox.take_sent<proto::Drain>(first);
   heartbeat(first, {held(one, {{0}, 1})});
-  (void)outbox.take_sent<wire::Drain>(first);  // The first may have been lost.
+  (void)outbox.take_sent<proto::Drain>(first);  // The first may have been lost.
   EXPECT_FALSE(is_quiet(state));
   deliver(first, one, {0});
   EXPECT_FALSE(is_quiet(state));
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
+  (void)outbox.take_sent<proto::ResultAck>(first);
   EXPECT_TRUE(is_quiet(state));
   EXPECT_FALSE(is_finished(campaign(one)));
 }
 
 TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
-  begin();
   add_campaign(one, 5);
   on_drain(state, outbox);
   say_hello(first, hello());
-  (void)outbox.take_sent<wire::Welcome>(first);
-  (void)outbox.take_sent<wire::Drain>(first);
+  (void)outbox.take_sent<proto::Welcome>(first);
+  (void)outbox.take_sent<proto::Drain>(first);
   (void)outbox.take_events();
   deliver(first, one, {3});
   EXPECT_EQ(outbox.take_stored(), Runs{{3}});
 }
 
 TEST_F(WorkerTest, IsToldToStopAgainAndAgain) {
-  begin();
   add_campaign(one, 5);
   add_worker(first);
   outbox.forget();
   on_stop(state, outbox);
-  (void)outbox.take_sent<wire::Stop>(first);
+  (void)outbox.take_sent<proto::Stop>(first);
   heartbeat(first);
-  (void)outbox.take_sent<wire::Stop>(first);
+  (void)outbox.take_sent<proto::Stop>(first);
   say_hello(second, hello());
-  (void)outbox.take_sent<wire::Stop>(second);
+  (void)outbox.take_sent<proto::Stop>(second);
 }
 
 }  // namespace

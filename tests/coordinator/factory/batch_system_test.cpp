@@ -28,12 +28,10 @@ const BatchSystem& system_of(std::string_view name) {
   return *std::ranges::find(batch_systems(), name, &BatchSystem::name);
 }
 
-AllocationConfig example() {
+FactoryConfig example() {
   return {.name = "fleet",
-          .worker_command = "echo \"it's $1\"",
           .walltime = std::chrono::seconds(2 * 3600 + 5 * 60 + 7),
-          .num_processors = {},
-          .options = {}};
+          .worker_command = "echo \"it's $1\""};
 }
 
 /// What the shell makes of the text again.
@@ -69,8 +67,8 @@ TEST(BatchSystem, HandsTheIdentifierToTheWorkersCommand) {
 }
 
 TEST(BatchSystem, AsksSlurmForAMachineOrForProcessors) {
-  AllocationConfig config = example();
-  config.options = {"--partition=long"};
+  FactoryConfig config = example();
+  config.submit_options = {"--partition=long"};
   EXPECT_THAT(system_of("slurm").submission(config).arguments,
               ElementsAre("sbatch", "--parsable", "--job-name=fleet", "--nodes=1", "--ntasks=1",
                           "--time=2:05:07", "--exclusive", "--partition=long"));
@@ -81,17 +79,17 @@ TEST(BatchSystem, AsksSlurmForAMachineOrForProcessors) {
 
 TEST(BatchSystem, ReadsWhatSlurmAnswers) {
   const BatchSystem& slurm = system_of("slurm");
-  EXPECT_EQ(slurm.id_of("4711\n"), "4711");
-  EXPECT_EQ(slurm.id_of("4711;cluster\n"), "4711");
-  EXPECT_THAT(ids_and_states(slurm.allocations_of(
-                  example(), "17 PENDING\n18 RUNNING\n19 CONFIGURING\n20 SUSPENDED\n")),
+  EXPECT_EQ(id_in("4711\n", "sbatch"), "4711");
+  EXPECT_EQ(id_in("4711;cluster\n", "sbatch"), "4711");
+  EXPECT_THAT(ids_and_states(allocations_of(
+                  slurm, example(), "17 PENDING\n18 RUNNING\n19 CONFIGURING\n20 SUSPENDED\n")),
               ElementsAre("17 waits", "18 runs", "19 waits", "20 waits"));
-  EXPECT_THAT(slurm.allocations_of(example(), ""), IsEmpty());
-  EXPECT_THAT(slurm.cancellation("17").arguments, ElementsAre("scancel", "17"));
+  EXPECT_THAT(allocations_of(slurm, example(), ""), IsEmpty());
+  EXPECT_THAT(slurm.canceller, ElementsAre("scancel"));
 }
 
 TEST(BatchSystem, AsksPbsForAMachineOrForProcessors) {
-  AllocationConfig config = example();
+  FactoryConfig config = example();
   EXPECT_THAT(system_of("pbs").submission(config).arguments,
               ElementsAre("qsub", "-N", "fleet", "-l", "walltime=2:05:07", "-l", "select=1", "-l",
                           "place=excl"));
@@ -102,8 +100,8 @@ TEST(BatchSystem, AsksPbsForAMachineOrForProcessors) {
 
 TEST(BatchSystem, ReadsWhatPbsAnswers) {
   const BatchSystem& pbs = system_of("pbs");
-  EXPECT_EQ(pbs.id_of("17.head\n"), "17.head");
-  EXPECT_THAT(ids_and_states(pbs.allocations_of(example(), "18.head Q\n17.head R\n")),
+  EXPECT_EQ(id_in("17.head\n", "qsub"), "17.head");
+  EXPECT_THAT(ids_and_states(allocations_of(pbs, example(), "18.head Q\n17.head R\n")),
               ElementsAre("18.head waits", "17.head runs"));
 }
 
@@ -127,7 +125,7 @@ TEST(BatchSystem, ListsWhatPbsHasNotEnded) {
   BatchCommand listing = pbs.listing(example());
   listing.arguments.insert(listing.arguments.begin(),
                            {"env", "PATH=" + folder_of_qselect() + ":/usr/bin:/bin"});
-  EXPECT_THAT(ids_and_states(pbs.allocations_of(example(), output_of(listing))),
+  EXPECT_THAT(ids_and_states(allocations_of(pbs, example(), output_of(listing))),
               ElementsAre("H.head waits", "Q.head waits", "S.head waits", "T.head waits",
                           "U.head waits", "W.head waits", "R.head runs"));
 }
@@ -157,7 +155,7 @@ TEST(BatchSystem, QuotesForCondor) {
 }
 
 TEST(BatchSystem, LetsCondorExpandNothingOfTheWorkersCommand) {
-  AllocationConfig config = example();
+  FactoryConfig config = example();
   config.worker_command = "cd $(mktemp -d); x=$ENV(HOME) y=$$(Memory) z=$$$";
   EXPECT_THAT(system_of("condor").submission(config).input,
               HasSubstr("'cd $(DOLLAR)(mktemp -d); x=$(DOLLAR)ENV(HOME) "
@@ -166,14 +164,14 @@ TEST(BatchSystem, LetsCondorExpandNothingOfTheWorkersCommand) {
 
 TEST(BatchSystem, ReadsWhatCondorAnswers) {
   const BatchSystem& condor = system_of("condor");
-  EXPECT_EQ(condor.id_of("12.0 - 12.0\n"), "12.0");
-  EXPECT_THAT(ids_and_states(condor.allocations_of(example(), "12.0 1\n13.0 2\n")),
+  EXPECT_EQ(id_in("12.0 - 12.0\n", "condor_submit"), "12.0");
+  EXPECT_THAT(ids_and_states(allocations_of(condor, example(), "12.0 1\n13.0 2\n")),
               ElementsAre("12.0 waits", "13.0 runs"));
 }
 
 TEST(BatchSystem, FindsLocalWorkersByNameAndProcess) {
-  EXPECT_THAT(ids_and_states(system_of("local").allocations_of(
-                  example(),
+  EXPECT_THAT(ids_and_states(allocations_of(
+                  system_of("local"), example(),
                   " 17 proofmass-worker --name fleet-17 --threads 2\n"
                   " 18 proofmass-worker --name fleet-17 --threads 2\n"  // Its second process.
                   " 19 proofmass-worker --name other-19\n"
@@ -182,12 +180,12 @@ TEST(BatchSystem, FindsLocalWorkersByNameAndProcess) {
 }
 
 TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
-  AllocationConfig config = example();
+  FactoryConfig config = example();
   const std::string file = testing::TempDir() + "/started-by-factory";
   config.worker_command = "echo \"$1\" $$ > " + wire::shell_word(file + ".new") + " && mv " +
                           wire::shell_word(file + ".new") + " " + wire::shell_word(file);
   const BatchSystem& local = system_of("local");
-  const std::string id = local.id_of(output_of(local.submission(config)));
+  const std::string id = id_in(output_of(local.submission(config)), "sh");
   const std::string seen = output_of(
       {{"sh", "-c", "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\"; rm \"$0\"", file}});
   EXPECT_EQ(seen, id + " " + id + "\n");
@@ -196,12 +194,12 @@ TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
 TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {
   const BatchSystem& slurm = system_of("slurm");
   EXPECT_EQ(
-      test::message_of<Error>([&] { (void)slurm.id_of(""); }),
+      test::message_of<Error>([&] { (void)id_in("", "sbatch"); }),
       "sbatch: identifier = \"\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit first)");
-  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of("$(rm)"); }),
+  EXPECT_EQ(test::message_of<Error>([&] { (void)id_in("$(rm)", "sbatch"); }),
             "sbatch: identifier = \"$(rm)\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit "
             "first)");
-  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.allocations_of(example(), "17\n"); }),
+  EXPECT_EQ(test::message_of<Error>([&] { (void)allocations_of(slurm, example(), "17\n"); }),
             "squeue: line = \"17\" (must be an identifier and a state)");
 }
 
@@ -216,6 +214,45 @@ TEST(BatchSystem, SaysWhyACommandFailed) {
             "sh: killed by signal 9 (Killed)");
   EXPECT_EQ(test::message_of<Error>([] { (void)output_of({{"no-such-program"}}); }),
             "no-such-program: cannot be started: No such file or directory");
+}
+
+/// A batch system that runs what it is handed: an identifier is a line of sh that cancels it.
+class CarryOut : public testing::Test {
+ protected:
+  void carry_out(const FactoryActions& actions) {
+    coordinator::carry_out(actions, state_, system_, config_,
+                           [this](const wire::Event& event) { events_.push_back(to_text(event)); });
+  }
+
+  BatchSystem system_{.name = "sh",
+                      .submission =
+                          [](const FactoryConfig& config) {
+                            return BatchCommand{{"sh", "-c", config.worker_command}};
+                          },
+                      .listing = nullptr,
+                      .lister = {},
+                      .running = {},
+                      .canceller = {"sh", "-c"}};
+  FactoryConfig config_{.name = "fleet", .worker_command = "printf 17"};
+  FactoryState state_;
+  std::vector<std::string> events_;
+};
+
+TEST_F(CarryOut, GoesOnAfterACancellationThatFails) {
+  carry_out({.num_submissions = 1, .cancelled = {"echo Unknown Job Id >&2; exit 153", "true"}});
+  EXPECT_THAT(events_, ElementsAre("cancellation_failed allocation=\"echo Unknown Job Id >&2; exit "
+                                   "153\" reason=\"sh: exit code 153: Unknown Job Id\"",
+                                   "allocation_cancelled allocation=true",
+                                   "worker_requested allocation=17"));
+  EXPECT_TRUE(state_.allocations.contains("17"));
+}
+
+TEST_F(CarryOut, TriesNoFurtherSubmissionAfterOneThatFails) {
+  config_.worker_command = "echo queue full >&2; exit 1";
+  carry_out({.num_submissions = 3, .cancelled = {}});
+  EXPECT_THAT(events_, ElementsAre("submission_failed retry_min=1 "
+                                   "reason=\"sh: exit code 1: queue full\""));
+  EXPECT_EQ(state_.num_failed_submissions, 1);
 }
 
 }  // namespace

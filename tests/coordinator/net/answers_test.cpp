@@ -10,13 +10,13 @@
 #include <memory>
 #include <string>
 #include <thread>
-#include <variant>
 #include <vector>
 
 #include "core/error.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
 #include "tests/message_of.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,9 +39,9 @@ class AnswersTest : public testing::Test {
     std::filesystem::permissions(config_.answer_program, std::filesystem::perms::owner_all);
   }
 
-  void ask(const std::string& key, wire::Question question = wire::Question::report) {
-    answers_.ask({.campaign = "a", .question = question}, directory_ / "a.db", {.name = key},
-                 [this](wire::ClientReply reply) { replies_.push_back(std::move(reply)); });
+  void ask(const std::string& key, proto::Question question = proto::QUESTION_REPORT) {
+    answers_.ask(test::question(question).answer(), directory_ / "a.db", {.name = key},
+                 [this](proto::ReplyEnvelope reply) { replies_.push_back(std::move(reply)); });
   }
 
   std::string refusal_of(const std::string& key) {
@@ -63,8 +63,9 @@ class AnswersTest : public testing::Test {
     return part(key, offset, replies_.size() - 1);
   }
   std::string part(const std::string& key, std::uint64_t offset, std::size_t question) {
-    const auto& answer = std::get<wire::AnswerReply>(replies_.at(question));
-    return answers_.part({.answer_id = answer.answer_id, .offset = offset}, {.name = key}).content;
+    const proto::RequestEnvelope request =
+        test::answer_part(replies_.at(question).answer().answer_id(), offset);
+    return answers_.part(request.answer_part(), {.name = key}).answer_part().content();
   }
 
   bool is_dropped(std::size_t question = 0) {
@@ -73,7 +74,7 @@ class AnswersTest : public testing::Test {
   }
 
   test::TemporaryDirectory directory_;
-  std::vector<wire::ClientReply> replies_;
+  std::vector<proto::ReplyEnvelope> replies_;
   TimePoint now_{};
   ServiceConfig config_;
 
@@ -105,9 +106,7 @@ TEST_F(AnswersTest, AreComputedForEachKeyTwoAtATimeAndFourForAll) {
   EXPECT_THAT(refusal_of("dora"), StartsWith("4 questions are being answered"));
   std::ofstream{gate};  // Now they end.
   wait_for(4);
-  for (const wire::ClientReply& reply : replies_) {
-    EXPECT_TRUE(std::holds_alternative<wire::AnswerReply>(reply));
-  }
+  for (const proto::ReplyEnvelope& reply : replies_) EXPECT_TRUE(reply.has_answer());
   ask("anna");
 }
 
@@ -183,7 +182,7 @@ TEST_F(AnswersTest, AreCountedWhileTheyComeAndNothingElseIs) {
   answer_with("head -c " + size + " /dev/zero; sleep 3600");
   ask("anna");
   wait_for(2);
-  EXPECT_EQ(std::get<wire::ErrorReply>(replies_.back()).text,
+  EXPECT_EQ(replies_.back().error().text(),
             "the answer has more than 67108864 bytes; ask for less, or fetch the database");
 }
 
@@ -193,7 +192,7 @@ TEST_F(AnswersTest, DoNotCopyADatabaseForWhichTheDiskHasNoRoom) {
   const std::uintmax_t size = available / 2 + (1 << 20);
   std::filesystem::resize_file(directory_ / "a.db", size);
   std::filesystem::create_directory(config_.answer_directory);
-  EXPECT_THAT(test::message_of<Error>([&] { ask("anna", wire::Question::database); }),
+  EXPECT_THAT(test::message_of<Error>([&] { ask("anna", proto::QUESTION_DATABASE); }),
               HasSubstr("(must be " + std::to_string(2 * size) + ", twice the size of the"));
 }
 

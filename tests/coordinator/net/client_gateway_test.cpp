@@ -13,6 +13,7 @@
 
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/message_of.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -21,8 +22,7 @@ namespace {
 class ClientGatewayTest : public testing::Test {
  protected:
   void ask(const std::string& routing_id, std::uint64_t id) {
-    const std::string bytes =
-        wire::encode(wire::RequestPacket{.id = id, .request = wire::ReleaseHostRequest{"n7"}});
+    const std::string bytes = wire::encode(test::numbered(id, test::release("n7")));
     gateway_.receive(
         {.from = {.routing_id = routing_id, .key = {}, .host = {}}, .frames = {bytes}});
   }
@@ -56,10 +56,9 @@ class ClientGatewayTest : public testing::Test {
   }
 
   void note(const std::string& routing_id, const std::string& bytes) {
-    const auto packet = std::get<wire::ReplyPacket>(wire::decode_reply(bytes));
-    const auto* const error = std::get_if<wire::ErrorReply>(&packet.reply);
-    const auto* const done = std::get_if<wire::DoneReply>(&packet.reply);
-    replies_[routing_id].emplace_back(packet.id, error != nullptr ? error->text : done->text);
+    const auto reply = std::get<proto::ReplyEnvelope>(wire::decode_reply(bytes));
+    replies_[routing_id].emplace_back(
+        reply.request_id(), reply.has_error() ? reply.error().text() : reply.done().text());
   }
 
   std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> replies_;
@@ -71,7 +70,7 @@ TEST_F(ClientGatewayTest, CarriesARepeatedRequestOutOnceAndTellsAllWhoWait) {
   ask("a", 5);
   ask("b", 5);
   ASSERT_EQ(carried_out.size(), 1U);
-  carried_out[0](wire::DoneReply{"done"});
+  carried_out[0](wire::done_reply("done"));
   for (const std::string client : {"a", "b"}) {
     ASSERT_EQ(replies_to(client).size(), 1U) << client;
     EXPECT_EQ(replies_to(client)[0].first, 5U);
@@ -88,7 +87,7 @@ TEST_F(ClientGatewayTest, LimitsHowManyWaitForTheSame) {
   EXPECT_EQ(replies_to("late")[0].second,
             "16 clients wait for the answer to this request already; try again later");
   ASSERT_EQ(carried_out.size(), 1U);
-  carried_out[0](wire::DoneReply{"done"});
+  carried_out[0](wire::done_reply("done"));
   EXPECT_EQ(replies_to("late").size(), 1U);
   EXPECT_EQ(replies_to("15").size(), 1U);
 }
@@ -108,41 +107,29 @@ TEST_F(ClientGatewayTest, OutlivesWhateverIsThrown) {
   EXPECT_EQ(carried_out.size(), 1U);
 }
 
-wire::SubmitRequest some_submit() {
+Definition some_definition() {
   MicroscopeCampaign campaign;
   campaign.name = "tables";
   campaign.num_runs = 2;
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {{0.1, -2.0 / 3.0}};
-  return {.definition = definition_of(campaign),
-          .priority = -7,
-          .audit_fraction = 0.1,
-          .stop_rule = "std(a_c13) within 5%",
-          .failures_max = 3};
+  return definition_of(campaign);
 }
 
 TEST(RequestOf, HasTheCampaignThatTheDefinitionSays) {
-  const auto submission = std::get<Submission>(request_of(some_submit()));
-  EXPECT_EQ(submission.campaign->definition(TableColumns::included), some_submit().definition);
-  EXPECT_EQ(submission.campaign->table_columns[0][1], -2.0 / 3.0);
-  EXPECT_EQ(submission.priority, -7);
-  EXPECT_EQ(submission.audit_fraction, 0.1);
-  EXPECT_EQ(submission.stop_rule, "std(a_c13) within 5%");
-  EXPECT_EQ(submission.failures_max, 3U);
-}
-
-TEST(RequestOf, HasAllElseAsItCame) {
-  const auto control = std::get<wire::ControlRequest>(
-      request_of(wire::ControlRequest{.action = wire::ControlAction::cancel, .campaign = "a"}));
-  EXPECT_EQ(control.action, wire::ControlAction::cancel);
-  EXPECT_EQ(control.campaign, "a");
+  const Request request = request_of(test::submission(some_definition(), {.priority = -7}));
+  EXPECT_EQ(request.campaign->definition(TableColumns::included), some_definition());
+  EXPECT_EQ(request.campaign->table_columns[0][1], -2.0 / 3.0);
+  EXPECT_EQ(request.message.submit().priority(), -7);
+  EXPECT_FALSE(request.message.submit().has_definition());
 }
 
 TEST(RequestOf, RefusesADefinitionThatIsNone) {
   const auto refusal = [](const std::function<void(Definition&)>& change) {
-    wire::SubmitRequest submit = some_submit();
-    change(submit.definition);
-    return test::message_of<DefinitionError>([&] { (void)request_of(submit); });
+    Definition definition = some_definition();
+    change(definition);
+    return test::message_of<DefinitionError>(
+        [&] { (void)request_of(test::submission(definition)); });
   };
   EXPECT_EQ(refusal([](Definition& d) { d.text.insert(0, "x = 1\n"); }),
             "definition:1: x = 1 (unknown key)");
@@ -153,19 +140,24 @@ TEST(RequestOf, RefusesADefinitionThatIsNone) {
   EXPECT_NE(refusal([](Definition& d) { d.table_columns[0].pop_back(); }), "");
 }
 
-using wire::RequestPart;
-
 constexpr TimePoint start{};
 
 std::uint64_t next_offset(const RequestParts::Outcome& outcome) {
-  return std::get<wire::PartReply>(outcome).next_offset;
+  const auto& reply = std::get<proto::ReplyEnvelope>(outcome);
+  EXPECT_TRUE(reply.has_part());
+  return reply.part().next_offset();
+}
+
+bool is_refused(const RequestParts::Outcome& outcome) {
+  const auto* const reply = std::get_if<proto::ReplyEnvelope>(&outcome);
+  return reply != nullptr && reply->has_error();
 }
 
 TEST(RequestParts, MakeARequestWhole) {
   RequestParts parts;
-  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 0, "abc"}, start)), 3U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 0, "abc"), start)), 3U);
   EXPECT_EQ(parts.size_held(), 6U);
-  const auto outcome = parts.take("a", 1, {6, 3, "def"}, start);
+  const auto outcome = parts.take("a", 1, test::part(6, 3, "def"), start);
   EXPECT_EQ(std::get<RequestParts::Whole>(outcome).bytes, "abcdef");
   EXPECT_EQ(parts.size_held(), 6U);  // Until it has been read.
   parts.release(6);
@@ -174,64 +166,67 @@ TEST(RequestParts, MakeARequestWhole) {
 
 TEST(RequestParts, OfSeveralConnectionsMayInterleave) {
   RequestParts parts;
-  (void)parts.take("a", 1, {4, 0, "ab"}, start);
-  (void)parts.take("b", 1, {4, 0, "wx"}, start);
-  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("a", 1, {4, 2, "cd"}, start)).bytes, "abcd");
-  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("b", 1, {4, 2, "yz"}, start)).bytes, "wxyz");
+  (void)parts.take("a", 1, test::part(4, 0, "ab"), start);
+  (void)parts.take("b", 1, test::part(4, 0, "wx"), start);
+  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("a", 1, test::part(4, 2, "cd"), start)).bytes,
+            "abcd");
+  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("b", 1, test::part(4, 2, "yz"), start)).bytes,
+            "wxyz");
 }
 
 TEST(RequestParts, OutOfOrderAreAskedForAgain) {
   RequestParts parts;
-  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 3, "def"}, start)), 0U);
-  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 0, "ab"}, start)), 2U);
-  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 0, "ab"}, start)), 2U);  // Repeated.
-  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 4, "ef"}, start)), 2U);  // One is missing.
-  const auto outcome = parts.take("a", 1, {6, 2, "cdef"}, start);
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 3, "def"), start)), 0U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 0, "ab"), start)), 2U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 0, "ab"), start)), 2U);  // Repeated.
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 4, "ef"), start)), 2U);  // One is missing.
+  const auto outcome = parts.take("a", 1, test::part(6, 2, "cdef"), start);
   EXPECT_EQ(std::get<RequestParts::Whole>(outcome).bytes, "abcdef");
 }
 
 TEST(RequestParts, OfAnotherRequestTakeThePlaceOfTheFirst) {
   RequestParts parts;
-  (void)parts.take("a", 1, {100, 0, "abc"}, start);
-  EXPECT_EQ(next_offset(parts.take("a", 2, {10, 0, "xyz"}, start)), 3U);
+  (void)parts.take("a", 1, test::part(100, 0, "abc"), start);
+  EXPECT_EQ(next_offset(parts.take("a", 2, test::part(10, 0, "xyz"), start)), 3U);
   EXPECT_EQ(parts.size_held(), 10U);
-  EXPECT_EQ(next_offset(parts.take("a", 1, {100, 3, "def"}, start)), 0U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(100, 3, "def"), start)), 0U);
   // The same number with another size is another request.
-  EXPECT_EQ(next_offset(parts.take("a", 2, {12, 0, "x"}, start)), 1U);
+  EXPECT_EQ(next_offset(parts.take("a", 2, test::part(12, 0, "x"), start)), 1U);
   EXPECT_EQ(parts.size_held(), 12U);
 }
 
 TEST(RequestParts, TakeNoMoreMemoryThanTheyMay) {
   RequestParts parts(10);
-  (void)parts.take("a", 1, {6, 0, "a"}, start);
-  const auto refused = parts.take("b", 1, {5, 0, "b"}, start);
-  EXPECT_EQ(std::get<wire::ErrorReply>(refused).text,
+  (void)parts.take("a", 1, test::part(6, 0, "a"), start);
+  const auto refused = parts.take("b", 1, test::part(5, 0, "b"), start);
+  EXPECT_EQ(std::get<proto::ReplyEnvelope>(refused).error().text(),
             "request size = 5 bytes (the coordinator is receiving 6 bytes of others, at most 10 "
             "together: try again later)");
-  EXPECT_EQ(next_offset(parts.take("b", 1, {4, 0, "b"}, start)), 1U);
+  EXPECT_EQ(next_offset(parts.take("b", 1, test::part(4, 0, "b"), start)), 1U);
   // A whole one counts until it has been read.
-  (void)parts.take("b", 1, {4, 1, "bcd"}, start);
-  EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(parts.take("c", 1, {1, 0, "c"}, start)));
+  (void)parts.take("b", 1, test::part(4, 1, "bcd"), start);
+  EXPECT_TRUE(is_refused(parts.take("c", 1, test::part(1, 0, "c"), start)));
   parts.release(4);
-  EXPECT_TRUE(std::holds_alternative<RequestParts::Whole>(parts.take("c", 1, {1, 0, "c"}, start)));
+  EXPECT_TRUE(std::holds_alternative<RequestParts::Whole>(
+      parts.take("c", 1, test::part(1, 0, "c"), start)));
 }
 
 // Room is counted with the first part of a request.
 TEST(RequestParts, Take128MebibytesUnlessToldOtherwise) {
   constexpr std::uint64_t half = std::uint64_t{64} << 20;
   RequestParts parts;
-  EXPECT_EQ(next_offset(parts.take("a", 1, {half, 0, "a"}, start)), 1U);
-  EXPECT_EQ(next_offset(parts.take("b", 1, {half, 0, "b"}, start)), 1U);
-  EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(parts.take("c", 1, {1, 0, "c"}, start)));
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(half, 0, "a"), start)), 1U);
+  EXPECT_EQ(next_offset(parts.take("b", 1, test::part(half, 0, "b"), start)), 1U);
+  EXPECT_TRUE(is_refused(parts.take("c", 1, test::part(1, 0, "c"), start)));
 }
 
 TEST(RequestParts, ThatDoNotComeAreWaitedForHalfAMinute) {
   RequestParts parts;
-  (void)parts.take("a", 1, {6, 0, "abc"}, start);
-  (void)parts.take("b", 1, {6, 0, "abc"}, start + std::chrono::seconds(20));
+  (void)parts.take("a", 1, test::part(6, 0, "abc"), start);
+  (void)parts.take("b", 1, test::part(6, 0, "abc"), start + std::chrono::seconds(20));
   parts.drop_stale(start + std::chrono::seconds(31));
   EXPECT_EQ(parts.size_held(), 6U);
-  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 3, "def"}, start)), 0U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 3, "def"), start)), 0U);
 }
 
 }  // namespace

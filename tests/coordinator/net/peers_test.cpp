@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/proofmass.pb.h"
+
 namespace proofmass::coordinator {
 namespace {
 
-using wire::Epoch;
 using wire::SessionId;
 using wire::WorkerId;
 
@@ -62,10 +63,14 @@ TEST(Peers, NumberTheMessagesToEachWorker) {
   Peers peers;
   (void)peers.meet({11}, 1, at("a"));
   (void)peers.meet({12}, 1, at("b"));
-  EXPECT_EQ(peers.next_header({1}, Epoch{9}),
-            (wire::Header{.session = {11}, .epoch = {9}, .sequence = 1}));
-  EXPECT_EQ(peers.next_header({1}, Epoch{9}).sequence, 2U);
-  EXPECT_EQ(peers.next_header({2}, Epoch{9}).sequence, 1U);
+  proto::Envelope message;
+  peers.address({1}, message);
+  EXPECT_EQ(message.session(), 11U);
+  EXPECT_EQ(message.sequence(), 1U);
+  peers.address({1}, message);
+  EXPECT_EQ(message.sequence(), 2U);
+  peers.address({2}, message);
+  EXPECT_EQ(message.sequence(), 1U);
 }
 
 TEST(Peers, ForgetAWorkerAltogether) {

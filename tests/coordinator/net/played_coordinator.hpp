@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <variant>
 #include <zmq.hpp>
 
@@ -21,19 +22,21 @@ class PlayedCoordinator {
   }
 
   /// The next request; whoever sent it is answered from now on.
-  wire::RequestPacket receive() {
+  proto::RequestEnvelope receive() {
     zmq::message_t bytes;
     if (!socket_.recv(client_) || !socket_.recv(bytes)) throw Error("no request");
-    return std::get<wire::RequestPacket>(wire::decode_request(bytes.to_string_view()));
+    return std::get<proto::RequestEnvelope>(wire::decode_request(bytes.to_string_view()));
   }
 
   void answer(const std::string& bytes) {
     (void)socket_.send(zmq::buffer(client_.to_string()), zmq::send_flags::sndmore);
     (void)socket_.send(zmq::buffer(bytes), zmq::send_flags::none);
   }
-  void answer(std::uint64_t id, const std::string& text) {
-    answer(wire::encode(wire::ReplyPacket{id, wire::DoneReply{text}}));
+  void answer(std::uint64_t id, proto::ReplyEnvelope reply) {
+    reply.set_request_id(id);
+    answer(wire::encode(std::move(reply)));
   }
+  void answer(std::uint64_t id, const std::string& text) { answer(id, wire::done_reply(text)); }
 
  private:
   zmq::context_t context_;

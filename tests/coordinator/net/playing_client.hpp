@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 #include <zmq.hpp>
@@ -11,6 +12,7 @@
 #include "core/error.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::test {
 
@@ -32,44 +34,54 @@ class PlayingClient {
                          is_last ? zmq::send_flags::none : zmq::send_flags::sndmore);
     }
   }
-  void send(std::uint64_t id, const wire::ClientRequest& request) {
-    send({wire::encode(wire::RequestPacket{.id = id, .request = request})});
+  void send(std::uint64_t id, proto::RequestEnvelope request) {
+    request.set_request_id(id);
+    send({wire::encode(std::move(request))});
   }
 
-  wire::ReplyPacket receive() {
+  proto::ReplyEnvelope receive() {
     zmq::message_t frame;
     if (!socket_.recv(frame)) throw Error("no reply before the deadline");
-    return std::get<wire::ReplyPacket>(wire::decode_reply(frame.to_string_view()));
+    return std::get<proto::ReplyEnvelope>(wire::decode_reply(frame.to_string_view()));
   }
   /// The next that is no sign of life.
-  wire::ReplyPacket receive_final() {
+  proto::ReplyEnvelope receive_final() {
     for (;;) {
-      wire::ReplyPacket packet = receive();
-      if (!std::holds_alternative<wire::WaitReply>(packet.reply)) return packet;
+      proto::ReplyEnvelope reply = receive();
+      if (!reply.has_wait()) return reply;
     }
   }
 
-  wire::ReplyPacket ask_bytes(const std::vector<std::string>& frames) {
+  proto::ReplyEnvelope ask_bytes(const std::vector<std::string>& frames) {
     send(frames);
     return receive_final();
   }
 
-  wire::ClientReply ask(const wire::ClientRequest& request) {
+  proto::ReplyEnvelope ask(const proto::RequestEnvelope& request) {
     send(++id_, request);
-    const wire::ReplyPacket packet = receive_final();
-    EXPECT_EQ(packet.id, id_);
-    return packet.reply;
+    proto::ReplyEnvelope reply = receive_final();
+    EXPECT_EQ(reply.request_id(), id_);
+    return reply;
   }
 
-  std::string done(const wire::ClientRequest& request) {
-    const wire::ClientReply reply = ask(request);
-    const auto* const error = std::get_if<wire::ErrorReply>(&reply);
-    return error != nullptr ? "error: " + error->text : std::get<wire::DoneReply>(reply).text;
+  std::string done(const proto::RequestEnvelope& request) {
+    const proto::ReplyEnvelope reply = ask(request);
+    if (reply.has_error()) return "error: " + reply.error().text();
+    EXPECT_TRUE(reply.has_done());
+    return reply.done().text();
   }
-  std::string error(const wire::ClientRequest& request) {
-    return std::get<wire::ErrorReply>(ask(request)).text;
+  std::string error(const proto::RequestEnvelope& request) {
+    const proto::ReplyEnvelope reply = ask(request);
+    EXPECT_TRUE(reply.has_error());
+    return reply.error().text();
   }
-  wire::StatusReply status() { return std::get<wire::StatusReply>(ask(wire::StatusRequest{})); }
+  wire::StatusReply status(std::uint64_t first_campaign = 0) {
+    proto::RequestEnvelope request;
+    request.mutable_status()->set_first_campaign(first_campaign);
+    const proto::ReplyEnvelope reply = ask(request);
+    EXPECT_TRUE(reply.has_status());
+    return wire::read(reply.status());
+  }
 
  private:
   zmq::context_t context_;

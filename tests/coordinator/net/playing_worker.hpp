@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -15,9 +16,11 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "core/runs.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/support/drawn_result.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::test {
 
@@ -40,79 +43,82 @@ class PlayingWorker {
     }
   }
 
-  void send(const wire::Message& message) {
-    send_frames({wire::encode({.header = next_header(), .message = message})});
+  template <typename Content>
+  void send(const Content& content) {
+    send_frames({wire::encode(next_envelope(content))});
   }
 
-  [[nodiscard]] wire::Header next_header() {
-    return {.session = session_, .epoch = epoch, .sequence = ++sequence_};
+  /// The message as it would be sent next.
+  template <typename Content>
+  [[nodiscard]] proto::Envelope next_envelope(const Content& content) {
+    proto::Envelope envelope = in_envelope(content);
+    envelope.set_session(session_.value);
+    envelope.set_epoch(epoch.value);
+    envelope.set_sequence(++sequence_);
+    return envelope;
   }
 
   /// The next message of this kind; others are passed over. Takes over the epoch of a Welcome.
   template <typename Content>
   Content receive() {
     while (true) {
-      wire::Packet packet = next_packet();
-      if (auto* const content = std::get_if<Content>(&packet.message)) return *content;
+      const proto::Envelope message = next_message();
+      if (holds<Content>(message)) return content_of<Content>(message);
     }
   }
 
-  wire::Packet next_packet() {
+  proto::Envelope next_message() {
     zmq::message_t frame;
     if (!socket_.recv(frame)) throw Error("no message before the deadline");
-    auto packet = std::get<wire::Packet>(wire::decode(frame.to_string_view()));
-    if (std::holds_alternative<wire::Welcome>(packet.message)) epoch = packet.header.epoch;
-    return packet;
+    auto message = std::get<proto::Envelope>(wire::decode(frame.to_string_view()));
+    if (message.has_welcome()) epoch = {message.epoch()};
+    return message;
   }
 
   void say_hello() {
     const wire::Epoch known = std::exchange(epoch, wire::Epoch{});
-    send(wire::Hello{.worker_name = fmt::format("w{}", session_.value),
-                     .host = "here",
-                     .process_id = session_.value,
-                     .num_slots = 1,
-                     .model_version = std::string(model_version),
-                     .build = "test",
-                     .former = {}});
+    proto::Hello hello = make_hello(fmt::format("w{}", session_.value), "here", 1, model_version);
+    hello.set_process_id(session_.value);
+    send(hello);
     epoch = known;
   }
 
-  wire::Welcome register_here() {
+  proto::Welcome register_here() {
     say_hello();
-    return receive<wire::Welcome>();
+    return receive<proto::Welcome>();
   }
 
-  void want(std::uint32_t num_runs, const std::vector<wire::HeldRuns>& held = {}) {
-    send(wire::Heartbeat{.num_runs_max = num_runs, .held = held, .computing = {}});
+  void want(std::uint32_t num_runs, const std::vector<proto::HeldRuns>& held = {}) {
+    send(make_heartbeat(num_runs, held));
   }
 
   /// True if nothing but its acknowledgement follows a heartbeat that wants runs. A second one
   /// tells where the answer to the first ends.
-  bool is_lent_nothing(const std::vector<wire::HeldRuns>& held = {}) {
+  bool is_lent_nothing(const std::vector<proto::HeldRuns>& held = {}) {
     for (int i = 0; i < 2; ++i) {
       want(wire::runs_per_lease_max, held);
-      if (!std::holds_alternative<wire::HeartbeatAck>(next_packet().message)) return false;
+      if (!next_message().has_heartbeat_ack()) return false;
     }
     return true;
   }
 
-  wire::RunLease borrow(std::uint32_t num_runs = 1) {
+  proto::RunLease borrow(std::uint32_t num_runs = 1) {
     (void)register_here();
     want(num_runs);
-    return receive<wire::RunLease>();
+    return receive<proto::RunLease>();
   }
 
-  void deliver(const wire::RunLease& lease, RunStatus status = RunStatus::completed) {
-    wire::ResultBatch batch{.campaign = lease.campaign, .attempt = lease.attempt, .results = {}};
-    for (std::uint64_t run = lease.runs.first.value; run < lease.runs.end(); ++run) {
-      RunResult& result = batch.results.emplace_back().result;
-      result.run = {run};
+  void deliver(const proto::RunLease& lease, RunStatus status = RunStatus::completed) {
+    std::vector<wire::ComputedRun> results;
+    for (const RunIndex run : indices_of(std::array{wire::runs_of(lease)})) {
+      RunResult& result = results.emplace_back().result;
+      result.run = run;
       result.status = status;
       result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
       result.num_rounds = status == RunStatus::no_draw ? 0 : 1;
       result = drawn_result(std::move(result));
     }
-    send(batch);
+    send(make_result_batch({lease.campaign()}, {lease.attempt()}, results));
   }
 
   /// Computes all that is lent until told to stop.
@@ -120,15 +126,15 @@ class PlayingWorker {
     (void)register_here();
     want(wire::runs_per_lease_max);
     while (true) {
-      const wire::Packet packet = next_packet();
-      if (std::holds_alternative<wire::Stop>(packet.message)) return;
-      if (const auto* const lease = std::get_if<wire::RunLease>(&packet.message)) deliver(*lease);
-      if (std::holds_alternative<wire::ResultAck>(packet.message)) want(wire::runs_per_lease_max);
+      const proto::Envelope message = next_message();
+      if (message.has_stop()) return;
+      if (message.has_run_lease()) deliver(message.run_lease());
+      if (message.has_result_ack()) want(wire::runs_per_lease_max);
     }
   }
 
-  [[nodiscard]] static wire::HeldRuns held(const wire::RunLease& lease) {
-    return {.campaign = lease.campaign, .attempt = lease.attempt, .ranges = {lease.runs}};
+  [[nodiscard]] static proto::HeldRuns held(const proto::RunLease& lease) {
+    return make_held({lease.campaign()}, {lease.attempt()}, {wire::runs_of(lease)});
   }
 
   wire::Epoch epoch;

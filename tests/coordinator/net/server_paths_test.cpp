@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include "proto/wire/client_codec.hpp"
+
 namespace proofmass::coordinator {
 namespace {
 
@@ -34,9 +36,9 @@ TEST(ServerPaths, AreInNoReply) {
   EXPECT_EQ(shown.campaigns[0].storage_failure, "file = a.db (full)");
   EXPECT_EQ(shown.unserved_files[0].file, "b.db");
   EXPECT_EQ(shown.unserved_files[0].reason, "file = b.db (locked)");
-  wire::ClientReply error = wire::ErrorReply{"file = served/b.db (locked)"};
+  proto::ReplyEnvelope error = wire::error_reply("file = served/b.db (locked)");
   paths.hide_in(error);
-  EXPECT_EQ(std::get<wire::ErrorReply>(error).text, "file = b.db (locked)");
+  EXPECT_EQ(error.error().text(), "file = b.db (locked)");
 }
 
 }  // namespace

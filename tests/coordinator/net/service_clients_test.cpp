@@ -27,16 +27,22 @@ class ServiceClients : public test::ServiceTest {
     client.emplace(service->clients_endpoint());
   }
 
+  /// The coordinator's words.
+  std::string submit(const std::string& name, std::uint64_t num_runs,
+                     const test::Wishes& wishes = {}) {
+    return client->done(test::submission(definition_of(test::campaign_of(name, num_runs)), wishes));
+  }
+  std::string control(ControlAction action, const std::string& name = "a", int priority = 0) {
+    return client->done(test::control(action, name, priority));
+  }
+
   std::optional<PlayingClient> client;
 };
 
 TEST_F(ServiceClients, SubmitACampaignThatIsThenComputed) {
   start_with({});
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("new", 5)),
-                                       .priority = 3,
-                                       .audit_fraction = 0.5}),
-      "campaign new: active, 5 runs, 0 of them done");
+  EXPECT_EQ(submit("new", 5, {.priority = 3, .audit_fraction = 0.5}),
+            "campaign new: active, 5 runs, 0 of them done");
   const wire::StatusReply status = client->status();
   ASSERT_EQ(status.campaigns.size(), 1U);
   EXPECT_EQ(status.version, "0.0");
@@ -46,15 +52,15 @@ TEST_F(ServiceClients, SubmitACampaignThatIsThenComputed) {
   EXPECT_EQ(status.campaigns[0].num_runs, 5U);
 
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   const wire::CampaignStatus lent = client->status().campaigns[0];
-  EXPECT_EQ(lent.num_lent, lease.runs.count);
+  EXPECT_EQ(lent.num_lent, lease.num_runs());
   worker.deliver(lease);
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   const wire::CampaignStatus after = client->status().campaigns[0];
-  EXPECT_EQ(after.num_done, lease.runs.count);
+  EXPECT_EQ(after.num_done, lease.num_runs());
   end(StopRequest::now);
-  EXPECT_EQ(num_stored("new"), lease.runs.count);
+  EXPECT_EQ(num_stored("new"), lease.num_runs());
   EXPECT_EQ(Store::open_read_only(directory / "new.db").control().audit_fraction, 0.5);
 }
 
@@ -62,22 +68,20 @@ TEST_F(ServiceClients, ExtendACampaignThatIsServed) {
   start_with({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
-      "campaign a: active, 3 runs, 1 of them done");
+  EXPECT_EQ(submit("a", 3), "campaign a: active, 3 runs, 1 of them done");
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{1});
+  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 1U);
 }
 
 TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
   start_with({test::campaign_of("a", 3)});
-  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 300)),
-                                         .priority = -2,
-                                         .audit_fraction = 0.25,
-                                         .stop_rule = "mean(k2c) within 5%",
-                                         .failures_max = 7});
+  (void)submit("a", 300,
+               {.priority = -2,
+                .audit_fraction = 0.25,
+                .stop_rule = "mean(k2c) within 5%",
+                .failures_max = 7});
   EXPECT_EQ(client->status().campaigns[0].priority, -2);
   EXPECT_EQ(client->status().campaigns[0].num_runs, 128U);  // The first at which rules are checked.
   end(StopRequest::now);
@@ -91,10 +95,8 @@ TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
 
 TEST_F(ServiceClients, ExtendACampaignThatKeepsItsPriority) {
   start_with({});
-  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3)),
-                                         .priority = 7,
-                                         .audit_fraction = 0.5});
-  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 5))});
+  (void)submit("a", 3, {.priority = 7, .audit_fraction = 0.5});
+  (void)submit("a", 5);
   EXPECT_EQ(client->status().campaigns[0].num_runs, 5U);
   EXPECT_EQ(client->status().campaigns[0].priority, 7);
   end(StopRequest::now);
@@ -105,13 +107,13 @@ TEST_F(ServiceClients, ExtendACampaignThatKeepsItsPriority) {
 
 TEST_F(ServiceClients, SetThePriorityOfACampaign) {
   start_with({test::campaign_of("a", 3), test::campaign_of("b", 3)});
-  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::set_priority, "b", 1}),
+  EXPECT_EQ(control(ControlAction::set_priority, "b", 1),
             "campaign b: active, 3 runs, 0 of them done");
   EXPECT_EQ(client->status().campaigns[1].priority, 1);
-  const wire::RunLease lease = PlayingWorker(endpoint.address()).borrow();
+  const proto::RunLease lease = PlayingWorker(endpoint.address()).borrow();
   end(StopRequest::now);
   const Store served = Store::open_read_only(directory / "b.db");
-  EXPECT_EQ(lease.campaign, served.id());
+  EXPECT_EQ(wire::CampaignId{lease.campaign()}, served.id());
   EXPECT_EQ(served.control().priority, 1);
 }
 
@@ -122,11 +124,10 @@ TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
     (void)campaign.store.write({&given_up, 1});
   }
   start_with({test::campaign_of("a", 1)});
-  EXPECT_EQ(client->error(wire::ControlRequest{ControlAction::set_priority, "a", 1}),
+  EXPECT_EQ(client->error(test::control(ControlAction::set_priority, "a", 1)),
             "campaign = a (is finished)");
-  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::retry, "a"}),
-            "campaign a: active, 1 runs, 0 of them done");
-  EXPECT_EQ(client->error(wire::ControlRequest{ControlAction::retry, "a"}),
+  EXPECT_EQ(control(ControlAction::retry), "campaign a: active, 1 runs, 0 of them done");
+  EXPECT_EQ(client->error(test::control(ControlAction::retry, "a")),
             "campaign = a (has no run that was given up)");
   EXPECT_EQ(client->status().campaigns[0].num_given_up, 0U);
   end(StopRequest::now);
@@ -135,25 +136,24 @@ TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
 
 TEST_F(ServiceClients, ResumeACancelledCampaignBeforeAnythingElse) {
   start_with({test::campaign_of("a", 1)});
-  (void)client->done(wire::ControlRequest{ControlAction::cancel, "a"});
+  (void)control(ControlAction::cancel);
   for (const ControlAction action : {ControlAction::retry, ControlAction::set_priority}) {
-    EXPECT_EQ(client->error(wire::ControlRequest{action, "a", 1}),
+    EXPECT_EQ(client->error(test::control(action, "a", 1)),
               "campaign = a (is cancelled; resume it first)");
   }
 }
 
 TEST_F(ServiceClients, AreToldWhyACampaignCannotBeExtended) {
   start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(
-      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
-      "runs = fewer (must be more)");
+  EXPECT_EQ(client->error(test::submission(definition_of(test::campaign_of("a", 2)))),
+            "runs = fewer (must be more)");
 }
 
 TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
   config.files = nullptr;
   start_with({});
   EXPECT_EQ(
-      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
+      client->error(test::submission(definition_of(test::campaign_of("a", 2)))),
       "campaign a cannot be submitted: this coordinator serves only the campaigns that it began "
       "with; "
       "start one with --directory");
@@ -161,22 +161,19 @@ TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
 
 TEST_F(ServiceClients, PauseAndResumeACampaign) {
   start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::pause, "a"}),
-            "campaign a: paused, 3 runs, 0 of them done");
+  EXPECT_EQ(control(ControlAction::pause), "campaign a: paused, 3 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
   (void)worker.register_here();
   EXPECT_TRUE(worker.is_lent_nothing());
-  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::resume, "a"}),
-            "campaign a: active, 3 runs, 0 of them done");
+  EXPECT_EQ(control(ControlAction::resume), "campaign a: active, 3 runs, 0 of them done");
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
+  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 0U);
 }
 
 TEST_F(ServiceClients, SeeThatACampaignWithAStopRuleIsPaused) {
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
   start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::pause, "a"}),
-            "campaign a: paused, 3 runs, 0 of them done");
+  EXPECT_EQ(control(ControlAction::pause), "campaign a: paused, 3 runs, 0 of them done");
 }
 
 // Its last runs are still under way, and count.
@@ -184,8 +181,8 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
   plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 0};
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow(1);
-  (void)client->done(wire::ControlRequest{ControlAction::pause, "a"});
+  const proto::RunLease lease = worker.borrow(1);
+  (void)control(ControlAction::pause);
   worker.deliver(lease, RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
             "too_many_failures without_estimate=1 failures_max=0 campaign=a");
@@ -193,8 +190,7 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
 
 TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
   start_with({test::campaign_of("a", 3)});
-  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3)),
-                                         .failures_max = 0});
+  (void)submit("a", 3, {.failures_max = 0});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
@@ -203,10 +199,8 @@ TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
 
 TEST_F(ServiceClients, SubmitACancelledCampaignAgain) {
   start_with({test::campaign_of("a", 3)});
-  (void)client->done(wire::ControlRequest{ControlAction::cancel, "a"});
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
-      "campaign a: active, 3 runs, 0 of them done");
+  (void)control(ControlAction::cancel);
+  EXPECT_EQ(submit("a", 3), "campaign a: active, 3 runs, 0 of them done");
 }
 
 // The runs are there already: what is open again is whether they are enough.
@@ -216,14 +210,13 @@ TEST_F(ServiceClients, GiveAFinishedCampaignAnotherRule) {
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
   (void)wait_for_event("campaign_summarised runs=1");
-  const std::string reply = client->done(wire::SubmitRequest{
-      .definition = definition_of(test::campaign_of("a", 1)), .stop_rule = "mean(k2c) within 1%"});
+  const std::string reply = submit("a", 1, {.stop_rule = "mean(k2c) within 1%"});
   EXPECT_EQ(reply, "campaign a: active, 1 runs, 1 of them done");
 }
 
 TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
   start_with({test::campaign_of("a", 3)});
-  (void)client->done(wire::ControlRequest{ControlAction::pause, "a"});
+  (void)control(ControlAction::pause);
   end(StopRequest::now);
   start_with({test::campaign_of("a", 3)});
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::paused);
@@ -232,35 +225,35 @@ TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
 TEST_F(ServiceClients, CancelACampaignWhichWorkersThenForget) {
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
-  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::cancel, "a"}),
-            "campaign a: cancelled, 3 runs, 0 of them done");
-  EXPECT_EQ(worker.receive<wire::Forget>().campaign, lease.campaign);
+  const proto::RunLease lease = worker.borrow();
+  EXPECT_EQ(control(ControlAction::cancel), "campaign a: cancelled, 3 runs, 0 of them done");
+  EXPECT_EQ(worker.receive<proto::Forget>().campaign(), lease.campaign());
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::cancelled);
 }
 
 TEST_F(ServiceClients, AreToldWhatCannotBeControlled) {
   start_with({test::campaign_of("a", 1)});
-  EXPECT_EQ(client->error(wire::ControlRequest{ControlAction::pause, "b"}),
+  EXPECT_EQ(client->error(test::control(ControlAction::pause, "b")),
             "campaign = b (is not served)");
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
-  EXPECT_EQ(client->error(wire::ControlRequest{ControlAction::pause, "a"}),
-            "campaign = a (is finished)");
+  (void)worker.receive<proto::ResultAck>();
+  EXPECT_EQ(client->error(test::control(ControlAction::pause, "a")), "campaign = a (is finished)");
 }
 
 TEST_F(ServiceClients, SeeTheWorkers) {
   start_with({test::campaign_of("a", 30)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
-  const auto reply = std::get<wire::WorkersReply>(client->ask(wire::WorkersRequest{}));
+  const proto::RunLease lease = worker.borrow();
+  proto::RequestEnvelope request;
+  request.mutable_workers();
+  const wire::WorkersReply reply = wire::read(client->ask(request).workers());
   ASSERT_EQ(reply.workers.size(), 1U);
   EXPECT_EQ(reply.workers[0].name, "w1001");
   EXPECT_EQ(reply.workers[0].host, "here");
   EXPECT_EQ(reply.workers[0].process_id, 1001U);
   EXPECT_EQ(reply.workers[0].num_slots, 1U);
-  EXPECT_EQ(reply.workers[0].num_lent, lease.runs.count);
+  EXPECT_EQ(reply.workers[0].num_lent, lease.num_runs());
   EXPECT_FALSE(reply.workers[0].is_quarantined);
 }
 
@@ -269,14 +262,12 @@ std::string large_submission(std::uint64_t id, const std::string& name, std::siz
   MicroscopeCampaign campaign = test::campaign_of(name, num_runs);
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {std::vector<double>(num_runs, 1e-3)};
-  return wire::encode(
-      wire::RequestPacket{id, wire::SubmitRequest{.definition = definition_of(campaign)}});
+  return wire::encode(test::numbered(id, test::submission(definition_of(campaign))));
 }
 
-wire::RequestPart part_of(const std::string& bytes, std::size_t offset) {
-  return {.total_size = bytes.size(),
-          .offset = offset,
-          .slice = bytes.substr(offset, wire::request_part_size_max)};
+proto::RequestEnvelope part_of(const std::string& bytes, std::size_t offset) {
+  return test::request_of(
+      test::part(bytes.size(), offset, bytes.substr(offset, wire::request_part_size_max)));
 }
 
 // One client's parts come out of order, another's in between.
@@ -287,9 +278,10 @@ TEST_F(ServiceClients, SubmitLargeCampaignsInParts) {
   const std::string others = large_submission(7, "others", 100'001);
   ASSERT_GT(mine.size(), 3 * wire::request_part_size_max);
   const auto next_offset = [](PlayingClient& from) {
-    const wire::ReplyPacket packet = from.receive();
-    EXPECT_EQ(packet.id, 7U);
-    return std::get<wire::PartReply>(packet.reply).next_offset;
+    const proto::ReplyEnvelope reply = from.receive();
+    EXPECT_EQ(reply.request_id(), 7U);
+    EXPECT_TRUE(reply.has_part());
+    return reply.part().next_offset();
   };
   client->send(7, part_of(mine, wire::request_part_size_max));
   EXPECT_EQ(next_offset(*client), 0U);
@@ -300,9 +292,9 @@ TEST_F(ServiceClients, SubmitLargeCampaignsInParts) {
     offset = next_offset(*client);
   }
   for (PlayingClient* const asker : {&*client, &other}) {
-    const wire::ReplyPacket packet = asker->receive_final();
-    EXPECT_EQ(packet.id, 7U);
-    EXPECT_TRUE(std::holds_alternative<wire::DoneReply>(packet.reply));
+    const proto::ReplyEnvelope reply = asker->receive_final();
+    EXPECT_EQ(reply.request_id(), 7U);
+    EXPECT_TRUE(reply.has_done());
   }
   EXPECT_EQ(client->status().campaigns.size(), 2U);
 }
@@ -318,7 +310,7 @@ TEST_F(ServiceClients, GetOneCampaignForASubmissionThatTheyRepeat) {
     }
   }
   for (PlayingClient* const asker : {&*client, &other}) {
-    EXPECT_EQ(std::get<wire::DoneReply>(asker->receive_final().reply).text,
+    EXPECT_EQ(asker->receive_final().done().text(),
               "campaign mine: active, 100000 runs, 0 of them done");
   }
 }
@@ -326,18 +318,18 @@ TEST_F(ServiceClients, GetOneCampaignForASubmissionThatTheyRepeat) {
 TEST_F(ServiceClients, AreToldThatALargeRequestMustTravelInParts) {
   start_with({});
   const std::string bytes = large_submission(7, "mine", 100'000);
-  EXPECT_EQ(std::get<wire::ErrorReply>(client->ask_bytes({bytes}).reply).text,
+  EXPECT_EQ(client->ask_bytes({bytes}).error().text(),
             "request size = " + std::to_string(bytes.size()) +
                 " bytes (must be at most 263168 in one message; larger ones travel in parts)");
 }
 
 TEST_F(ServiceClients, GetAnErrorForPartsThatAreNoRequest) {
   start_with({});
-  client->send(7, wire::RequestPart{.total_size = 3, .offset = 0, .slice = "abc"});
-  EXPECT_EQ(std::get<wire::PartReply>(client->receive().reply).next_offset, 3U);
-  const wire::ReplyPacket refused = client->receive_final();
-  EXPECT_EQ(refused.id, 7U);
-  EXPECT_EQ(std::get<wire::ErrorReply>(refused.reply).text,
+  client->send(7, test::request_of(test::part(3, 0, "abc")));
+  EXPECT_EQ(client->receive().part().next_offset(), 3U);
+  const proto::ReplyEnvelope refused = client->receive_final();
+  EXPECT_EQ(refused.request_id(), 7U);
+  EXPECT_EQ(refused.error().text(),
             "request = 3 bytes (must be an envelope of at most 65536 fields)");
 }
 
@@ -350,7 +342,7 @@ TEST_F(ServiceClients, OutliveAFileSystemThatThrows) {
     if (call == 1) throw std::bad_alloc();
   };
   start_with({});
-  const wire::SubmitRequest request{.definition = definition_of(test::campaign_of("a", 2))};
+  const proto::RequestEnvelope request = test::submission(definition_of(test::campaign_of("a", 2)));
   EXPECT_THAT(client->error(request), StartsWith("filesystem error: rename"));
   EXPECT_EQ(client->error(request), "std::bad_alloc");
   EXPECT_THAT(client->done(request), StartsWith("campaign a: active"));
@@ -363,7 +355,7 @@ TEST_F(ServiceClients, AreToldThatAFileCannotBeServed) {
     if (num_calls++ == 1) std::filesystem::copy_file(directory / "b.db", directory / "a.db");
   };
   start_with({test::campaign_of("b", 2)});
-  const wire::SubmitRequest request{.definition = definition_of(test::campaign_of("a", 2))};
+  const proto::RequestEnvelope request = test::submission(definition_of(test::campaign_of("a", 2)));
   const std::string expected = "campaign = a in " + (directory / "a.db").string() +
                                " (is served already, from another file)";
   EXPECT_EQ(client->error(request), expected);
@@ -378,9 +370,9 @@ TEST_F(ServiceClients, AreToldWhatFailsWhenTheirChangeTakesEffect) {
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
-  (void)worker.receive<wire::ResultAck>();
-  EXPECT_EQ(client->error(wire::SubmitRequest{
-                .definition = definition_of(test::campaign_of("a", 3)), .failures_max = 0}),
+  (void)worker.receive<proto::ResultAck>();
+  EXPECT_EQ(client->error(
+                test::submission(definition_of(test::campaign_of("a", 3)), {.failures_max = 0})),
             "notice = a (must be heard)");
 }
 
@@ -390,29 +382,25 @@ TEST_F(ServiceClients, SeeAllCampaignsInPages) {
     campaigns.push_back(test::campaign_of("c" + std::to_string(i), 1));
   }
   start_with(campaigns);
-  const auto page =
-      std::get<wire::StatusReply>(client->ask(wire::StatusRequest{.first_campaign = 1}));
+  const wire::StatusReply page = client->status(1);
   EXPECT_EQ(page.num_campaigns, 3U);
   ASSERT_EQ(page.campaigns.size(), 2U);
   EXPECT_EQ(page.campaigns[0].name, "c1");
-  EXPECT_TRUE(std::get<wire::StatusReply>(
-                  client->ask(wire::StatusRequest{.first_campaign = ~std::uint64_t{0}}))
-                  .campaigns.empty());
+  EXPECT_TRUE(client->status(~std::uint64_t{0}).campaigns.empty());
 }
 
 TEST_F(ServiceClients, AreToldThatAHostIsInNoQuarantine) {
   start_with({});
-  EXPECT_EQ(client->error(wire::ReleaseHostRequest{.host = "n7"}),
-            "host = n7 (is not in quarantine)");
+  EXPECT_EQ(client->error(test::release("n7")), "host = n7 (is not in quarantine)");
 }
 
 TEST_F(ServiceClients, SeeWhatFactoriesReport) {
   start_with({});
-  EXPECT_EQ(client->done(wire::FactoryReport{.name = "fleet",
-                                             .batch_system = "pbs",
-                                             .phase = wire::FactoryPhase::paused,
-                                             .reason = "qsub: queue full",
-                                             .interval_s = 3600}),
+  EXPECT_EQ(client->done(test::request_of(wire::FactoryReport{.name = "fleet",
+                                                              .batch_system = "pbs",
+                                                              .phase = wire::FactoryPhase::paused,
+                                                              .reason = "qsub: queue full",
+                                                              .interval_s = 3600})),
             "factory fleet: noted");
   const wire::StatusReply status = client->status();
   ASSERT_EQ(status.factories.size(), 1U);
@@ -424,20 +412,10 @@ TEST_F(ServiceClients, SeeWhatFactoriesReport) {
 
 TEST_F(ServiceClients, GetAnErrorForWhatIsNoRequest) {
   start_with({});
-  const wire::ReplyPacket garbage = client->ask_bytes({"garbage"});
-  EXPECT_EQ(garbage.id, 0U);
-  EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(garbage.reply));
-  EXPECT_EQ(std::get<wire::ErrorReply>(client->ask_bytes({"a", "b"}).reply).text,
-            "request = 2 frames (must be one)");
-}
-
-TEST_F(ServiceClients, FindTheStatisticsOfAFinishedCampaignUpToDate) {
-  start_with({test::campaign_of("a", 1)});
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
-  (void)wait_for_event("campaign_summarised");
-  end(StopRequest::now);
+  const proto::ReplyEnvelope garbage = client->ask_bytes({"garbage"});
+  EXPECT_EQ(garbage.request_id(), 0U);
+  EXPECT_TRUE(garbage.has_error());
+  EXPECT_EQ(client->ask_bytes({"a", "b"}).error().text(), "request = 2 frames (must be one)");
 }
 
 TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
@@ -449,10 +427,9 @@ TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
   start_with({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   (void)wait_for_event("campaign_summarised");
-  (void)client->done(
-      wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 1)), .priority = 5});
+  (void)submit("a", 1, {.priority = 5});
   end(StopRequest::now);
   EXPECT_EQ(Store::open_read_only(directory / "a.db").control().priority, 5);
   EXPECT_EQ(num_summaries, 1);
@@ -464,7 +441,7 @@ TEST_F(ServiceClients, AreToldTheEndByAServiceThatEndsWhenAllIsDone) {
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::active);
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   (void)wait_for_event("campaign_summarised");
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
   wait_for_end();

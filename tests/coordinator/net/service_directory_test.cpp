@@ -101,7 +101,7 @@ TEST_F(ServiceWithADirectory, ServesAFileOnceItCanBeOpened) {
   EXPECT_EQ(num_events("campaign_not_served"), 1);
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
 }
 
 // A coordinator that is killed while it folds the log in, on a full disk perhaps, leaves a file
@@ -148,7 +148,7 @@ TEST_F(ServiceWithADirectory, DoesNotOpenWhatHasEnded) {
   EXPECT_THAT(served(), testing::UnorderedElementsAre("a", "b"));
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   EXPECT_EQ(folder.num_loads(), 1);
   for (const wire::CampaignStatus& campaign : client->status().campaigns) {
     if (campaign.name != "a") continue;
@@ -172,20 +172,19 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   {
     PlayingWorker worker(endpoint.address());
     worker.deliver(worker.borrow());
-    (void)worker.receive<wire::ResultAck>();
+    (void)worker.receive<proto::ResultAck>();
     wait_for_event("campaign_closed campaign=a");
-    worker.send(wire::Bye{});
+    worker.send(test::make_bye());
     wait_for_event("worker_left");
   }
   EXPECT_EQ(client->status().campaigns.at(0).phase, wire::CampaignPhase::finished);
   EXPECT_EQ(client->status().campaigns.at(0).num_done, 1U);
-  EXPECT_EQ(client->error(wire::ControlRequest{wire::ControlAction::pause, "a"}),
+  EXPECT_EQ(client->error(test::control(wire::ControlAction::pause, "a")),
             "campaign = a (is finished)");
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
-      "campaign a: active, 3 runs, 1 of them done");
+  EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
+            "campaign a: active, 3 runs, 1 of them done");
   PlayingWorker worker(endpoint.address(), 1002);
-  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{1});
+  EXPECT_EQ(worker.borrow(1).first_run(), 1U);
   EXPECT_THAT(served(), ElementsAre("a"));
 }
 
@@ -194,9 +193,8 @@ TEST_F(ServiceWithADirectory, ExtendsAClosedCampaignInItsFileWhateverThatIsCalle
   make_finished_file("a");
   fs::rename(directory / "a.db", directory / "small.db");
   start_service();
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
-      "campaign a: active, 3 runs, 0 of them done");
+  EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
+            "campaign a: active, 3 runs, 0 of them done");
   EXPECT_THAT(served(), ElementsAre("a"));
   EXPECT_FALSE(fs::exists(directory / "a.db"));
   end(StopRequest::now);
@@ -218,14 +216,13 @@ TEST_F(ServiceWithADirectory, RemovesAFileThatItMadeForASubmissionInVain) {
     released.get_future().get();
   });
   begun.get_future().get();
-  client->send(100, wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))});
+  client->send(100, test::submission(definition_of(test::campaign_of("a", 3))));
   EXPECT_THAT(served(), IsEmpty());  // An answer after the submission was begun.
   released.set_value();
-  const wire::ReplyPacket packet = client->receive_final();
-  EXPECT_EQ(packet.id, 100U);
-  EXPECT_EQ(std::get<wire::ErrorReply>(packet.reply).text,
-            "campaign = a in " + (directory / "a.db").string() +
-                " (is served already, from another file)");
+  const proto::ReplyEnvelope reply = client->receive_final();
+  EXPECT_EQ(reply.request_id(), 100U);
+  EXPECT_EQ(reply.error().text(), "campaign = a in " + (directory / "a.db").string() +
+                                      " (is served already, from another file)");
   EXPECT_FALSE(fs::exists(directory / "a.db"));
   EXPECT_TRUE(fs::exists(directory / "small.db"));
   EXPECT_THAT(served(), ElementsAre("a"));
@@ -241,7 +238,7 @@ TEST_F(ServiceWithADirectory, KeepsTheFilesOpenThatFinishedLast) {
   (void)worker.register_here();
   for (int i = 0; i < 3; ++i) {
     worker.want(1);
-    worker.deliver(worker.receive<wire::RunLease>());
+    worker.deliver(worker.receive<proto::RunLease>());
   }
   while (num_events("campaign_summarised") < 3 || num_events("campaign_closed") < 2) {
     std::this_thread::yield();
@@ -264,11 +261,11 @@ TEST_F(ServiceWithADirectory, ServesAnOlderCopyInPlaceOfAFileThatWasClosed) {
   start_service();
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_event("campaign_closed campaign=a");
   fs::rename(directory / "older", directory / "a.db");
   while (folder.num_loads() < 2) std::this_thread::yield();
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
+  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 0U);
   EXPECT_THAT(served(), ElementsAre("a"));
 }
 
@@ -293,7 +290,7 @@ TEST_F(ServiceWithADirectory, ComputesStatisticsAgainThatADiskPrevented) {
   start_service();
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_event("campaign_closed campaign=a");
   EXPECT_EQ(num_failures, 4);
   EXPECT_EQ(num_events("statistics_failed"), 1);
@@ -310,13 +307,13 @@ TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
   }
   start_service();
   EXPECT_EQ(folder.num_loads(), 0);
-  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::cancel, "a"}),
+  EXPECT_EQ(client->done(test::control(wire::ControlAction::cancel, "a")),
             "campaign a: cancelled, 2 runs, 0 of them done");
-  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::resume, "a"}),
+  EXPECT_EQ(client->done(test::control(wire::ControlAction::resume, "a")),
             "campaign a: active, 2 runs, 0 of them done");
   EXPECT_EQ(client->status().campaigns.at(0).priority, 4);
   PlayingWorker worker(endpoint.address());
-  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+  EXPECT_EQ(worker.borrow(1).first_run(), 0U);
 }
 
 TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
@@ -329,10 +326,10 @@ TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
   }
   start_service();
   EXPECT_EQ(folder.num_loads(), 0);
-  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::retry, "a"}),
+  EXPECT_EQ(client->done(test::control(wire::ControlAction::retry, "a")),
             "campaign a: active, 1 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
-  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+  EXPECT_EQ(worker.borrow(1).first_run(), 0U);
 }
 
 // Who reads the newest state is in nobody's way until the end of the service is written down.
@@ -341,7 +338,7 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   start_service();
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_event("campaign_summarised");
   const fs::path file = directory / "a.db";
   while (has_journal(file)) std::this_thread::yield();
@@ -349,7 +346,7 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   ASSERT_EQ(sqlite3_open_v2(file.c_str(), &reader, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
   const char* const read = "BEGIN; SELECT * FROM campaign";
   ASSERT_EQ(sqlite3_exec(reader, read, nullptr, nullptr, nullptr), SQLITE_OK);
-  const wire::ControlRequest archive{wire::ControlAction::archive, "a"};
+  const proto::RequestEnvelope archive = test::control(wire::ControlAction::archive, "a");
   EXPECT_EQ(client->error(archive),
             "campaign = a (its database is being read or changed; try again)");
   EXPECT_TRUE(fs::exists(file));
@@ -410,7 +407,7 @@ TEST_F(ServiceWithADirectory, IsNotDoneWhileAFileWaits) {
   folder.set_before_load([](const fs::path&) {});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_end();
 }
 

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/directory_look.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/link/keys.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"
@@ -65,13 +65,13 @@ class ServiceLimits : public test::ServiceTest {
   }
 
   std::string submit(const MicroscopeCampaign& campaign) {
-    return client->done(wire::SubmitRequest{.definition = definition_of(campaign)});
+    return client->done(test::submission(definition_of(campaign)));
   }
   std::string submit(const std::string& name, std::uint64_t num_runs = 2) {
     return submit(test::campaign_of(name, num_runs));
   }
   std::string control(ControlAction action, const std::string& name) {
-    return client->done(wire::ControlRequest{action, name});
+    return client->done(test::control(action, name));
   }
 
   const std::string too_many =

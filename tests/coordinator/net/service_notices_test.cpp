@@ -56,7 +56,7 @@ TEST_F(ServiceNotices, TellOfResultsThatCannotBeStored) {
   config.writer.retry_after = std::chrono::milliseconds(10);
   start({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   const test::FileSizeLimit limit(1);
   worker.deliver(lease);
   expect_failure("a.db");
@@ -67,16 +67,16 @@ TEST_F(ServiceNotices, TellOfARunWithTwoResults) {
   start({test::campaign_of("a", 2)});
   PlayingWorker first(endpoint.address(), 1001);
   PlayingWorker second(endpoint.address(), 1002);
-  const wire::RunLease lease = first.borrow();
+  const proto::RunLease lease = first.borrow();
   in_service([&] {
     const std::optional<WorkerId> worker = service->worker_of(1001);
     ASSERT_TRUE(worker.has_value());
     service->worker_ended(*worker, LossReason::silent);
   });
-  const wire::RunLease again = second.borrow();
-  ASSERT_EQ(again.runs, lease.runs);
+  const proto::RunLease again = second.borrow();
+  ASSERT_EQ(wire::runs_of(again), wire::runs_of(lease));
   second.deliver(again);
-  (void)second.receive<wire::ResultAck>();
+  (void)second.receive<proto::ResultAck>();
   (void)first.register_here();
   first.deliver(lease, RunStatus::not_finite);
   expect_failure("1 runs were computed again with another result");

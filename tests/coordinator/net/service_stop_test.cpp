@@ -18,18 +18,23 @@ using wire::CampaignPhase;
 class ServiceStop : public test::ServiceTest {
  protected:
   [[nodiscard]] Store file_of_a() const { return Store::open_read_only(directory / "a.db"); }
+
+  /// Serves a campaign of so many runs to a worker until it ends by itself.
+  void work_to_the_end(std::uint64_t num_runs, std::uint64_t session = 1001) {
+    config.end = ServiceEnd::when_done;
+    start({test::campaign_of("a", num_runs)});
+    test::PlayingWorker worker(endpoint.address(), session);
+    worker.work();
+    wait_for_end();
+  }
 };
 
 TEST_F(ServiceStop, GoesOnAsLongAsTheStopRuleAsks) {
-  config.end = ServiceEnd::when_done;
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
   files.next_runs = [](std::uint64_t num_runs) {
     return num_runs < 12 ? std::optional(num_runs + 4) : std::nullopt;
   };
-  start({test::campaign_of("a", 4)});
-  test::PlayingWorker worker(endpoint.address());
-  worker.work();
-  wait_for_end();
+  work_to_the_end(4);
   EXPECT_EQ(num_stored("a"), 12U);
   EXPECT_EQ(file_of_a().num_runs(), 12U);
   EXPECT_EQ(file_of_a().control().phase, CampaignPhase::finished);
@@ -65,11 +70,7 @@ TEST_F(ServiceStop, IsNotFinishedWhileTheRuleIsChecked) {
 }
 
 TEST_F(ServiceStop, ChecksARuleThatItsPredecessorDidNot) {
-  config.end = ServiceEnd::when_done;
-  start({test::campaign_of("a", 1)});
-  test::PlayingWorker worker(endpoint.address());
-  worker.work();
-  wait_for_end();
+  work_to_the_end(1);
   service.reset();
   {
     Store store = Store::open(directory / "a.db");
@@ -80,16 +81,12 @@ TEST_F(ServiceStop, ChecksARuleThatItsPredecessorDidNot) {
   files.next_runs = [](std::uint64_t num_runs) {
     return num_runs < 2 ? std::optional<std::uint64_t>(2) : std::nullopt;
   };
-  start({test::campaign_of("a", 1)});
-  test::PlayingWorker another(endpoint.address(), 1002);
-  another.work();
-  wait_for_end();
+  work_to_the_end(1, 1002);
   EXPECT_EQ(num_stored("a"), 2U);
 }
 
 // Somebody else may have locked the file, or the disk may be full for a while.
 TEST_F(ServiceStop, ChecksARuleAgainThatCouldNotBeChecked) {
-  config.end = ServiceEnd::when_done;
   config.writer.retry_after = std::chrono::milliseconds(10);
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
   int num_failures = 0;
@@ -97,10 +94,7 @@ TEST_F(ServiceStop, ChecksARuleAgainThatCouldNotBeChecked) {
     if (num_runs == 1 && ++num_failures <= 3) throw Error("no disk is there");
     return num_runs == 1 ? std::optional<std::uint64_t>(2) : std::nullopt;
   };
-  start({test::campaign_of("a", 1)});
-  test::PlayingWorker worker(endpoint.address());
-  worker.work();
-  wait_for_end();
+  work_to_the_end(1);
   EXPECT_EQ(wait_for_event("statistics_failed"),
             "statistics_failed reason=\"no disk is there\" campaign=a");
   EXPECT_EQ(num_events("statistics_failed"), 1);
@@ -110,7 +104,6 @@ TEST_F(ServiceStop, ChecksARuleAgainThatCouldNotBeChecked) {
 }
 
 TEST_F(ServiceStop, AsksAgainForRunsThatTheFileDidNotTake) {
-  config.end = ServiceEnd::when_done;
   config.writer.retry_after = std::chrono::milliseconds(10);
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
   int num_failures = 0;
@@ -120,10 +113,7 @@ TEST_F(ServiceStop, AsksAgainForRunsThatTheFileDidNotTake) {
   files.next_runs = [](std::uint64_t num_runs) {
     return num_runs == 1 ? std::optional<std::uint64_t>(2) : std::nullopt;
   };
-  start({test::campaign_of("a", 1)});
-  test::PlayingWorker worker(endpoint.address());
-  worker.work();
-  wait_for_end();
+  work_to_the_end(1);
   EXPECT_EQ(wait_for_event("campaign_not_extended"),
             "campaign_not_extended runs=2 reason=\"no disk is there\" campaign=a");
   EXPECT_EQ(num_events("campaign_not_extended"), 1);
@@ -137,7 +127,7 @@ TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
   test::PlayingWorker one(endpoint.address(), 1001);
   test::PlayingWorker two(endpoint.address(), 1002);
   one.deliver(one.borrow(1), RunStatus::no_draw);
-  (void)one.receive<wire::ResultAck>();
+  (void)one.receive<proto::ResultAck>();
   EXPECT_EQ(file_of_a().control().phase, CampaignPhase::active);
   two.deliver(two.borrow(1), RunStatus::not_finite);
   EXPECT_EQ(wait_for_event("too_many_failures"),
@@ -182,7 +172,7 @@ TEST_F(ServiceStop, CountsTheFailuresOfItsPredecessor) {
   start({test::campaign_of("a", 5)});
   test::PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   end(StopRequest::now);
   start({test::campaign_of("a", 5)});
   test::PlayingWorker another(endpoint.address(), 1002);

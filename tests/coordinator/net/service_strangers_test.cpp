@@ -22,7 +22,7 @@ class ServiceStrangers : public test::ServiceTest {
   /// The others are served as if nothing had happened.
   void expect_service() {
     PlayingWorker good(endpoint.address(), 2001);
-    EXPECT_EQ(good.borrow().runs.count, 1U);
+    EXPECT_EQ(good.borrow().num_runs(), 1U);
   }
 };
 
@@ -31,9 +31,9 @@ TEST_F(ServiceStrangers, AreClosedOutIfTheySendGarbage) {
   PlayingWorker bad(endpoint.address());
   (void)bad.borrow();
   bad.send_frames({"garbage"});
-  const auto reject = bad.receive<wire::Reject>();
-  EXPECT_EQ(reject.reason, wire::RejectReason::malformed);
-  EXPECT_EQ(reject.text, "message = 7 bytes (must be an envelope of at most 65536 fields)");
+  const auto reject = bad.receive<proto::Reject>();
+  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_MALFORMED);
+  EXPECT_EQ(reject.text(), "message = 7 bytes (must be an envelope of at most 65536 fields)");
   EXPECT_THAT(
       wait_for_event("peer_closed_out"),
       AllOf(
@@ -48,15 +48,15 @@ TEST_F(ServiceStrangers, AreClosedOutIfTheySendSeveralFrames) {
   start({test::campaign_of("a", 1)});
   PlayingWorker bad(endpoint.address());
   bad.send_frames({"a", "b"});
-  EXPECT_EQ(bad.receive<wire::Reject>().text, "message = 2 frames (must be one)");
+  EXPECT_EQ(bad.receive<proto::Reject>().text(), "message = 2 frames (must be one)");
   expect_service();
 }
 
 TEST_F(ServiceStrangers, AreClosedOutIfTheySayWhatACoordinatorSays) {
   start({test::campaign_of("a", 1)});
   PlayingWorker bad(endpoint.address());
-  bad.send(wire::Stop{});
-  EXPECT_EQ(bad.receive<wire::Reject>().text,
+  bad.send(proto::Stop());
+  EXPECT_EQ(bad.receive<proto::Reject>().text(),
             "message = one of a coordinator (must be one of a worker)");
   expect_service();
 }
@@ -64,10 +64,9 @@ TEST_F(ServiceStrangers, AreClosedOutIfTheySayWhatACoordinatorSays) {
 TEST_F(ServiceStrangers, AreClosedOutIfAMessageIsCutShort) {
   start({test::campaign_of("a", 1)});
   PlayingWorker bad(endpoint.address());
-  const std::string bytes =
-      wire::encode({.header = bad.next_header(), .message = wire::Bye{LossReason::drained}});
+  const std::string bytes = wire::encode(bad.next_envelope(test::make_bye(LossReason::drained)));
   bad.send_frames({bytes.substr(0, bytes.size() - 1)});
-  EXPECT_EQ(bad.receive<wire::Reject>().reason, wire::RejectReason::malformed);
+  EXPECT_EQ(bad.receive<proto::Reject>().reason(), proto::REJECT_REASON_MALFORMED);
   expect_service();
 }
 
@@ -78,32 +77,31 @@ TEST_F(ServiceStrangers, CannotSendMoreThanAMessageMayHave) {
   (void)bad.register_here();
   bad.send_frames({std::string(wire::message_size_max + 1, 'x')});  // The socket cuts it off.
   PlayingWorker good(service->workers_endpoint(), 2001);
-  EXPECT_EQ(good.borrow().runs.count, 1U);
+  EXPECT_EQ(good.borrow().num_runs(), 1U);
   // It is free to come back and behave.
-  EXPECT_EQ(bad.register_here().worker, WorkerId{1});
+  EXPECT_EQ(bad.register_here().worker_id(), 1U);
 }
 
 TEST_F(ServiceStrangers, AreClosedOutIfTheyUseTwoSessionsOnOneConnection) {
   start({test::campaign_of("a", 1)});
   PlayingWorker bad(endpoint.address());
   (void)bad.register_here();
-  wire::Header header = bad.next_header();
-  header.session = {4711};
-  bad.send_frames({wire::encode({.header = header, .message = wire::Bye{LossReason::drained}})});
-  EXPECT_EQ(bad.receive<wire::Reject>().text,
+  proto::Envelope bye = bad.next_envelope(test::make_bye(LossReason::drained));
+  bye.set_session(4711);
+  bad.send_frames({wire::encode(bye)});
+  EXPECT_EQ(bad.receive<proto::Reject>().text(),
             "session = 4711 (must be one connection's and one key's)");
 }
 
 TEST_F(ServiceStrangers, OfAnotherVersionAreToldSo) {
   start({test::campaign_of("a", 1)});
   PlayingWorker old(endpoint.address());
-  std::string bytes =
-      wire::encode({.header = old.next_header(), .message = wire::Bye{LossReason::drained}});
+  std::string bytes = wire::encode(old.next_envelope(test::make_bye(LossReason::drained)));
   bytes[1] = 99;  // The version is the first field of the envelope.
   old.send_frames({bytes});
-  const auto reject = old.receive<wire::Reject>();
-  EXPECT_EQ(reject.reason, wire::RejectReason::incompatible);
-  EXPECT_THAT(reject.text, StartsWith("protocol_version = 99 (must be "));
+  const auto reject = old.receive<proto::Reject>();
+  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_INCOMPATIBLE);
+  EXPECT_THAT(reject.text(), StartsWith("protocol_version = 99 (must be "));
   expect_service();
 }
 
@@ -142,17 +140,17 @@ TEST_F(ServiceKeys, ThatAreRevokedEndTheirSessions) {
   PlayingWorker first(service->workers_endpoint(), 1001, security_of(revoked));
   (void)first.borrow();
   PlayingWorker second(service->workers_endpoint(), 1002, security_of(kept));
-  const wire::RunLease lease = second.borrow();
+  const proto::RunLease lease = second.borrow();
 
   authorize(wire::authorized_workers_name, {kept});
-  const auto reject = first.receive<wire::Reject>();
-  EXPECT_EQ(reject.reason, wire::RejectReason::revoked);
-  EXPECT_EQ(reject.text, "key = " + revoked.public_key.text() + " (is not authorized any more)");
+  const auto reject = first.receive<proto::Reject>();
+  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_REVOKED);
+  EXPECT_EQ(reject.text(), "key = " + revoked.public_key.text() + " (is not authorized any more)");
   EXPECT_THAT(wait_for_event("peer_closed_out"),
               HasSubstr("address=127.0.0.1 key=" + revoked.public_key.text()));
   in_service([&] { EXPECT_FALSE(service->worker_of(1001)); });
   second.deliver(lease);
-  EXPECT_EQ(second.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+  EXPECT_EQ(wire::runs_of(second.receive<proto::ResultAck>()).size(), lease.num_runs());
 }
 
 TEST_F(ServiceKeys, CannotTakeASessionThatAnotherKeyHas) {
@@ -162,13 +160,13 @@ TEST_F(ServiceKeys, CannotTakeASessionThatAnotherKeyHas) {
   authorize(wire::authorized_clients_name, {});
   start({test::campaign_of("a", 10)});
   PlayingWorker first(service->workers_endpoint(), 1001, security_of(owner));
-  const wire::RunLease lease = first.borrow();
+  const proto::RunLease lease = first.borrow();
   PlayingWorker second(service->workers_endpoint(), 1001, security_of(thief));
   second.say_hello();
-  EXPECT_EQ(second.receive<wire::Reject>().text,
+  EXPECT_EQ(second.receive<proto::Reject>().text(),
             "session = 1001 (must be one connection's and one key's)");
   first.deliver(lease);
-  EXPECT_EQ(first.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+  EXPECT_EQ(wire::runs_of(first.receive<proto::ResultAck>()).size(), lease.num_runs());
 }
 
 }  // namespace

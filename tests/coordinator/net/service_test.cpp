@@ -30,21 +30,21 @@ TEST_F(ServiceWorkers, AreServedAtAPortOnLoopback) {
   config.workers_endpoint = "tcp://127.0.0.1:*";
   start({test::campaign_of("a", 2)});
   EXPECT_THAT(service->workers_endpoint(), StartsWith("tcp://127.0.0.1:"));
-  EXPECT_EQ(PlayingWorker(service->workers_endpoint()).borrow().runs.first, RunIndex{0});
+  EXPECT_EQ(PlayingWorker(service->workers_endpoint()).borrow().first_run(), 0U);
 }
 
 TEST_F(ServiceWorkers, AreLentOnlyWhatIsMissing) {
   start({test::campaign_of("a", 3)});
   {
     PlayingWorker worker(endpoint.address());
-    const wire::RunLease lease = worker.borrow();
-    EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
+    const proto::RunLease lease = worker.borrow();
+    EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
     worker.deliver(lease);
-    EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+    EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
   }
   end(StopRequest::now);
   start({test::campaign_of("a", 3)});
-  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().runs.first, RunIndex{1});
+  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().first_run(), 1U);
 }
 
 TEST_F(ServiceWorkers, WaitForNoCommitWithOthersOnceAllResultsAreThere) {
@@ -53,7 +53,7 @@ TEST_F(ServiceWorkers, WaitForNoCommitWithOthersOnceAllResultsAreThere) {
   start({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
 }
 
 TEST_F(ServiceWorkers, HearTheEpochOfEachCoordinator) {
@@ -75,27 +75,27 @@ TEST_F(ServiceWorkers, AreToldToRegisterIfTheyMeanAnotherCoordinator) {
   const wire::Epoch ours = worker.epoch;
   worker.epoch = {ours.value + 1};
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::Reject>().reason, wire::RejectReason::not_registered);
+  EXPECT_EQ(worker.receive<proto::Reject>().reason(), proto::REJECT_REASON_NOT_REGISTERED);
   worker.epoch = ours;
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.count, 1U);
+  EXPECT_EQ(wire::runs_of(worker.receive<proto::RunLease>()).count, 1U);
 }
 
 TEST_F(ServiceWorkers, AreToldToRegisterIfTheyDidNot) {
   start({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::Reject>().reason, wire::RejectReason::not_registered);
+  EXPECT_EQ(worker.receive<proto::Reject>().reason(), proto::REJECT_REASON_NOT_REGISTERED);
 }
 
 TEST_F(ServiceWorkers, KeepTheirRunsOnANewConnection) {
   start({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   worker.reconnect();
   EXPECT_TRUE(worker.is_lent_nothing({PlayingWorker::held(lease)}));
   worker.deliver(lease);
-  EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
   in_service([&] { EXPECT_EQ(service->campaigns().front().num_duplicates, 0U); });
 }
 
@@ -103,11 +103,11 @@ TEST_F(ServiceWorkers, AreEachLentRunsOfTheirOwn) {
   start({test::campaign_of("a", 10)});
   PlayingWorker first(endpoint.address(), 1001);
   PlayingWorker second(endpoint.address(), 1002);
-  const wire::RunLease lease = first.borrow();
-  EXPECT_EQ(lease.runs.first, RunIndex{0});
-  EXPECT_EQ(second.borrow().runs.first.value, lease.runs.end());
-  EXPECT_EQ(first.register_here().worker, WorkerId{1});
-  EXPECT_EQ(second.register_here().worker, WorkerId{2});
+  const proto::RunLease lease = first.borrow();
+  EXPECT_EQ(lease.first_run(), 0U);
+  EXPECT_EQ(second.borrow().first_run(), wire::runs_of(lease).end());
+  EXPECT_EQ(first.register_here().worker_id(), 1U);
+  EXPECT_EQ(second.register_here().worker_id(), 2U);
 }
 
 TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
@@ -120,15 +120,15 @@ TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
     EXPECT_THAT(service->runs_held_text(*worker), HasSubstr("0"));
     service->worker_ended(*worker, LossReason::crashed);
   });
-  const wire::RunLease lease = PlayingWorker(endpoint.address(), 1002).borrow();
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(lease.attempt, wire::Attempt{2});
+  const proto::RunLease lease = PlayingWorker(endpoint.address(), 1002).borrow();
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt(), 2U);
 }
 
 TEST_F(ServiceWorkers, AreWaitedForByTheCoordinatorAfterOneThatWasKilled) {
   start({test::campaign_of("a", 1)});
   PlayingWorker faithful(endpoint.address(), 1001);
-  const wire::RunLease lease = faithful.borrow();
+  const proto::RunLease lease = faithful.borrow();
   kill();
 
   config.dispatch.reattach_wait = std::chrono::hours(1);
@@ -139,7 +139,7 @@ TEST_F(ServiceWorkers, AreWaitedForByTheCoordinatorAfterOneThatWasKilled) {
   (void)faithful.register_here();
   faithful.want(1, {PlayingWorker::held(lease)});
   faithful.deliver(lease);
-  EXPECT_THAT(faithful.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  EXPECT_THAT(wire::runs_of(faithful.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
 }
 
 TEST_F(ServiceWorkers, AreNotWaitedForAfterACoordinatorThatEndedInOrder) {
@@ -148,14 +148,14 @@ TEST_F(ServiceWorkers, AreNotWaitedForAfterACoordinatorThatEndedInOrder) {
   end(StopRequest::now);
   config.dispatch.reattach_wait = std::chrono::hours(1);
   start({test::campaign_of("a", 1)});
-  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().runs.count, 1U);
+  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().num_runs(), 1U);
 }
 
 // The next coordinator waits for those that held runs; they were not told to end.
 TEST_F(ServiceWorkers, AreLeftToTheNextCoordinator) {
   start({test::campaign_of("a", 2)});
   PlayingWorker holder(endpoint.address(), 1001);
-  const wire::RunLease lease = holder.borrow(1);
+  const proto::RunLease lease = holder.borrow(1);
   end(StopRequest::leave);
   config.dispatch.reattach_wait = std::chrono::hours(1);
   start({test::campaign_of("a", 2)});
@@ -163,26 +163,26 @@ TEST_F(ServiceWorkers, AreLeftToTheNextCoordinator) {
   (void)other.register_here();
   EXPECT_TRUE(other.is_lent_nothing());
   holder.say_hello();
-  for (wire::Packet packet = holder.next_packet();
-       !std::holds_alternative<wire::Welcome>(packet.message); packet = holder.next_packet()) {
-    EXPECT_FALSE(std::holds_alternative<wire::Stop>(packet.message));
+  for (proto::Envelope message = holder.next_message(); !message.has_welcome();
+       message = holder.next_message()) {
+    EXPECT_FALSE(message.has_stop());
   }
   holder.want(1, {PlayingWorker::held(lease)});
   holder.deliver(lease);
-  EXPECT_EQ(holder.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+  EXPECT_EQ(wire::runs_of(holder.receive<proto::ResultAck>()).size(), lease.num_runs());
 }
 
 TEST_F(ServiceWorkers, DeliverWhatTheyHoldWhenDrained) {
   start({test::campaign_of("a", 5)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   stop = StopRequest::drain;
-  (void)worker.receive<wire::Drain>();
+  (void)worker.receive<proto::Drain>();
   worker.deliver(lease);
-  EXPECT_EQ(worker.receive<wire::ResultAck>().runs.size(), lease.runs.count);
-  worker.send(wire::Bye{.reason = LossReason::drained});
+  EXPECT_EQ(wire::runs_of(worker.receive<proto::ResultAck>()).size(), lease.num_runs());
+  worker.send(test::make_bye(LossReason::drained));
   wait_for_end();
-  EXPECT_EQ(num_stored("a"), lease.runs.count);
+  EXPECT_EQ(num_stored("a"), lease.num_runs());
 }
 
 TEST_F(ServiceWorkers, HaveSoMuchTimeAndNoMoreWhenDrained) {
@@ -191,7 +191,7 @@ TEST_F(ServiceWorkers, HaveSoMuchTimeAndNoMoreWhenDrained) {
   PlayingWorker worker(endpoint.address());
   (void)worker.borrow();
   stop = StopRequest::drain;
-  (void)worker.receive<wire::Stop>();
+  (void)worker.receive<proto::Stop>();
   wait_for_end();
 }
 
@@ -205,7 +205,7 @@ TEST_F(ServiceWorkers, AreLentRunsThatWereGivenUpIfThatIsAskedFor) {
   start({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   in_service([&] { EXPECT_TRUE(service->is_done()); });
 }
 
@@ -229,7 +229,7 @@ TEST_F(ServiceStorage, FailsAndRecovers) {
   config.writer.retry_after = std::chrono::milliseconds(10);
   start({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   {
     const test::FileSizeLimit limit(1);
     worker.deliver(lease);
@@ -239,7 +239,7 @@ TEST_F(ServiceStorage, FailsAndRecovers) {
       EXPECT_EQ(service->campaigns().front().num_done, 0U);
     });
   }
-  EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
   (void)wait_for_event("storage_recovered");
   in_service([&] { EXPECT_EQ(service->campaigns().front().storage_failure, ""); });
   end(StopRequest::now);

@@ -22,18 +22,18 @@ std::size_t encoded_size(const Campaign& campaign) {
 TEST(DefinitionCache, EncodesADefinitionOnceForAllWorkers) {
   DefinitionCache cache;
   const auto one = definition(10);
-  for (int i = 0; i < 300; ++i) (void)cache.part({.campaign = {1}, .offset = 0}, one);
+  for (int i = 0; i < 300; ++i) (void)cache.part({1}, 0, one);
   EXPECT_EQ(cache.num_encoded(), 1U);
   EXPECT_EQ(cache.size(), encoded_size(*one));
 }
 
 TEST(DefinitionCache, EncodesAnExtendedCampaignAgain) {
   DefinitionCache cache;
-  const auto before = cache.part({.campaign = {1}, .offset = 0}, definition(10));
-  const auto after = cache.part({.campaign = {1}, .offset = 0}, definition(11));
-  EXPECT_NE(before.checksum, after.checksum);
+  const auto before = cache.part({1}, 0, definition(10));
+  const auto after = cache.part({1}, 0, definition(11));
+  EXPECT_NE(before.checksum(), after.checksum());
   EXPECT_EQ(cache.num_encoded(), 2U);
-  EXPECT_EQ(cache.size(), after.total_size);
+  EXPECT_EQ(cache.size(), after.total_size());
 }
 
 // Workers get the values of the tables with each lease.
@@ -42,8 +42,8 @@ TEST(DefinitionCache, LeavesOutTheColumns) {
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {std::vector<double>(campaign.num_runs, 1e-3)};
   DefinitionCache cache;
-  const wire::DefinitionPart part =
-      cache.part({.campaign = {1}}, std::make_shared<const MicroscopeCampaign>(campaign));
+  const proto::DefinitionPart part =
+      cache.part({1}, 0, std::make_shared<const MicroscopeCampaign>(campaign));
   wire::IncomingDefinition incoming;
   ASSERT_EQ(incoming.add(part), wire::IncomingDefinition::Progress::complete);
   const auto taken = std::get<Definition>(incoming.take());
@@ -56,7 +56,7 @@ TEST(DefinitionCache, KeepsThoseThatWereUsedLast) {
   const std::size_t size = encoded_size(*one);
   DefinitionCache cache(2 * size - 1);
   const auto ask = [&](std::uint64_t id) {
-    (void)cache.part({.campaign = {id}, .offset = 0}, one);
+    (void)cache.part({id}, 0, one);
     return cache.num_encoded();
   };
   EXPECT_EQ(ask(1), 1U);

@@ -1,5 +1,6 @@
 #include "coordinator/page/campaign_details.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -35,12 +36,21 @@ TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
   EXPECT_EQ(end_of_rest(ended, 40ms), ended + 3s);
 }
 
+/// The campaign of a file `NAME.db`, or of another name.
+CampaignRecord record(const std::filesystem::path& file, std::uint64_t num_done = 0,
+                      const std::string& name = "") {
+  CampaignRecord campaign{.file = file};
+  campaign.status.name = name.empty() ? file.stem().string() : name;
+  campaign.status.num_done = num_done;
+  return campaign;
+}
+
 /// A reader whose databases are played; counts how often each is read.
 class DetailReaderTest : public ::testing::Test {
  protected:
   DetailSources sources() {
     return {.read_events =
-                [this](const DetailSubject& campaign, const CampaignEvents* before) {
+                [this](const CampaignRecord& campaign, const CampaignEvents* before) {
                   note("events " + campaign.file.string());
                   auto events = std::make_shared<CampaignEvents>();
                   events->events = before == nullptr ? decltype(events->events){} : before->events;
@@ -48,7 +58,7 @@ class DetailReaderTest : public ::testing::Test {
                   return events;
                 },
             .read_results =
-                [this](const DetailSubject& campaign, const CampaignResults* before) {
+                [this](const CampaignRecord& campaign, const CampaignResults* before) {
                   note("results " + campaign.file.string());
                   auto results = std::make_shared<CampaignResults>();
                   results->html = "<p>" + campaign.file.string() + "</p>";
@@ -70,11 +80,10 @@ class DetailReaderTest : public ::testing::Test {
     return counts_[what];
   }
   /// Asks until both parts are there.
-  static CampaignDetails whole(DetailReader& reader, const std::string& name,
-                               const DetailSubject& subject) {
+  static CampaignDetails whole(DetailReader& reader, const CampaignRecord& campaign) {
     const auto end = std::chrono::steady_clock::now() + 20s;
     while (std::chrono::steady_clock::now() < end) {
-      CampaignDetails details = reader.details(name, subject, std::chrono::steady_clock::now());
+      CampaignDetails details = reader.details(campaign, std::chrono::steady_clock::now());
       if (details.events != nullptr && details.results != nullptr) return details;
       std::this_thread::yield();
     }
@@ -90,34 +99,33 @@ class DetailReaderTest : public ::testing::Test {
 
 TEST_F(DetailReaderTest, ReadsACampaignAtWhichSomebodyLooks) {
   DetailReader reader(sources());
-  const CampaignDetails first =
-      reader.details("a", {.file = "a.db"}, std::chrono::steady_clock::now());
+  const CampaignDetails first = reader.details(record("a.db"), std::chrono::steady_clock::now());
   EXPECT_EQ(first.events, nullptr);  // It never waits.
-  const CampaignDetails details = whole(reader, "a", {.file = "a.db"});
+  const CampaignDetails details = whole(reader, record("a.db"));
   EXPECT_EQ(details.results->html, "<p>a.db</p>");
   EXPECT_EQ(details.events->events.size(), 1U);
 }
 
 TEST_F(DetailReaderTest, ReadsEventsFurtherAndResultsOnlyIfThereAreMore) {
   DetailReader reader(sources());
-  const DetailSubject subject{.file = "a.db", .num_finished = 5};
-  (void)whole(reader, "a", subject);
+  const CampaignRecord subject = record("a.db", 5);
+  (void)whole(reader, subject);
   wait_for("events a.db", 2);  // Two seconds later.
   EXPECT_EQ(count_of("results a.db"), 1);
-  (void)reader.details("a", {.file = "a.db", .num_finished = 6}, std::chrono::steady_clock::now());
+  (void)reader.details(record("a.db", 6), std::chrono::steady_clock::now());
   wait_for("results a.db", 2);
-  EXPECT_GE(whole(reader, "a", subject).events->events.size(), 2U);
+  EXPECT_GE(whole(reader, subject).events->events.size(), 2U);
 }
 
 // A part of five results at a time.
 TEST_F(DetailReaderTest, ReadsResultsFurtherUntilItHasThoseThatAreFinished) {
   DetailReader reader(sources());
-  const DetailSubject subject{.file = "a.db", .num_finished = 10};
-  (void)whole(reader, "a", subject);
+  const CampaignRecord subject = record("a.db", 10);
+  (void)whole(reader, subject);
   wait_for("results a.db", 2);
   wait_for("events a.db", 3);
   EXPECT_EQ(count_of("results a.db"), 2);
-  EXPECT_EQ(whole(reader, "a", subject).results->num_runs, 10U);
+  EXPECT_EQ(whole(reader, subject).results->num_runs, 10U);
 }
 
 /// Uses so much time of the processor.
@@ -137,7 +145,7 @@ TEST_F(DetailReaderTest, RestsAfterEachReadingWhateverIsNext) {
   constexpr auto cpu_time = 5ms;
   DetailSources played = sources();
   std::vector<TimePoint> begun, ended;  // Of the reader's thread.
-  played.read_events = [&, read = played.read_events](const DetailSubject& campaign,
+  played.read_events = [&, read = played.read_events](const CampaignRecord& campaign,
                                                       const CampaignEvents* before) {
     begun.push_back(std::chrono::steady_clock::now());
     work_for(cpu_time);
@@ -147,7 +155,7 @@ TEST_F(DetailReaderTest, RestsAfterEachReadingWhateverIsNext) {
   {
     DetailReader reader(played);
     for (const std::string name : {"a", "b", "c"}) {
-      (void)reader.details(name, {.file = name + ".db"}, std::chrono::steady_clock::now());
+      (void)reader.details(record(name + ".db"), std::chrono::steady_clock::now());
     }
     for (const std::string name : {"a", "b", "c"}) wait_for("events " + name + ".db", 1);
   }
@@ -157,69 +165,69 @@ TEST_F(DetailReaderTest, RestsAfterEachReadingWhateverIsNext) {
 
 TEST_F(DetailReaderTest, BeginsAnewWithAnotherFileOfThatName) {
   DetailReader reader(sources());
-  (void)whole(reader, "a", {.file = "a.db"});
-  EXPECT_EQ(whole(reader, "a", {.file = "b.db"}).results->html, "<p>b.db</p>");
+  (void)whole(reader, record("a.db"));
+  EXPECT_EQ(whole(reader, record("b.db", 0, "a")).results->html, "<p>b.db</p>");
 }
 
 TEST_F(DetailReaderTest, BeginsAnewWithAnotherCampaignInThatFile) {
   DetailReader reader(sources());
-  const DetailSubject first{.id = {1}, .file = "a.db", .num_finished = 5};
-  const DetailSubject second{.id = {2}, .file = "a.db", .num_finished = 5};
-  (void)whole(reader, "a", first);
-  EXPECT_EQ(reader.details("a", second, std::chrono::steady_clock::now()).results, nullptr);
-  EXPECT_EQ(whole(reader, "a", second).results->num_runs, 5U);
+  CampaignRecord first = record("a.db", 5), second = first;
+  first.id = {1};
+  second.id = {2};
+  (void)whole(reader, first);
+  EXPECT_EQ(reader.details(second, std::chrono::steady_clock::now()).results, nullptr);
+  EXPECT_EQ(whole(reader, second).results->num_runs, 5U);
 }
 
 // The file is an older copy now, or the number was older than the reading.
 TEST_F(DetailReaderTest, ReadsResultsAgainIfFewerAreFinishedThanItRead) {
   DetailReader reader(sources());
-  (void)whole(reader, "a", {.file = "a.db", .num_finished = 5});
-  (void)reader.details("a", {.file = "a.db", .num_finished = 4}, std::chrono::steady_clock::now());
+  (void)whole(reader, record("a.db", 5));
+  (void)reader.details(record("a.db", 4), std::chrono::steady_clock::now());
   wait_for("results a.db", 2);
 }
 
 TEST_F(DetailReaderTest, TriesAgainWhatCouldNotBeRead) {
   DetailSources played = sources();
-  played.read_results = [this](const DetailSubject&, const CampaignResults* before) {
+  played.read_results = [this](const CampaignRecord&, const CampaignResults* before) {
     note("results");
     auto results = std::make_shared<CampaignResults>();
     if (before == nullptr) results->failure = "not now";
     return results;
   };
   DetailReader reader(played);
-  EXPECT_EQ(whole(reader, "a", {}).results->failure, "not now");
+  EXPECT_EQ(whole(reader, record("a.db")).results->failure, "not now");
   wait_for("results", 2);
 }
 
 // As if memory were short in its own code.
 TEST_F(DetailReaderTest, GoesOnAfterAnException) {
   DetailSources played = sources();
-  played.read_events = [this, read = played.read_events](const DetailSubject& campaign,
+  played.read_events = [this, read = played.read_events](const CampaignRecord& campaign,
                                                          const CampaignEvents* before) {
     note("tried");
     if (count_of("tried") == 1) throw std::bad_alloc();
     return read(campaign, before);
   };
   DetailReader reader(played);
-  EXPECT_EQ(whole(reader, "a", {.file = "a.db"}).events->events.size(), 1U);
+  EXPECT_EQ(whole(reader, record("a.db")).events->events.size(), 1U);
 }
 
 TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
   DetailReader reader(sources());
   const auto now = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < DetailReader::num_campaigns_max; ++i) {
-    const std::string name = "c" + std::to_string(i);
-    EXPECT_EQ(reader.details(name, {.file = name + ".db"}, now).events, nullptr);
+    EXPECT_EQ(reader.details(record(fmt::format("c{}.db", i)), now).events, nullptr);
   }
-  const CampaignDetails none = reader.details("one more", {.file = "more.db"}, now + 1s);
+  const CampaignDetails none = reader.details(record("more.db"), now + 1s);
   ASSERT_NE(none.events, nullptr);
   EXPECT_EQ(none.events->failure,
             "campaigns that are looked at = 64 (must be fewer; try again in 60 s)");
   EXPECT_EQ(none.results->failure, none.events->failure);
   // Those that were asked for before are still there, and one gives its place when it is not wanted
   // any more.
-  EXPECT_EQ(reader.details("c0", {.file = "c0.db"}, now + 2s).results, nullptr);
-  EXPECT_EQ(reader.details("one more", {.file = "more.db"}, now + 61s).events, nullptr);
+  EXPECT_EQ(reader.details(record("c0.db"), now + 2s).results, nullptr);
+  EXPECT_EQ(reader.details(record("more.db"), now + 61s).events, nullptr);
 }
 
 class DatabaseDetails : public test::StoreTest {
@@ -247,10 +255,10 @@ class DatabaseDetails : public test::StoreTest {
   }
   [[nodiscard]] std::shared_ptr<const CampaignResults> results_after(
       std::uint64_t num_finished, const CampaignResults* before) const {
-    return sources_.read_results({.file = file(), .num_finished = num_finished}, before);
+    return sources_.read_results(record(file(), num_finished), before);
   }
   [[nodiscard]] std::vector<std::string> texts_after(const CampaignEvents* before) {
-    events_ = sources_.read_events({.file = file()}, before);
+    events_ = sources_.read_events(record(file()), before);
     std::vector<std::string> texts;
     for (const StoredEvent& event : events_->events) texts.push_back(event.text);
     return texts;
@@ -327,10 +335,84 @@ TEST_F(DatabaseDetails, AreThoseOfBeforeIfTheFileCannotBeRead) {
 
 TEST(DatabaseSources, SayWhyAFileCannotBeRead) {
   const DetailSources sources = database_sources();
-  const DetailSubject nowhere{.file = "/nowhere/a.db"};
+  const CampaignRecord nowhere = record("/nowhere/a.db");
   const std::string failure = "campaign database = a.db (does not exist)";
   EXPECT_EQ(sources.read_events(nowhere, nullptr)->failure, failure);
   EXPECT_EQ(sources.read_results(nowhere, nullptr)->failure, failure);
+}
+
+/// A campaign of 2,000 runs whose results come as a test wants them. Errors grow with the run.
+class ResultsReadingTest : public test::StoreTest {
+ protected:
+  static Store made(const std::filesystem::path& path) {
+    const auto campaign = test::campaign_of(2'000);
+    Store store = Store::create(path, campaign, canonical_definition(campaign));
+    (void)store.write(std::vector<Entry>{test::worker_1()});
+    return store;
+  }
+  static void finish(Store& store, std::uint64_t first, std::uint64_t end, std::uint64_t step = 1) {
+    std::vector<Entry> entries;
+    for (std::uint64_t run = first; run < end; run += step) {
+      entries.emplace_back(test::delivery_of(run));
+    }
+    (void)store.write(entries);
+  }
+  static std::uint64_t worst_run(const ResultsReading& reading) {
+    return reading.results().statistics().accuracy[0].worst_run.value;
+  }
+};
+
+TEST_F(ResultsReadingTest, ReadsEveryResultOnceAPartAtATime) {
+  Store store = made(file());
+  ResultsReading reading(store);
+  reading.read_further(store, 100);
+  EXPECT_EQ(reading.num_read(), 0U);
+  finish(store, 0, 250);
+  for (const std::uint64_t num_read : {100U, 200U, 250U, 250U}) {
+    reading.read_further(store, 100);
+    EXPECT_EQ(reading.num_read(), num_read);
+    EXPECT_EQ(reading.results().statistics().num_runs, num_read);
+  }
+  EXPECT_EQ(worst_run(reading), 249U);
+}
+
+TEST_F(ResultsReadingTest, FindsWhatComesLaterInFrontOfWhatItHas) {
+  Store store = made(file());
+  finish(store, 100, 200);
+  ResultsReading reading(store);
+  reading.read_further(store, 60);
+  finish(store, 0, 50);  // Before the place where it goes on.
+  finish(store, 300, 310);
+  for (int i = 0; i < 4; ++i) reading.read_further(store, 60);
+  EXPECT_EQ(reading.num_read(), 160U);
+  EXPECT_EQ(reading.results().statistics().num_runs, 160U);
+}
+
+// Each of a thousand gaps has to be looked up, and the lookups are bounded, too.
+TEST_F(ResultsReadingTest, ComesThroughManyGaps) {
+  Store store = made(file());
+  finish(store, 0, 2'000, 2);
+  ResultsReading reading(store);
+  int num_parts = 0;
+  for (; reading.num_read() < 1'000 && num_parts < 100; ++num_parts) {
+    reading.read_further(store, 320);
+  }
+  finish(store, 1, 2'000, 2);
+  for (; reading.num_read() < 2'000 && num_parts < 1'000; ++num_parts) {
+    const std::uint64_t before = reading.num_read();
+    reading.read_further(store, 320);
+    EXPECT_LE(reading.num_read() - before, 10U);  // One a gap.
+  }
+  EXPECT_EQ(reading.num_read(), 2'000U);
+  EXPECT_EQ(worst_run(reading), 1'999U);
+}
+
+TEST_F(ResultsReadingTest, KnowsItsCampaign) {
+  const Store store = made(file());
+  const Store other = made(directory() / "other.db");
+  const ResultsReading reading(store);
+  EXPECT_TRUE(reading.is_of(store));
+  EXPECT_FALSE(reading.is_of(other));
 }
 
 }  // namespace

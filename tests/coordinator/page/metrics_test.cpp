@@ -52,16 +52,16 @@ std::map<std::string, ReadMetric> read_metrics(const std::string& text) {
   return metrics;
 }
 
-std::string text_of(const PageSnapshot& snapshot) {
+std::string text_of(const ServiceSnapshot& snapshot) {
   return metrics_text(snapshot, snapshot.taken_at, {}, {});
 }
 
 TEST(Metrics, TellWhatIsKnownOfEachCampaign) {
-  PageSnapshot snapshot;
-  snapshot.service.campaigns = {test::campaign_snapshot("a", 42, 100),
-                                test::campaign_snapshot("b", 1'000'000, 12'345'678)};
-  snapshot.service.campaigns[1].status.storage_failure = "disk";
-  snapshot.service.campaigns[1].num_waiting = 7;
+  ServiceSnapshot snapshot;
+  snapshot.campaigns = {test::campaign_snapshot("a", 42, 100),
+                        test::campaign_snapshot("b", 1'000'000, 12'345'678)};
+  snapshot.campaigns[1].status.storage_failure = "disk";
+  snapshot.campaigns[1].num_waiting = 7;
   const auto metrics = read_metrics(text_of(snapshot));
   EXPECT_EQ(metrics.at("proofmass_runs_finished_total").samples.at("{campaign=\"a\"}"), 42.0);
   EXPECT_EQ(metrics.at("proofmass_runs_finished_total").samples.at("{campaign=\"b\"}"), 1e6);
@@ -73,8 +73,8 @@ TEST(Metrics, TellWhatIsKnownOfEachCampaign) {
 }
 
 TEST(Metrics, AreCountersIfTheirNamesSaySo) {
-  PageSnapshot snapshot;
-  snapshot.service.campaigns = {test::campaign_snapshot("a", 42, 100)};
+  ServiceSnapshot snapshot;
+  snapshot.campaigns = {test::campaign_snapshot("a", 42, 100)};
   for (const auto& [name, metric] : read_metrics(text_of(snapshot))) {
     EXPECT_EQ(metric.kind == "counter", name.ends_with("_total")) << name;
     EXPECT_FALSE(metric.samples.empty()) << name;
@@ -82,8 +82,8 @@ TEST(Metrics, AreCountersIfTheirNamesSaySo) {
 }
 
 TEST(Metrics, CountWorkersByState) {
-  PageSnapshot snapshot;
-  snapshot.service.num_workers_by_activity = {5, 4, 3, 2};
+  ServiceSnapshot snapshot;
+  snapshot.num_workers_by_activity = {5, 4, 3, 2};
   const ReadMetric workers = read_metrics(text_of(snapshot)).at("proofmass_workers");
   EXPECT_EQ(workers.samples.at("{state=\"computing\"}"), 5.0);
   EXPECT_EQ(workers.samples.at("{state=\"idle\"}"), 4.0);
@@ -94,18 +94,18 @@ TEST(Metrics, CountWorkersByState) {
 TEST(Metrics, EscapeLabels) {
   EXPECT_EQ(label_value("a\\b\"c\nd"), "a\\\\b\\\"c\\nd");
   EXPECT_EQ(label_value("é\xff"), "é\uFFFD");
-  PageSnapshot snapshot;
-  snapshot.service.campaigns = {test::campaign_snapshot(test::hostile_name, 1, 2)};
+  ServiceSnapshot snapshot;
+  snapshot.campaigns = {test::campaign_snapshot(test::hostile_name, 1, 2)};
   EXPECT_EQ(read_metrics(text_of(snapshot)).at("proofmass_runs_finished_total").samples.size(), 1U);
 }
 
 // Those that may still change must not be left out for finished ones.
 TEST(Metrics, LeaveOutCampaignsBeyondABound) {
-  PageSnapshot snapshot;
-  snapshot.service.campaigns.push_back(test::campaign_snapshot("active", 1, 2));
+  ServiceSnapshot snapshot;
+  snapshot.campaigns.push_back(test::campaign_snapshot("active", 1, 2));
   for (int i = 0; i < 250; ++i) {
-    snapshot.service.campaigns.push_back(test::campaign_snapshot("c" + std::to_string(i), 2, 2));
-    snapshot.service.campaigns.back().status.phase = wire::CampaignPhase::finished;
+    snapshot.campaigns.push_back(test::campaign_snapshot("c" + std::to_string(i), 2, 2));
+    snapshot.campaigns.back().status.phase = wire::CampaignPhase::finished;
   }
   const auto metrics = read_metrics(text_of(snapshot));
   const auto& finished = metrics.at("proofmass_runs_finished_total").samples;

@@ -12,10 +12,10 @@ inline const std::string hostile_name = "<script>alert(\"1\")</script>\n\x1b[31m
 /// A token of a page.
 inline const std::string page_secret = "a-secret-of-20-signs";
 
-inline coordinator::CampaignSnapshot campaign_snapshot(const std::string& name,
-                                                       std::uint64_t num_done,
-                                                       std::uint64_t num_runs) {
-  coordinator::CampaignSnapshot campaign;
+inline coordinator::CampaignRecord campaign_snapshot(const std::string& name,
+                                                     std::uint64_t num_done,
+                                                     std::uint64_t num_runs) {
+  coordinator::CampaignRecord campaign;
   campaign.status.name = name;
   campaign.status.num_done = num_done;
   campaign.status.num_runs = num_runs;
@@ -23,9 +23,9 @@ inline coordinator::CampaignSnapshot campaign_snapshot(const std::string& name,
   return campaign;
 }
 
-inline coordinator::WorkerSnapshot worker_snapshot(const std::string& name, std::uint64_t id,
-                                                   std::uint64_t num_results = 0) {
-  coordinator::WorkerSnapshot worker;
+inline coordinator::RegisteredWorker worker_snapshot(const std::string& name, std::uint64_t id,
+                                                     std::uint64_t num_results = 0) {
+  coordinator::RegisteredWorker worker;
   worker.status.id = {id};
   worker.status.name = name;
   worker.status.host = "host-" + name;
@@ -36,8 +36,8 @@ inline coordinator::WorkerSnapshot worker_snapshot(const std::string& name, std:
 }
 
 /// Workers `w00000`, `w00001`, ... of which each has delivered more than those before it.
-inline std::vector<coordinator::WorkerSnapshot> many_workers(std::uint64_t count) {
-  std::vector<coordinator::WorkerSnapshot> workers;
+inline std::vector<coordinator::RegisteredWorker> many_workers(std::uint64_t count) {
+  std::vector<coordinator::RegisteredWorker> workers;
   for (std::uint64_t i = 0; i < count; ++i) {
     std::string name = std::to_string(100'000 + i);
     name[0] = 'w';

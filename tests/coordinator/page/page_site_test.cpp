@@ -37,8 +37,8 @@ class PageSiteTest : public ::testing::Test {
     return PageSite({.access = PageAccess(token ? std::optional(PageToken(*token)) : std::nullopt),
                      .board = &board,
                      .details =
-                         [this](const std::string& name, const DetailSubject& campaign, TimePoint) {
-                           asked_for = name + " " + campaign.file.string();
+                         [this](const CampaignRecord& campaign, TimePoint) {
+                           asked_for = campaign.status.name + " " + campaign.file.string();
                            return details;
                          },
                      .counts = [] { return HttpCounts{}; },

@@ -58,10 +58,10 @@ TEST(GroupedNumber, HasACommaEveryThreeDigits) {
 }
 
 TEST(OverviewPage, ShowsEachCampaign) {
-  PageSnapshot snapshot;
-  snapshot.service.campaigns = {campaign_snapshot("hardy2013", 42, 100)};
-  snapshot.service.campaigns[0].status.rate_hz = 0.5;
-  snapshot.service.campaigns[0].status.remaining_s = 116.0;
+  ServiceSnapshot snapshot;
+  snapshot.campaigns = {campaign_snapshot("hardy2013", 42, 100)};
+  snapshot.campaigns[0].status.rate_hz = 0.5;
+  snapshot.campaigns[0].status.remaining_s = 116.0;
   const std::string html = overview_page(snapshot, {}, {}).live;
   EXPECT_THAT(html, HasSubstr("<a href=\"campaigns/hardy2013\">hardy2013</a>"));
   EXPECT_THAT(html, HasSubstr("<progress max=\"100\" value=\"42\""));
@@ -70,9 +70,9 @@ TEST(OverviewPage, ShowsEachCampaign) {
 }
 
 TEST(OverviewPage, ShowsFiftyCampaignsAtATime) {
-  PageSnapshot snapshot;
+  ServiceSnapshot snapshot;
   for (int i = 0; i < 60; ++i) {
-    snapshot.service.campaigns.push_back(campaign_snapshot("c" + std::to_string(i), 0, 1));
+    snapshot.campaigns.push_back(campaign_snapshot("c" + std::to_string(i), 0, 1));
   }
   const std::string second = overview_page(snapshot, *parse_target("/?page=2"), {}).live;
   EXPECT_THAT(second, HasSubstr(">c50</a>"));
@@ -81,7 +81,7 @@ TEST(OverviewPage, ShowsFiftyCampaignsAtATime) {
 }
 
 TEST(OverviewPage, SaysWhenTheCoordinatorIsSilent) {
-  const PageSnapshot snapshot{.service = {}, .taken_at = TimePoint{}};
+  const ServiceSnapshot snapshot{.taken_at = TimePoint{}};
   const auto html_after = [&](std::chrono::seconds age) {
     return overview_page(snapshot, {}, TimePoint{} + age).live;
   };
@@ -90,13 +90,13 @@ TEST(OverviewPage, SaysWhenTheCoordinatorIsSilent) {
 }
 
 TEST(Pages, ShowHostileTextAsText) {
-  PageSnapshot snapshot;
-  snapshot.service.campaigns = {campaign_snapshot(hostile_name, 1, 2)};
-  snapshot.service.campaigns[0].status.owner = hostile_name;
-  snapshot.service.campaigns[0].status.storage_failure = hostile_name;
-  snapshot.service.status.unserved_files = {{.file = hostile_name, .reason = hostile_name}};
-  snapshot.service.status.num_unserved_files = 1;
-  snapshot.service.workers = {worker_snapshot(hostile_name, 1)};
+  ServiceSnapshot snapshot;
+  snapshot.campaigns = {campaign_snapshot(hostile_name, 1, 2)};
+  snapshot.campaigns[0].status.owner = hostile_name;
+  snapshot.campaigns[0].status.storage_failure = hostile_name;
+  snapshot.status.unserved_files = {{.file = hostile_name, .reason = hostile_name}};
+  snapshot.status.num_unserved_files = 1;
+  snapshot.workers = {worker_snapshot(hostile_name, 1)};
   expect_harmless(text_of(overview_page(snapshot, {}, {})));
   expect_harmless(text_of(workers_page(
       snapshot, *parse_target("/workers?filter=" + percent_encoded(hostile_name)), {})));
@@ -112,14 +112,13 @@ TEST(Pages, ShowHostileTextAsText) {
   events->attempts.workers = {{.key = 1, .name = hostile_name, .host = hostile_name}};
   events->failure = hostile_name;
   const CampaignDetails details{.events = events, .results = nullptr};
-  const std::string html =
-      text_of(campaign_page(snapshot.service.campaigns[0], details, {}, TimePoint{}));
+  const std::string html = text_of(campaign_page(snapshot.campaigns[0], details, {}, TimePoint{}));
   expect_harmless(html);
   EXPECT_THAT(html, HasSubstr("&lt;script&gt;"));
 }
 
 TEST(ChosenWorkers, AreThoseOfOnePageInOrder) {
-  const std::vector<WorkerSnapshot> workers = test::many_workers(120);
+  const std::vector<RegisteredWorker> workers = test::many_workers(120);
   const ChosenWorkers second = choose_workers(workers, {.page = 2});
   ASSERT_EQ(second.workers.size(), rows_per_page);
   EXPECT_EQ(second.workers.front()->status.name, "w00050");
@@ -129,10 +128,10 @@ TEST(ChosenWorkers, AreThoseOfOnePageInOrder) {
 
 // Sorting only what is shown must give the same as sorting all.
 TEST(ChosenWorkers, HaveEachWorkerOnceOverAllPages) {
-  std::vector<WorkerSnapshot> workers = test::many_workers(333);
+  std::vector<RegisteredWorker> workers = test::many_workers(333);
   std::mt19937 random(1);
   std::shuffle(workers.begin(), workers.end(), random);
-  for (WorkerSnapshot& worker : workers) {
+  for (RegisteredWorker& worker : workers) {
     worker.activity = worker_activities[worker.status.id.value % worker_activities.size()];
   }
   for (const WorkerOrder order : {WorkerOrder::name, WorkerOrder::state, WorkerOrder::throughput}) {
@@ -147,7 +146,7 @@ TEST(ChosenWorkers, HaveEachWorkerOnceOverAllPages) {
 }
 
 TEST(ChosenWorkers, AreSortedByStateAndThroughput) {
-  std::vector<WorkerSnapshot> workers = test::many_workers(4);
+  std::vector<RegisteredWorker> workers = test::many_workers(4);
   workers[2].activity = WorkerActivity::quarantined;
   workers[0].activity = WorkerActivity::silent;
   workers[3].activity = WorkerActivity::computing;
@@ -163,15 +162,15 @@ TEST(ChosenWorkers, AreSortedByStateAndThroughput) {
 }
 
 TEST(ChosenWorkers, CanBeThoseWithANameOrHost) {
-  const std::vector<WorkerSnapshot> workers = test::many_workers(1000);
+  const std::vector<RegisteredWorker> workers = test::many_workers(1000);
   EXPECT_EQ(choose_workers(workers, {.filter = "w0099"}).list.count, 10U);
   EXPECT_EQ(choose_workers(workers, {.filter = "host-w00001"}).list.count, 1U);
   EXPECT_EQ(choose_workers(workers, {.filter = "nobody"}).list.count, 0U);
 }
 
 TEST(WorkersPage, SaysHowManyAreShown) {
-  PageSnapshot snapshot;
-  snapshot.service.workers = test::many_workers(10'000);
+  ServiceSnapshot snapshot;
+  snapshot.workers = test::many_workers(10'000);
   EXPECT_THAT(workers_page(snapshot, {}, {}).live, HasSubstr("showing 1–50 of 10,000 workers"));
 }
 

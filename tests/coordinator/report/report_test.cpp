@@ -245,32 +245,6 @@ TEST(ErrorTable, ShowsBiasPercentilesAndHowOftenObjectivesHold) {
           "\nall objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws (mixed)\n"));
 }
 
-// Run 1 has the worst total of all, and no run has the worst error of both parameters.
-TEST(RunTotals, AreThoseOfSingleRuns) {
-  const MicroscopeCampaign campaign;
-  const ErrorBudget budget = *campaign.error_budget();
-  RunTotalPasses passes(budget);
-  std::vector<double> totals;
-  for (std::uint64_t run = 0; run < 3; ++run) {
-    RunResult result = test::zero_result({.run = {run}});
-    std::vector<double> errors(num_parameters);
-    errors[index(Parameter::a_c12)] = run == 0 ? 1e-3 : 1e-5;
-    errors[index(Parameter::a_c13)] = run == 1 ? -2e-3 : 1e-5;
-    result.estimate = errors;
-    result.health = test::values_of({.residual_m_s2 = 1e-10});
-    totals.push_back(budget.of_run(result).total);
-    passes.add(result);
-  }
-  RunResult without = test::zero_result({.run = {3}, .status = RunStatus::no_draw});
-  without.estimate.assign(num_parameters, 1.0);
-  passes.add(without);
-  ASSERT_FALSE(passes.end_pass());
-  EXPECT_EQ(passes.totals()->worst, totals[1]);
-  EXPECT_EQ(passes.totals()->worst_run, RunIndex{1});
-  EXPECT_EQ(passes.totals()->median, totals[0]);
-  EXPECT_FALSE(RunTotalPasses(budget).totals().has_value());
-}
-
 TEST(BudgetTable, TellsTheTotalsOfSingleRuns) {
   const RunTotals totals{
       .worst = 6.4e-16, .worst_run = {57}, .median = 2.6e-16, .percentile_95 = 5.1e-16};
@@ -387,6 +361,30 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
           "\n" + accuracy_text(campaign, statistics) + "\n" + interval_text(statistics, 0) + "\n" +
           error_text(statistics, 0) + "\n" +
           budget_text(campaign, statistics, read_results(store, campaign).totals));
+}
+
+// Run 1 has the worst total of all, and no run has the worst error of both parameters.
+TEST_F(StoredReport, HasTheTotalsOfSingleRuns) {
+  const MicroscopeCampaign campaign;
+  Store store = Store::create(file(), test::campaign_of(4), "");
+  EXPECT_FALSE(read_results(store, campaign).totals.has_value());
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 4);
+  std::vector<double> totals;
+  for (std::size_t run = 0; run < 3; ++run) {
+    RunResult& result = deliveries[run].result;
+    result.truth.assign(num_parameters, 0.0);
+    result.estimate.assign(num_parameters, 0.0);
+    result.estimate[index(Parameter::a_c12)] = run == 0 ? 1e-3 : 1e-5;
+    result.estimate[index(Parameter::a_c13)] = run == 1 ? -2e-3 : 1e-5;
+    result.health = test::values_of({.residual_m_s2 = 1e-10});
+    totals.push_back(campaign.error_budget()->of_run(result).total);
+  }
+  deliveries[3].result.status = RunStatus::no_draw;
+  store.commit(deliveries);
+  const std::optional<RunTotals> of_runs = read_results(store, campaign).totals;
+  EXPECT_EQ(of_runs->worst, totals[1]);
+  EXPECT_EQ(of_runs->worst_run, RunIndex{1});
+  EXPECT_EQ(of_runs->median, totals[0]);
 }
 
 // One of nine finished runs has no estimate, nor has the one that was given up.

@@ -1,10 +1,9 @@
-#include "coordinator/report/requirements.hpp"
-
 #include <gmock/gmock.h>
 
 #include <string>
 #include <vector>
 
+#include "coordinator/report/verification_matrix.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 
@@ -13,13 +12,15 @@ namespace {
 
 /// What is said of so many runs, so many of them at 1e-3 and the others at 1e-4.
 std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t num_beyond) {
-  std::vector<double> errors(num_runs, 1e-4);
-  std::fill_n(errors.begin(), num_beyond, 1e-3);
-  const Requirement requirement = parse_requirement(text);
-  return requirement_text({.text = text,
-                           .requirement = requirement,
-                           .check = check_requirement(requirement, errors, 0, num_runs),
-                           .missing = {}});
+  RequirementAnswer answer;
+  answer.stated.requirement = text;
+  answer.requirement = parse_requirement(text);
+  answer.check = check_requirement(answer.requirement,
+                                   {.num_runs = num_runs, .num_exceedances = num_beyond}, num_runs);
+  if (answer.check.bound_order > 0) {
+    answer.bound = answer.check.bound_order <= num_beyond ? 1e-3 : 1e-4;
+  }
+  return requirement_text(answer);
 }
 
 // [Wilks1941]: 299 runs for 99 % with 95 %. Clopper and Pearson, one-sided: 1 - 0.05^(1/299).
@@ -67,13 +68,12 @@ TEST(RequirementText, SaysThatItIsNotMet) {
 
 // With five unknown draws the sixth largest error is the first that can be a bound.
 TEST(RequirementText, SaysHowManyDrawsExceedForWantOfAnEstimate) {
-  const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
-  const std::vector<double> errors(395, 1e-4);
-  const std::string text =
-      requirement_text({.text = "",
-                        .requirement = requirement,
-                        .check = check_requirement(requirement, errors, 5, 400),
-                        .missing = {.num_not_finite = 1, .num_no_draw = 4}});
+  RequirementAnswer answer;
+  answer.requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
+  answer.check = check_requirement(
+      answer.requirement, {.num_runs = 400, .num_exceedances = 5, .num_without_estimate = 5}, 400);
+  answer.missing = {.num_not_finite = 1, .num_no_draw = 4};
+  const std::string text = requirement_text(answer);
   EXPECT_THAT(text, testing::HasSubstr("Exceeding    5 of 400 runs;\n"));
   EXPECT_THAT(text, testing::HasSubstr("\n             5 of them for want of an estimate:\n"
                                        "             1 not finite, 4 without draw\n"));
@@ -91,13 +91,13 @@ TEST(RequirementText, ShowsOnWhichSideABoundLies) {
 TEST(RequirementText, TellsOfAllObjectives) {
   const Requirement requirement = parse_requirement("all objectives for 95% with 90%");
   const auto answer_to_count = [&](std::uint64_t num_exceedances, double coverage) {
-    Requirement asked = requirement;
-    asked.tolerance.coverage = coverage;
-    return requirement_text({.text = "all objectives for 95% with 90%",
-                             .requirement = asked,
-                             .check = check_requirement(
-                                 asked, {.num_runs = 100, .num_exceedances = num_exceedances}, 100),
-                             .missing = {}});
+    RequirementAnswer answer;
+    answer.stated.requirement = "all objectives for 95% with 90%";
+    answer.requirement = requirement;
+    answer.requirement.tolerance.coverage = coverage;
+    answer.check = check_requirement(answer.requirement,
+                                     {.num_runs = 100, .num_exceedances = num_exceedances}, 100);
+    return requirement_text(answer);
   };
   EXPECT_THAT(answer_to_count(3, 0.95),
               testing::StartsWith("Requirement  all objectives for 95% with 90%\n"
@@ -141,7 +141,8 @@ TEST_F(StoredRequirement, CountsRunsWithoutAnEstimateAsExceeding) {
   store.write({&given_up, 1});
   const std::vector<std::string> texts{"k2c < 1e9 for 50% with 50%"};
 
-  const auto answers = check_requirements(store, MicroscopeCampaign{}.objectives(), texts);
+  const auto answers =
+      check_requirements(store, MicroscopeCampaign{}.objectives(), numbered_requirements(texts));
 
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_EQ(answers[0].check.num_runs, 11U);
@@ -165,7 +166,8 @@ TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
   miss(7, Parameter::a_c13);
   store.commit(deliveries);
   const std::vector<std::string> texts{"all objectives for 50% with 50%"};
-  const RequirementCheck check = check_requirements(store, objectives, texts)[0].check;
+  const RequirementCheck check =
+      check_requirements(store, objectives, numbered_requirements(texts))[0].check;
   EXPECT_EQ(check.num_runs, 10U);
   EXPECT_EQ(check.num_exceedances, 3U);
   EXPECT_EQ(check.num_without_estimate, 1U);
@@ -181,7 +183,8 @@ TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
   store.commit(deliveries);
   const std::vector<std::string> texts{"k2c < 1 for 50% with 50%"};
   EXPECT_EQ(
-      check_requirements(store, MicroscopeCampaign{}.objectives(), texts)[0].check.num_exceedances,
+      check_requirements(store, MicroscopeCampaign{}.objectives(), numbered_requirements(texts))[0]
+          .check.num_exceedances,
       4U);
 }
 
@@ -190,7 +193,8 @@ TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
 TEST_F(StoredRequirement, IsOfAFixedSizeUntilTheCampaignIsExtended) {
   const std::vector<std::string> texts{"k2c < 1e9 for 95% with 95%"};
   const auto answer = [&](const Store& store) {
-    return check_requirements(store, MicroscopeCampaign{}.objectives(), texts)[0];
+    return check_requirements(store, MicroscopeCampaign{}.objectives(),
+                              numbered_requirements(texts))[0];
   };
   Store store = Store::create(file(), test::campaign_of(60), "");
   EXPECT_EQ(store.num_runs_fixed(), 60U);
@@ -198,16 +202,16 @@ TEST_F(StoredRequirement, IsOfAFixedSizeUntilTheCampaignIsExtended) {
   EXPECT_EQ(store.num_runs_fixed(), 64U);
   store.commit(test::deliveries_of(0, 63));
   EXPECT_FALSE(answer(store).check.is_of_fixed_size);  // It may yet be stopped.
-  EXPECT_EQ(answer(store).check.verdict, Verdict::undecided);
+  EXPECT_EQ(answer(store).check.verdict, RequirementVerdict::undecided);
   EXPECT_EQ(answer(store).check.num_runs_at_best, 64U);
   store.commit(test::deliveries_of(63, 64));
   EXPECT_TRUE(answer(store).check.is_of_fixed_size);
-  EXPECT_EQ(answer(store).check.verdict, Verdict::met);
+  EXPECT_EQ(answer(store).check.verdict, RequirementVerdict::met);
   store.extend(test::campaign_of(70), "");
   store.commit(test::deliveries_of(64, 70));
   EXPECT_EQ(store.num_runs_fixed(), 64U);
   EXPECT_FALSE(answer(store).check.is_of_fixed_size);
-  EXPECT_EQ(answer(store).check.verdict, Verdict::undecided);
+  EXPECT_EQ(answer(store).check.verdict, RequirementVerdict::undecided);
   EXPECT_THAT(requirement_text(answer(store)),
               testing::HasSubstr("Rule         sequential: holds however often one looks and "
                                  "goes on\n"));

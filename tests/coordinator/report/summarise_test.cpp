@@ -110,7 +110,7 @@ TEST_F(Summarise, CountsWhereAllObjectivesHold) {
       .stop_rule = "all objectives within 50%", .num_runs_max = 1000, .failures_max = {}};
   Store store = finished(128, plan, 0.0, 1.0);
   EXPECT_EQ(next_runs(store), std::nullopt);
-  EXPECT_EQ(store.last_stop_check("all objectives")->estimate, 0.5);
+  EXPECT_EQ(store.stop_checks().back().check.estimate, 0.5);
   EXPECT_EQ(stop_text(store),
             "Stopping  all objectives within 17.9 %, half its 95 % interval\n"
             "          in 64 of 128 runs, 41 to 59 % of all draws\n"
@@ -133,7 +133,7 @@ TEST_F(Summarise, EndsWithTheLastRunThatThereMayBe) {
 TEST_F(Summarise, RecordsAfterHowManyRunsItChecked) {
   Store store = finished(128, plan_of(1000), 1.0, 3.0);
   (void)next_runs(store);
-  EXPECT_EQ(store.last_stop_check("mean(k2c)")->num_runs, 128U);
+  EXPECT_EQ(store.stop_checks().back().num_runs, 128U);
   EXPECT_EQ(store.summary()->num_finished, 128U);
   EXPECT_EQ(store.summary()->num_estimated, 127U);
 }

@@ -38,11 +38,11 @@ class BeforeWrites {
   }
   static ssize_t act_and_write(int descriptor, const void* bytes, std::size_t size) {
     act();
-    return write(descriptor, bytes, size);
+    return ::write(descriptor, bytes, size);
   }
   static ssize_t act_and_pwrite(int descriptor, const void* bytes, std::size_t size, off_t place) {
     act();
-    return pwrite(descriptor, bytes, size, place);
+    return ::pwrite(descriptor, bytes, size, place);
   }
 
   static inline std::function<void()> action_;

@@ -11,13 +11,12 @@ namespace {
 using test::delivery_of;
 using test::lost_runs;
 using test::result_of;
+using test::session_1;
 using ::testing::ElementsAre;
 
 class CampaignHistoryTest : public test::StoreTest {
  protected:
-  CampaignHistoryTest() : store(Store::create(file(), test::campaign_of(100), "definition")) {
-    write({test::worker_1()});
-  }
+  CampaignHistoryTest() : store(create(100)) { write({test::worker_1()}); }
   void write(const std::vector<Entry>& entries) { (void)store.write(entries); }
 
   static Delivery failed(std::uint64_t run, RunStatus status) {
@@ -45,18 +44,26 @@ TEST_F(CampaignHistoryTest, HasTheEventsAfterOne) {
   EXPECT_EQ(history.events_after(all[4].id, 100)[0].text, "later");
 }
 
-TEST_F(CampaignHistoryTest, CountsLossesByReason) {
+TEST_F(CampaignHistoryTest, CountsLossesByReasonAndBlame) {
   write({lost_runs(0, 10, wire::LossReason::silent, false),
          lost_runs(10, 5, wire::LossReason::silent, false),
-         lost_runs(20, 1, wire::LossReason::crashed, true)});
-  const std::vector<LossCount> losses = CampaignHistory(file()).losses();
-  ASSERT_EQ(losses.size(), 2U);
-  EXPECT_EQ(losses[0].reason, "silent");
-  EXPECT_EQ(losses[0].num_losses, 2U);
-  EXPECT_EQ(losses[0].num_runs, 15U);
-  EXPECT_EQ(losses[0].num_blamed, 0U);
-  EXPECT_EQ(losses[1].reason, "crashed");
-  EXPECT_EQ(losses[1].num_blamed, 1U);
+         lost_runs(20, 1, wire::LossReason::crashed, true),
+         lost_runs(21, 2, wire::LossReason::crashed, false)});
+  const std::vector<LossCount> by_reason = CampaignHistory(file()).losses();
+  const auto has = [](const LossCount& loss, std::string_view reason, std::uint64_t num_losses,
+                      std::uint64_t num_runs, std::uint64_t num_blamed) {
+    return loss.reason == reason && loss.num_losses == num_losses && loss.num_runs == num_runs &&
+           loss.num_blamed == num_blamed;
+  };
+  ASSERT_EQ(by_reason.size(), 2U);
+  EXPECT_TRUE(has(by_reason[0], "silent", 2, 15, 0));
+  EXPECT_TRUE(has(by_reason[1], "crashed", 2, 3, 1));
+  std::string shares;
+  for (const LossShare& loss : store.execution().losses) {
+    shares += fmt::format("{} {} {} {};", loss.reason, loss.num_losses, loss.num_runs,
+                          loss.is_blamed ? "blamed" : "not");
+  }
+  EXPECT_EQ(shares, "silent 2 15 not;crashed 1 2 not;crashed 1 1 blamed;");
 }
 
 TEST_F(CampaignHistoryTest, CountsHowRunsEndedWithoutAnEstimate) {
@@ -92,7 +99,7 @@ TEST_F(CampaignHistoryTest, JoinsTheRunsOfABatch) {
   single.compute_s = 2.0;
   entries.emplace_back(single);
   write(entries);
-  test::change(file(), "UPDATE delivery SET received_unix_s = 2000");
+  change("UPDATE delivery SET received_unix_s = 2000");
   const RecentAttempts attempts = CampaignHistory(file()).recent_attempts(100, 100);
   ASSERT_EQ(attempts.computed.size(), 2U);
   EXPECT_THAT(attempts.computed[0].runs, ElementsAre(RunIndex{4}, RunIndex{5}, RunIndex{6}));
@@ -111,7 +118,7 @@ TEST_F(CampaignHistoryTest, HasTheNewestAttemptsAndCountsTheOthers) {
     entries.emplace_back(lost_runs(50 + i, 1, wire::LossReason::silent, false));
   }
   write(entries);
-  test::change(file(), "UPDATE delivery SET received_unix_s = 1000 + run_index");
+  change("UPDATE delivery SET received_unix_s = 1000 + run_index");
   const RecentAttempts attempts = CampaignHistory(file()).recent_attempts(8, 2);
   EXPECT_EQ(attempts.num_runs_left_out, 12U);
   EXPECT_EQ(attempts.num_losses_left_out, 3U);
@@ -126,6 +133,70 @@ TEST_F(CampaignHistoryTest, RefusesWhatIsNoCampaign) {
   test::write_file(directory() / "other.db", "hello");
   EXPECT_THROW(CampaignHistory(directory() / "other.db"), StoreError);
   EXPECT_THROW(CampaignHistory(directory() / "none.db"), StoreError);
+}
+
+/// A campaign whose workers, results and losses are known.
+class StoreExecution : public test::StoreTest {
+ protected:
+  static constexpr wire::SessionId second_worker{2}, third_worker{3};
+
+  StoreExecution() : store(create(100)) {
+    const auto worker = [](wire::SessionId session, const std::string& host) {
+      return WorkerJoined{.session = session, .name = "w", .host = host};
+    };
+    write({worker(session_1, "node-1"), worker(second_worker, "node-1"),
+           worker(third_worker, "node-2")});
+  }
+  void write(const std::vector<Entry>& entries) { (void)store.write(entries); }
+
+  static Delivery computed(std::uint64_t run, wire::SessionId worker, std::uint32_t attempt,
+                           double compute_s) {
+    Delivery delivery = delivery_of(run);
+    delivery.worker = worker;
+    delivery.attempt = {attempt};
+    delivery.compute_s = compute_s;
+    return delivery;
+  }
+
+  Store store;
+};
+
+TEST_F(StoreExecution, OfANewCampaignIsEmpty) {
+  const Execution execution =
+      Store::create(directory() / "new.db", test::campaign_of(5), "definition").execution();
+  EXPECT_EQ(execution.num_workers, 0U);
+  EXPECT_EQ(execution.compute_s, 0.0);
+  EXPECT_TRUE(execution.hosts.empty());
+  EXPECT_TRUE(execution.losses.empty());
+  EXPECT_FALSE(execution.first_result_utc.has_value());
+}
+
+TEST_F(StoreExecution, SaysWhoComputedTheResultsAndWhen) {
+  write({computed(0, session_1, 1, 0.5), computed(1, second_worker, 1, 1.0),
+         computed(2, second_worker, 2, 2.0), computed(3, third_worker, 3, 4.0)});
+  store.begin_coordinator({.epoch = {1}, .host = "login", .process_id = 7, .version = "v"});
+  store.begin_coordinator({.epoch = {2}, .host = "login", .process_id = 8, .version = "v"});
+  Delivery wrong = test::wrong_delivery_of(1);
+  wrong.worker = third_worker;
+  write({SecondDelivery{computed(0, third_worker, 1, 0.5)}, SecondDelivery{wrong}});
+  test::change(file(), "UPDATE delivery SET received_unix_s = 86400 + 3600 * run_index");
+  const Execution execution = store.execution();
+  EXPECT_EQ(execution.num_audited, 2U);
+  EXPECT_EQ(execution.num_contradicting, 1U);
+  EXPECT_EQ(execution.first_result_utc, "1970-01-02T00:00:00Z");
+  EXPECT_EQ(execution.last_result_utc, "1970-01-02T03:00:00Z");
+  EXPECT_EQ(execution.num_coordinators, 2U);
+  EXPECT_EQ(execution.num_workers, 3U);
+  EXPECT_EQ(execution.num_hosts, 2U);
+  EXPECT_EQ(execution.compute_s, 7.5);
+  EXPECT_EQ(execution.num_retried, 2U);
+  ASSERT_EQ(execution.hosts.size(), 2U);
+  EXPECT_EQ(execution.hosts[0].host, "node-1");
+  EXPECT_EQ(execution.hosts[0].num_workers, 2U);
+  EXPECT_EQ(execution.hosts[0].num_results, 3U);
+  EXPECT_EQ(execution.hosts[0].compute_s, 3.5);
+  EXPECT_EQ(execution.hosts[1].host, "node-2");
+  EXPECT_EQ(execution.hosts[1].compute_s, 4.0);
 }
 
 }  // namespace

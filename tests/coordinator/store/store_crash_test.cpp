@@ -38,7 +38,7 @@ TEST_F(StoreCrash, LeavesEveryCommittedResult) {
 
 TEST_F(StoreCrash, InTheMiddleOfReadingHoldsNobodyBack) {
   run_and_kill([&] {
-    Store store = Store::create(file(), campaign_of(100), "");
+    Store store = create(100);
     store.commit(deliveries_of(0, 10));
     store.for_each_result([](const RunResult&) { ::raise(SIGKILL); });
   });
@@ -51,19 +51,18 @@ TEST_F(StoreCrash, WhileCreatingIsRepairedByCreatingAgain) {
   test::write_file(file().concat(".unfinished"), "half a database");
   test::write_file(file().concat(".unfinished-journal"), "half a journal");
   test::write_file(file().concat(".lock"), "process 1 on nowhere\n");
-  Store::create(file(), campaign_of(3), "");
+  create(3);
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   EXPECT_EQ(Store::open(file()).num_runs(), 3u);
 }
 
 TEST_F(StoreCrash, OfTheDiskFailsTheCommitAndKeepsTheEarlierOnes) {
-  Store store = Store::create(file(), campaign_of(5000), "");
+  Store store = create(5000);
   store.commit(deliveries_of(0, 100));
   {
     const FileSizeLimit limit(300'000);
     const std::string error = store_error_of([&] { store.commit(deliveries_of(100, 5000)); });
-    EXPECT_EQ(error, "campaign database = " + file().string() +
-                         " (disk I/O error; what was committed before is safe)");
+    EXPECT_EQ(error, message("disk I/O error; what was committed before is safe"));
     EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 100}));
   }
   EXPECT_EQ(store.commit(deliveries_of(100, 5000)).num_new, 4900u);
@@ -72,8 +71,7 @@ TEST_F(StoreCrash, OfTheDiskFailsTheCommitAndKeepsTheEarlierOnes) {
 
 TEST_F(StoreCrash, OfTheDiskWhileCreatingLeavesNoFile) {
   const FileSizeLimit limit(10'000);
-  EXPECT_THAT(store_error_of([&] { Store::create(file(), campaign_of(1), ""); }),
-              HasSubstr("(disk I/O error; "));
+  EXPECT_THAT(store_error_of([&] { create(1); }), HasSubstr("(disk I/O error; "));
   EXPECT_TRUE(file_names().empty());
 }
 

@@ -3,48 +3,28 @@
 
 #include <gmock/gmock.h>
 
-#include <array>
-
-#include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using detail::Access;
-using detail::Database;
 using test::campaign_of;
 using test::deliveries_of;
 using test::delivery_of;
 using test::session_1;
 using test::store_error_of;
 using test::worker_1;
+using test::write;
 using test::wrong_delivery_of;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-class StoreDispatch : public test::StoreTest {
- protected:
-  /// A query of the file's text; its coordinator may be at work.
-  [[nodiscard]] std::string text(const std::string& sql) const {
-    return Database(file(), Access::read_only).text(sql);
-  }
-  [[nodiscard]] std::int64_t integer(const std::string& sql) const {
-    return Database(file(), Access::read_only).integer(sql);
-  }
-  [[nodiscard]] Store create(std::uint64_t num_runs = 10) const {
-    return Store::create(file(), campaign_of(num_runs), "");
-  }
-};
+using StoreDispatch = test::StoreTest;
 
-CommitSummary write(Store& store, const std::vector<Entry>& entries) {
-  return store.write(entries);
-}
-
-LostRuns lost(std::uint64_t first, std::uint64_t count, std::uint32_t attempt,
-              wire::LossReason reason) {
+ReturnedRuns lost(std::uint64_t first, std::uint64_t count, std::uint32_t attempt,
+                  wire::LossReason reason) {
   return {.runs = {RunIndex{first}, count},
           .attempt = {attempt},
           .worker = session_1,
@@ -82,8 +62,7 @@ TEST_F(StoreDispatch, KeepsHowTheCampaignIsServed) {
 TEST_F(StoreDispatch, RefusesAnAuditOfMoreThanAllRuns) {
   Store store = create();
   EXPECT_EQ(store_error_of([&] { write(store, {CampaignControl{.audit_fraction = 1.5}}); }),
-            "campaign database = " + file().string() +
-                " (CHECK constraint failed: audit_fraction BETWEEN 0.0 AND 1.0)");
+            message("CHECK constraint failed: audit_fraction BETWEEN 0.0 AND 1.0"));
 }
 
 TEST_F(StoreDispatch, KeepsWhichCoordinatorsBeganAndEnded) {
@@ -136,7 +115,7 @@ TEST_F(StoreDispatch, KeepsAProcessNumberThatNoProcessHas) {
 TEST_F(StoreDispatch, ReportsASessionThatNobodyCanHave) {
   Store store = create();
   write(store, {worker_1()});
-  Database(file(), Access::read_write).execute("UPDATE worker SET session = 'not hexadecimal!'");
+  change("UPDATE worker SET session = 'not hexadecimal!'");
   EXPECT_EQ(store_error_of([&] { (void)store.attached_sessions(); }),
             "worker.session = not hexadecimal! (must be hexadecimal)");
 }
@@ -229,10 +208,9 @@ TEST_F(StoreDispatch, KeepsTheHistoryOfAttempts) {
 TEST_F(StoreDispatch, KeepsTheNewestMillionLossesAndSaysSo) {
   Store store = create();
   write(store, {lost(0, 1, 1, wire::LossReason::silent)});
-  Database(file(), Access::read_write)
-      .execute(
-          "UPDATE attempt SET attempt_id = 1; INSERT INTO attempt SELECT 1000000, first_run, "
-          "num_runs, attempt, worker_key, reason, is_blamed, lost_unix_s FROM attempt");
+  change(
+      "UPDATE attempt SET attempt_id = 1; INSERT INTO attempt SELECT 1000000, first_run, "
+      "num_runs, attempt, worker_key, reason, is_blamed, lost_unix_s FROM attempt");
   write(store, {lost(1, 1, 1, wire::LossReason::silent), lost(2, 1, 1, wire::LossReason::silent)});
   EXPECT_EQ(text("SELECT group_concat(attempt_id) FROM attempt"), "1000000,1000001,1000002");
   EXPECT_EQ(text("SELECT group_concat(kind || ' ' || text) FROM event"),
@@ -243,10 +221,9 @@ TEST_F(StoreDispatch, KeepsTheNewestMillionLossesAndSaysSo) {
 TEST_F(StoreDispatch, CountsFurtherWorkersThanAHundredThousandInOneRow) {
   Store store = create();
   write(store, {delivery_of(0)});
-  Database(file(), Access::read_write)
-      .execute(
-          "INSERT INTO worker (worker_key, session, worker, host) VALUES (100000,"
-          " 'ffffffffffffffff', 'last', 'here')");
+  change(
+      "INSERT INTO worker (worker_key, session, worker, host) VALUES (100000,"
+      " 'ffffffffffffffff', 'last', 'here')");
   const auto of_worker = [](std::uint64_t session, std::uint64_t run) {
     Delivery delivery = delivery_of(run);
     delivery.worker = wire::SessionId{session};
@@ -272,10 +249,9 @@ TEST_F(StoreDispatch, KeepsSoManyComparisonsAndSaysSo) {
     Store store = create(10);
     write(store, {delivery_of(0), delivery_of(1), SecondDelivery{delivery_of(0)}});
   }
-  Database(file(), Access::read_write)
-      .execute("WITH RECURSIVE n(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM n WHERE i < " +
-               std::to_string(num_rows) +
-               ") INSERT INTO audit SELECT 0, i, 1, stored_digest, second_digest, 0 FROM n, audit");
+  change("WITH RECURSIVE n(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM n WHERE i < " +
+         std::to_string(num_rows) +
+         ") INSERT INTO audit SELECT 0, i, 1, stored_digest, second_digest, 0 FROM n, audit");
   Store store = Store::open(file());
   write(store, {delivery_of(2), SecondDelivery{delivery_of(1)}, SecondDelivery{delivery_of(2)},
                 SecondDelivery{delivery_of(0)}});
@@ -298,7 +274,7 @@ TEST_F(StoreDispatch, NamesEveryReason) {
 
 TEST_F(StoreDispatch, KeepsRunsThatAreGivenUpWithTheLastReason) {
   Store store = create();
-  LostRuns last = lost(5, 2, 3, wire::LossReason::crashed);
+  ReturnedRuns last = lost(5, 2, 3, wire::LossReason::crashed);
   last.reason = wire::LossReason::out_of_memory;
   write(store, {lost(4, 3, 1, wire::LossReason::crashed), lost(5, 1, 2, wire::LossReason::silent),
                 last, GivenUpRun{RunIndex{5}}, GivenUpRun{RunIndex{6}}, GivenUpRun{RunIndex{9}}});
@@ -311,7 +287,7 @@ TEST_F(StoreDispatch, KeepsRunsThatAreGivenUpWithTheLastReason) {
 
 // A coordinator that starts again does not have them computed a third time.
 TEST_F(StoreDispatch, KnowsOfWhichRunsASecondResultWasCompared) {
-  Store store = Store::create(file(), test::campaign_of(8), "");
+  Store store = create(8);
   store.commit(test::deliveries_of(0, 8));
   std::vector<Entry> entries;
   for (const Delivery& delivery : test::deliveries_of(2, 4)) {
@@ -380,10 +356,9 @@ TEST_F(StoreDispatch, ShowsTheThroughputOfWorkers) {
   Store store = create(10);
   write(store, {worker_1(), delivery_of(0), delivery_of(1),
                 WorkerJoined{.session = {2}, .name = "idle", .host = "node-2"}});
-  Database(file(), Access::read_write)
-      .execute(
-          "UPDATE worker SET first_seen_utc = strftime('%Y-%m-%dT%H:%M:%SZ', "
-          "last_result_unix_s - 60, 'unixepoch') WHERE worker = 'worker-1'");
+  change(
+      "UPDATE worker SET first_seen_utc = strftime('%Y-%m-%dT%H:%M:%SZ', "
+      "last_result_unix_s - 60, 'unixepoch') WHERE worker = 'worker-1'");
   EXPECT_EQ(text("SELECT group_concat(worker || ' ' || num_results || ' ' || compute_s || ' ' || "
                  "ifnull(run_s, '-') || ' ' || ifnull(results_per_h, '-'), ';') "
                  "FROM worker_throughput"),
@@ -394,8 +369,7 @@ TEST_F(StoreDispatch, KeepsTheNewestEventsAndCutsLongOnes) {
   Store store = create(1);
   store.record_event("long", std::string(3000, 'x'));
   EXPECT_EQ(text("SELECT text FROM event"), std::string(2000, 'x'));
-  Database(file(), Access::read_write)
-      .execute("INSERT INTO event (event_id, kind, text) VALUES (10000, 'old', '')");
+  change("INSERT INTO event (event_id, kind, text) VALUES (10000, 'old', '')");
   store.record_event("new", "");
   EXPECT_EQ(text("SELECT group_concat(kind) FROM event"), "old,new");
 }

@@ -25,6 +25,24 @@
 
 namespace proofmass::test {
 
+/// Harmonic environment, no tables.
+inline MicroscopeCampaign campaign_of(std::uint64_t num_runs) {
+  MicroscopeCampaign campaign;
+  campaign.num_runs = num_runs;
+  return campaign;
+}
+
+/// Changes a file as anybody with SQL can.
+inline void change(const std::filesystem::path& file, const std::string& sql) {
+  coordinator::detail::Database database(file, coordinator::detail::Access::read_write);
+  database.execute(sql);
+}
+
+/// First cell of a query of a file, without opening it as a Store.
+inline std::string text_in(const std::filesystem::path& file, const std::string& sql) {
+  return coordinator::detail::Database(file, coordinator::detail::Access::read_only).text(sql);
+}
+
 /// A test with a directory of its own, removed afterwards.
 class StoreTest : public ::testing::Test {
  protected:
@@ -46,6 +64,20 @@ class StoreTest : public ::testing::Test {
     return names;
   }
 
+  coordinator::Store create(std::uint64_t num_runs = 10) const {
+    return coordinator::Store::create(file(), campaign_of(num_runs), "");
+  }
+  void change(const std::string& sql) const { test::change(file(), sql); }
+  [[nodiscard]] std::string text(const std::string& sql) const { return text_in(file(), sql); }
+  [[nodiscard]] std::int64_t integer(const std::string& sql) const {
+    return coordinator::detail::Database(file(), coordinator::detail::Access::read_only)
+        .integer(sql);
+  }
+  /// `campaign database = <file()> (<reason>)`
+  [[nodiscard]] std::string message(const std::string& reason) const {
+    return "campaign database = " + file().string() + " (" + reason + ")";
+  }
+
  private:
   std::filesystem::path directory_;
 };
@@ -57,13 +89,6 @@ inline void write_file(const std::filesystem::path& path, const std::string& con
 inline std::string content_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-/// Harmonic environment, no tables.
-inline MicroscopeCampaign campaign_of(std::uint64_t num_runs) {
-  MicroscopeCampaign campaign;
-  campaign.num_runs = num_runs;
-  return campaign;
 }
 
 /// A result whose every number depends on the run; 1/3 needs all bits of a double.
@@ -103,8 +128,8 @@ inline coordinator::Delivery wrong_delivery_of(std::uint64_t run) {
 }
 
 /// Runs that worker_1() lost at their first attempt.
-inline coordinator::LostRuns lost_runs(std::uint64_t first, std::uint64_t count,
-                                       wire::LossReason reason, bool is_blamed) {
+inline coordinator::ReturnedRuns lost_runs(std::uint64_t first, std::uint64_t count,
+                                           wire::LossReason reason, bool is_blamed) {
   return {.runs = {{first}, count},
           .attempt = {1},
           .worker = session_1,
@@ -118,17 +143,6 @@ inline std::vector<coordinator::Delivery> deliveries_of(std::uint64_t first, std
   return deliveries;
 }
 
-/// Changes a file as anybody with SQL can.
-inline void change(const std::filesystem::path& file, const std::string& sql) {
-  coordinator::detail::Database database(file, coordinator::detail::Access::read_write);
-  database.execute(sql);
-}
-
-/// First cell of a query of a file, without opening it as a Store.
-inline std::string text_in(const std::filesystem::path& file, const std::string& sql) {
-  return coordinator::detail::Database(file, coordinator::detail::Access::read_only).text(sql);
-}
-
 /// Kinds of its events, in order: `log_lost,resumed`.
 inline std::string event_kinds_in(const std::filesystem::path& file) {
   return text_in(file, "SELECT group_concat(kind) FROM (SELECT kind FROM event ORDER BY event_id)");
@@ -138,6 +152,11 @@ inline std::vector<RunResult> results_in(const coordinator::Store& store) {
   std::vector<RunResult> results;
   store.for_each_result([&](const RunResult& result) { results.push_back(result); });
   return results;
+}
+
+inline coordinator::CommitSummary write(coordinator::Store& store,
+                                        const std::vector<coordinator::Entry>& entries) {
+  return store.write(entries);
 }
 
 /// Text of the StoreError that `action` throws; empty if it throws none.

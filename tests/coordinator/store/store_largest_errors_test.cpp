@@ -17,18 +17,9 @@ namespace {
 using detail::Access;
 using detail::Database;
 using detail::Statement;
-using test::campaign_of;
 using test::delivery_of;
 
-class StoreLargestErrors : public test::StoreTest {
- protected:
-  [[nodiscard]] std::string text(const std::string& sql) const {
-    return Database(file(), Access::read_only).text(sql);
-  }
-  [[nodiscard]] std::int64_t integer(const std::string& sql) const {
-    return Database(file(), Access::read_only).integer(sql);
-  }
-};
+using StoreLargestErrors = test::StoreTest;
 
 /// A delivery with this estimate − truth of the parameter with index 4, a_c13, and of no other.
 Delivery delivery_with_error(std::uint64_t run, double error) {
@@ -42,7 +33,7 @@ Delivery delivery_with_error(std::uint64_t run, double error) {
 void commit(Store& store, const Delivery& delivery) { store.commit({&delivery, 1}); }
 
 TEST_F(StoreLargestErrors, ErrorsInLongFormAreThoseOfTheResults) {
-  Store store = Store::create(file(), campaign_of(10), "");
+  Store store = create(10);
   std::vector<Delivery> deliveries = test::deliveries_of(0, 4);
   deliveries[1].result.status = RunStatus::not_finite;
   deliveries[2].result.status = RunStatus::not_converged;
@@ -78,7 +69,7 @@ TEST_F(StoreLargestErrors, WorstRunsAreTheSameInWhateverOrderTheyCome) {
   }
   std::mt19937 random(5);
   std::shuffle(deliveries.begin(), deliveries.end(), random);
-  Store store = Store::create(file(), campaign_of(60), "");
+  Store store = create(60);
   for (std::size_t first = 0; first < deliveries.size(); first += 7) {
     const std::size_t count = std::min<std::size_t>(7, deliveries.size() - first);
     store.commit(std::span(deliveries).subspan(first, count));
@@ -97,22 +88,11 @@ TEST_F(StoreLargestErrors, WorstRunsAreTheSameInWhateverOrderTheyCome) {
   store.check_integrity();
 }
 
-TEST_F(StoreLargestErrors, WorstRunsAreKnownAgainWhenAFileIsOpened) {
-  {
-    Store store = Store::create(file(), campaign_of(60), "");
-    commit(store, delivery_with_error(7, 3.0));
-  }
-  Store store = Store::open(file());
-  commit(store, delivery_with_error(8, 4.0));
-  EXPECT_EQ(text("SELECT group_concat(run_index) FROM worst_runs WHERE parameter = 'a_c13'"),
-            "8,7");
-}
-
 // Ten of them are there: a smaller error of a later coordinator's is none, a larger one drops the
 // smallest.
 TEST_F(StoreLargestErrors, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
   {
-    Store store = Store::create(file(), campaign_of(60), "");
+    Store store = create(60);
     for (std::uint64_t run = 0; run < 10; ++run) commit(store, delivery_with_error(run, 3.0));
   }
   Store store = Store::open(file());
@@ -125,7 +105,7 @@ TEST_F(StoreLargestErrors, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
 
 TEST_F(StoreLargestErrors, OverrunsAreErrorsAboveTheObjectiveOnly) {
   const double objective = MicroscopeCampaign{}.objectives()[4];
-  Store store = Store::create(file(), campaign_of(10), "");
+  Store store = create(10);
   std::vector<Delivery> deliveries{
       delivery_with_error(3, -2.0 * objective), delivery_with_error(1, objective),
       delivery_with_error(2, std::nextafter(objective, 1.0)), delivery_with_error(4, 0.0)};
@@ -149,7 +129,7 @@ TEST_F(StoreLargestErrors, OverrunsAreErrorsAboveTheObjectiveOnly) {
 }
 
 TEST_F(StoreLargestErrors, ASecondResultOfARunChangesNothing) {
-  Store store = Store::create(file(), campaign_of(10), "");
+  Store store = create(10);
   commit(store, delivery_with_error(3, 0.0));
   commit(store, delivery_with_error(3, 1.0));
   EXPECT_EQ(integer("SELECT count(*) FROM overruns"), 0);

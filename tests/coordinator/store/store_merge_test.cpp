@@ -62,7 +62,7 @@ std::vector<Entry> entries_of(std::vector<Entry> entries, const std::vector<std:
   return entries;
 }
 
-LostRuns crashed(std::uint64_t run, wire::SessionId worker) {
+ReturnedRuns crashed(std::uint64_t run, wire::SessionId worker) {
   return {.runs = {RunIndex{run}, 1},
           .attempt = {1},
           .worker = worker,

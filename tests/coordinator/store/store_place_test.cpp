@@ -75,7 +75,7 @@ class StorePlace : public test::WriterTest {
   void expect_copy_after(const std::function<void()>& fault, const std::string& what,
                          const std::string& first = "") {
     StoreWriter& writer = start();
-    writer.open(id, create());
+    writer.open(id, create(100));
     deliver(writer, 0, 10);
     (void)take_completions();
     fault();
@@ -91,7 +91,7 @@ class StorePlace : public test::WriterTest {
     Store store = Store::open(file());
     store.commit(deliveries_of(10, 30));
     EXPECT_EQ(results_in(store).size(), 30u);
-    EXPECT_FALSE(store.has_lost_its_log());
+    EXPECT_EQ(test::event_kinds_in(file()), "");
   }
 };
 
@@ -139,7 +139,7 @@ TEST_F(StorePlace, AFileWhoseLogIsRemovedIsCopied) {
 
 // Nobody can tell what happened to it meanwhile.
 TEST_F(StorePlace, AFileThatComesBackStaysAbandoned) {
-  Store store = create();
+  Store store = create(100);
   store.commit(deliveries_of(0, 10));
   std::filesystem::rename(file(), backup());
   const std::string error = test::store_error_of([&] { store.check_place(); });
@@ -155,7 +155,7 @@ TEST_F(StorePlace, AFileThatComesBackStaysAbandoned) {
 // told to be stored.
 TEST_F(StorePlace, AResultIsNotNamedThatIsCommittedWhileTheFileIsRemoved) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   deliver(writer, 0, 10);
   (void)take_completions();
   {
@@ -220,7 +220,7 @@ TEST_F(StorePlace, ACopyThatTheDiskDoesNotTakeLeavesTheLog) {
 }
 
 TEST_F(StorePlace, AReaderDoesNotHoldUpTheCopy) {
-  Store store = create();
+  Store store = create(100);
   store.commit(deliveries_of(0, 10));
   const Store reader = Store::open_read_only(file());
   reader.read_one_state([&] {
@@ -234,7 +234,7 @@ TEST_F(StorePlace, AReaderDoesNotHoldUpTheCopy) {
 
 TEST_F(StorePlace, AFileThatIsClosedWithoutItsNameIsCopied) {
   {
-    Store store = create();
+    Store store = create(100);
     store.commit(deliveries_of(0, 10));
     std::filesystem::remove(file());
   }
@@ -245,12 +245,12 @@ TEST_F(StorePlace, AFileThatIsClosedWithoutItsNameIsCopied) {
 // Otherwise a restarted coordinator would begin anew, and the copy would be forgotten.
 TEST_F(StorePlace, NoNewFileIsMadeBesideACopyOfTheOneThatIsGone) {
   {
-    Store store = create();
+    Store store = create(100);
     store.commit(deliveries_of(0, 10));
     std::filesystem::remove(file());
   }
   const std::string name = copy().filename().string();
-  EXPECT_EQ(test::store_error_of([&] { (void)create(); }),
+  EXPECT_EQ(test::store_error_of([&] { (void)create(100); }),
             "campaign database = " + file().string() + " (is gone, but its copy " + name +
                 " is there: give it the name, or move " + name + " away and begin anew)");
 }
@@ -259,7 +259,7 @@ TEST_F(StorePlace, AnIdleFileIsLookedAt) {
   WriterConfig config = test::patient_config();
   config.look_after = std::chrono::milliseconds(1);
   StoreWriter& writer = start(config);
-  writer.open(id, create());
+  writer.open(id, create(100));
   deliver(writer, 0, 10);
   std::filesystem::remove(file());
   while (copies_in(directory()).empty()) std::this_thread::yield();
@@ -269,7 +269,7 @@ TEST_F(StorePlace, AnIdleFileIsLookedAt) {
 // What was cut off cannot be had back; nothing more is stored, or named as stored.
 TEST_F(StorePlace, AFileThatIsTruncatedIsNamedAtOnceAndLeftAlone) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   deliver(writer, 0, 10);
   (void)take_completions();
   std::filesystem::resize_file(file(), 4096);
@@ -288,7 +288,7 @@ TEST_F(StorePlace, AFileThatIsTruncatedIsNamedAtOnceAndLeftAlone) {
 // The connection to the lost file must not touch the log of what has its name now.
 TEST_F(StorePlace, ClosingALostFileLeavesTheFileInItsPlaceAsItIs) {
   {
-    Store store = Store::create(file(), campaign_of(100), "");
+    Store store = create(100);
     store.commit(deliveries_of(0, 10));
     { (void)Store::create(backup(), campaign_of(7), ""); }
     test::run_and_kill([&] {
@@ -307,7 +307,7 @@ TEST_F(StorePlace, ClosingALostFileLeavesTheFileInItsPlaceAsItIs) {
 // second coordinator, which the first one's lock of the file itself keeps away as well.
 TEST_F(StorePlace, AnotherNameOfTheFileChangesNothing) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   deliver(writer, 0, 10);
   std::filesystem::create_hard_link(file(), directory() / "second.db");
   deliver(writer, 10, 20);
@@ -316,12 +316,11 @@ TEST_F(StorePlace, AnotherNameOfTheFileChangesNothing) {
 }
 
 TEST_F(StorePlace, KeepsASecondCoordinatorAwayThoughBothLockFilesWereRemoved) {
-  Store first = Store::create(file(), campaign_of(100), "");
+  Store first = create(100);
   first.commit(deliveries_of(0, 10));
   std::filesystem::remove(file().string() + ".lock");
   EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
-            "campaign database = " + file().string() +
-                " (another coordinator has it; a campaign has one coordinator at a time)");
+            message("another coordinator has it; a campaign has one coordinator at a time"));
   first.commit(deliveries_of(10, 20));
   EXPECT_EQ(num_readable(file()), 20u);
 }

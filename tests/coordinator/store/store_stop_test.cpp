@@ -13,7 +13,7 @@ using test::campaign_of;
 
 class StoreStop : public test::StoreTest {
  protected:
-  void SetUp() override { Store::create(file(), campaign_of(10), ""); }
+  void SetUp() override { create(10); }
 };
 
 TEST_F(StoreStop, PlanIsKept) {

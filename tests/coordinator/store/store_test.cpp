@@ -82,13 +82,6 @@ TEST_F(StoreTest, HoldsTheCampaignThatItWasCreatedWith) {
   EXPECT_THAT(columns[1], ElementsAre(17.0, 17.0 + 1.0 / 7.0, 17.0 + 2.0 / 7.0));
 }
 
-TEST_F(StoreTest, OfANewCampaignHasNoResults) {
-  const Store store = Store::create(file(), campaign_of(5), "");
-  EXPECT_THAT(store.finished_runs(), IsEmpty());
-  EXPECT_THAT(results_in(store), IsEmpty());
-  EXPECT_THAT(store.data_tables(), IsEmpty());
-}
-
 TEST_F(StoreTest, ReturnsResultsBitForBit) {
   RunResult extremes = result_of(0);
   extremes.truth = {0.1,
@@ -104,7 +97,7 @@ TEST_F(StoreTest, ReturnsResultsBitForBit) {
   extremes.num_draws = std::numeric_limits<std::uint32_t>::max();
   const std::vector<Delivery> deliveries{{extremes, session_1, {1}, 1.0},
                                          {result_of(1), session_1, {1}, 1.0}};
-  Store::create(file(), campaign_of(2), "").commit(deliveries);
+  create(2).commit(deliveries);
 
   const std::vector<RunResult> results = results_in(Store::open(file()));
   ASSERT_EQ(results.size(), 2u);
@@ -115,7 +108,7 @@ TEST_F(StoreTest, ReturnsResultsBitForBit) {
 TEST_F(StoreTest, KeepsNoSignOfAZero) {
   Delivery delivery = delivery_of(0);
   delivery.result.truth[0] = -0.0;
-  Store store = Store::create(file(), campaign_of(1), "");
+  Store store = create(1);
   store.commit({&delivery, 1});
   EXPECT_EQ(std::bit_cast<std::uint64_t>(results_in(store)[0].truth[0]), 0u);
   EXPECT_EQ(store.commit({&delivery, 1}).num_contradicting, 0u);
@@ -131,7 +124,7 @@ TEST_F(StoreTest, KeepsHealthAndWhereARunWasLost) {
       result.loss = test::loss_of(LossCause::residual, SessionTarget::a_c12);
     deliveries.push_back({result, session_1, {1}, 1.0});
   }
-  EXPECT_EQ(Store::create(file(), campaign_of(3), "").commit(deliveries).num_new, 3u);
+  EXPECT_EQ(create(3).commit(deliveries).num_new, 3u);
 
   const std::vector<RunResult> results = results_in(Store::open(file()));
   for (std::size_t i = 0; i < deliveries.size(); ++i) {
@@ -153,7 +146,7 @@ TEST_F(StoreTest, KeepsThatARunWasLostInAnySession) {
     result.loss = test::loss_of(LossCause::attitude, static_cast<SessionTarget>(i + 1));
     deliveries.push_back({result, session_1, {1}, 1.0});
   }
-  Store store = Store::create(file(), campaign_of(num_session_targets), "");
+  Store store = create(num_session_targets);
   EXPECT_EQ(store.commit(deliveries).num_new, num_session_targets);
   const Database database(file(), Access::read_only);
   for (std::size_t i = 0; i < num_session_targets; ++i) {
@@ -175,7 +168,7 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
       result.truth.assign(num_parameters, std::numeric_limits<double>::infinity());
     deliveries.push_back({result, session_1, {1}, 1.0});
   }
-  EXPECT_EQ(Store::create(file(), campaign_of(4), "").commit(deliveries).num_new, 4u);
+  EXPECT_EQ(create(4).commit(deliveries).num_new, 4u);
 
   const Database database(file(), Access::read_only);
   const auto count = [&](const std::string& column) {
@@ -189,20 +182,8 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
   }
 }
 
-TEST_F(StoreTest, ShowsEachErrorAsEstimateMinusTruth) {
-  Store::create(file(), campaign_of(1), "").commit(deliveries_of(0, 1));
-  const Database database(file(), Access::read_only);
-  for (const test::ParameterInfo& info : test::parameter_infos()) {
-    Statement select = database.prepare("SELECT error_" + std::string(info.name) +
-                                        std::string(info.unit_suffix) + " FROM run_result");
-    ASSERT_TRUE(select.step());
-    EXPECT_EQ(std::bit_cast<std::uint64_t>(select.real(0)),
-              std::bit_cast<std::uint64_t>(result_of(0).error(index(info.parameter))));
-  }
-}
-
 TEST_F(StoreTest, YieldsResultsInRunOrderWhateverTheOrderOfArrival) {
-  Store store = Store::create(file(), campaign_of(300), "");
+  Store store = create(300);
   for (const std::uint64_t run : {299u, 0u, 256u, 2u, 1u}) {
     const Delivery delivery = delivery_of(run);
     store.commit({&delivery, 1});
@@ -216,7 +197,7 @@ TEST_F(StoreTest, YieldsResultsInRunOrderWhateverTheOrderOfArrival) {
 }
 
 TEST_F(StoreTest, CommitsARunOnce) {
-  Store store = Store::create(file(), campaign_of(4), "");
+  Store store = create(4);
   EXPECT_EQ(store.commit(deliveries_of(0, 2)).num_new, 2u);
   std::vector<Delivery> again = deliveries_of(1, 4);
   again[0].worker = wire::SessionId{7};
@@ -236,14 +217,14 @@ TEST_F(StoreTest, CommitsARunOnce) {
 }
 
 TEST_F(StoreTest, RefusesARunBeyondTheCampaign) {
-  Store store = Store::create(file(), campaign_of(2), "");
+  Store store = create(2);
   EXPECT_EQ(store_error_of([&] { store.commit(deliveries_of(0, 3)); }),
             "run_result.run_index = 2 (must be below num_runs = 2)");
   EXPECT_THAT(store.finished_runs(), IsEmpty());
 }
 
 TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
-  Store store = Store::create(file(), campaign_of(2), "");
+  Store store = create(2);
   std::vector<Delivery> deliveries = deliveries_of(0, 2);
   deliveries[1].result.truth[0] = std::numeric_limits<double>::infinity();
   EXPECT_EQ(store_error_of([&] { store.commit(deliveries); }),
@@ -340,16 +321,16 @@ TEST_F(StoreTest, KeepsTheDigestOfItsTables) {
 // Python).
 TEST_F(StoreTest, HasTheKnownDigestOfADefinition) {
   (void)Store::create(file(), campaign_of(3), "d");
-  test::change(file(),
-               "UPDATE campaign SET model_version = 'm', build = 'b', created_utc = 'c',"
-               " campaign_uid = 7");
+  change(
+      "UPDATE campaign SET model_version = 'm', build = 'b', created_utc = 'c',"
+      " campaign_uid = 7");
   EXPECT_EQ(Store::open_read_only(file()).computed_table_digest(),
             "5509dd21e1bb692b627bf7def27c168579a5c119cfad179f1eb1afac15402055");
 }
 
 TEST_F(StoreTest, KeepsItsOwner) {
   {
-    Store store = Store::create(file(), campaign_of(3), "");
+    Store store = create(3);
     EXPECT_EQ(store.owner(), "");
     store.set_owner("anna");
   }
@@ -357,26 +338,17 @@ TEST_F(StoreTest, KeepsItsOwner) {
 }
 
 TEST_F(StoreTest, IsReadableWhileItsCoordinatorWrites) {
-  Store writer = Store::create(file(), campaign_of(10), "");
+  Store writer = create(10);
   const Store reader = Store::open_read_only(file());
   EXPECT_EQ(results_in(reader).size(), 0u);
+  EXPECT_THAT(reader.finished_runs(), IsEmpty());
   writer.commit(deliveries_of(0, 7));
   EXPECT_EQ(results_in(reader).size(), 7u);
   EXPECT_EQ(Store::open_read_only(file()).num_runs(), 10u);
 }
 
-TEST_F(StoreTest, LeavesOneFileWhenClosed) {
-  {
-    Store store = Store::create(file(), campaign_of(10), "");
-    store.commit(deliveries_of(0, 10));
-  }
-  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-  Store::open(file());
-  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-}
-
 TEST_F(StoreTest, LosesNothingWhenClosedWhileSomebodyReads) {
-  std::optional<Store> writer = Store::create(file(), campaign_of(300), "");
+  std::optional<Store> writer = create(300);
   writer->commit(deliveries_of(0, 300));
   const Store reader = Store::open_read_only(file());
   std::uint64_t num_read = 0;
@@ -388,7 +360,7 @@ TEST_F(StoreTest, LosesNothingWhenClosedWhileSomebodyReads) {
 }
 
 TEST_F(StoreTest, IsReadableInADirectoryThatIsNotWritable) {
-  Store::create(file(), campaign_of(3), "").commit(deliveries_of(0, 3));
+  create(3).commit(deliveries_of(0, 3));
   std::filesystem::permissions(file(), std::filesystem::perms(0444));
   std::filesystem::permissions(directory(), std::filesystem::perms(0555));
   std::size_t num_results = 0;

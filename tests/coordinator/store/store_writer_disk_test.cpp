@@ -89,9 +89,8 @@ TEST_F(StoreWriterDisk, DropsRecordsThatNobodyWaitsForBeyondALimit) {
   }
   writer.flush();
   EXPECT_THAT(take_completions(), Contains("recovered"));
-  EXPECT_EQ(
-      Database(file(), Access::read_only).text("SELECT group_concat(kind || text) FROM event"),
-      "a,b,c,records_droppedlosses_and_events=2 (the disk did not take them for too long)");
+  EXPECT_EQ(text("SELECT group_concat(kind || text) FROM event"),
+            "a,b,c,records_droppedlosses_and_events=2 (the disk did not take them for too long)");
 }
 
 TEST_F(StoreWriterDisk, ReportsWhatNoDiskIsToBlameFor) {

@@ -25,7 +25,7 @@ using StoreWriterTest = test::WriterTest;
 
 TEST_F(StoreWriterTest, NamesResultsOnceTheyAreStored) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   for (const std::uint64_t run : {4u, 2u, 3u}) writer.deliver(id, delivery_of(run));
   EXPECT_THAT(take_completions(), IsEmpty());
   writer.flush();
@@ -39,7 +39,7 @@ TEST_F(StoreWriterTest, CommitsAsSoonAsEnoughResultsWait) {
   WriterConfig config = patient_config();
   config.commit_runs_max = 3;
   StoreWriter& writer = start(config);
-  writer.open(id, create());
+  writer.open(id, create(100));
   for (std::uint64_t run = 0; run < 3; ++run) writer.deliver(id, delivery_of(run));
   wait_for("committed 0 1 2");
 }
@@ -48,14 +48,14 @@ TEST_F(StoreWriterTest, CommitsAFewResultsAfterAWhile) {
   WriterConfig config = patient_config();
   config.commit_after = std::chrono::milliseconds(1);
   StoreWriter& writer = start(config);
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.deliver(id, delivery_of(7));
   wait_for("committed 7");
 }
 
 TEST_F(StoreWriterTest, CommitsAtOnceWhatNoMoreResultsFollow) {
   StoreWriter& writer = start(patient_config());
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.hurry(id);
   writer.deliver(id, delivery_of(7));
   EXPECT_THAT(take_completions(), IsEmpty()) << "there was nothing to hurry with";
@@ -78,7 +78,7 @@ TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
 
 TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.deliver(id, delivery_of(1));
   writer.compare(id, delivery_of(1));
   writer.compare(id, wrong_delivery_of(1));
@@ -89,7 +89,7 @@ TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
 
 TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.record_worker_joined(id, worker_1());
   writer.record_loss(id, {.runs = {RunIndex{3}, 1},
                           .attempt = {1},
@@ -110,7 +110,7 @@ TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
   EXPECT_THAT(store.blamed_runs(), ElementsAre(BlamedRun{RunIndex{3}, 1, {1}}));
   EXPECT_THAT(store.given_up_runs(), ElementsAre(RunRange{RunIndex{4}, 1}));
   EXPECT_EQ(store.control().phase, wire::CampaignPhase::paused);
-  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT kind || text FROM event"), "notetext");
+  EXPECT_EQ(text("SELECT kind || text FROM event"), "notetext");
   EXPECT_THAT(take_completions(), IsEmpty());
 }
 
@@ -119,7 +119,7 @@ TEST_F(StoreWriterTest, TellsOnlyTheFilesThatKnowAWorkerOfIt) {
   constexpr wire::CampaignId other{2};
   const std::filesystem::path other_file = directory() / "other.db";
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.open(other, Store::create(other_file, campaign_of(100), ""));
   writer.record_worker_joined(id, worker_1());
   writer.record_worker_joined(id, {.session = {2}, .name = "gone", .host = "node-2"});
@@ -132,7 +132,7 @@ TEST_F(StoreWriterTest, TellsOnlyTheFilesThatKnowAWorkerOfIt) {
 }
 
 TEST_F(StoreWriterTest, TellsAFileOfTheEndOfAWorkerThatItKnewBefore) {
-  start().open(id, create());
+  start().open(id, create(100));
   StoreWriter& first = start();
   first.open(id, Store::open(file()));
   first.record_worker_joined(id, worker_1());
@@ -149,12 +149,11 @@ TEST_F(StoreWriterTest, LetsRecordsWaitLongerThanResults) {
   WriterConfig config = patient_config();
   config.commit_after = std::chrono::milliseconds(1);
   StoreWriter& writer = start(config);
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.record_event(id, {.kind = "early", .text = ""});
   writer.deliver(id, delivery_of(7));
   wait_for("committed 7");
-  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT group_concat(kind) FROM event"),
-            "early");
+  EXPECT_EQ(text("SELECT group_concat(kind) FROM event"), "early");
   config.record_after = std::chrono::milliseconds(1);
   config.commit_after = std::chrono::hours(1);
   StoreWriter& hasty = start(config);
@@ -167,7 +166,7 @@ TEST_F(StoreWriterTest, LetsRecordsWaitLongerThanResults) {
 TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
   constexpr wire::CampaignId other{2};
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.open(other, Store::create(directory() / "other.db", campaign_of(100), ""));
   writer.deliver(id, delivery_of(1));
   writer.deliver(other, delivery_of(2));
@@ -176,13 +175,13 @@ TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
   writer.flush();
   EXPECT_THAT(take_completions(), ElementsAre("committed 1", "committed 2"));
   const std::string kinds = "SELECT group_concat(kind) FROM event";
-  EXPECT_EQ(Database(file(), Access::read_only).text(kinds), "all");
+  EXPECT_EQ(text(kinds), "all");
   EXPECT_EQ(Database(directory() / "other.db", Access::read_only).text(kinds), "one,all");
 }
 
 TEST_F(StoreWriterTest, GivesTheFileBackWithAllThatWasHandedOver) {
   StoreWriter& writer = start();
-  writer.open(id, create());
+  writer.open(id, create(100));
   writer.deliver(id, delivery_of(5));
   {
     Store store = writer.close(id);
@@ -245,7 +244,7 @@ TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
 }
 
 TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {
-  start().open(id, create());
+  start().open(id, create(100));
   StoreWriter& writer = start();  // The file of the first one is free.
   writer.open(id, Store::open(file()));
   for (std::uint64_t run = 0; run < 50; ++run) writer.deliver(id, delivery_of(run));

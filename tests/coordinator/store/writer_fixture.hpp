@@ -46,10 +46,6 @@ class WriterTest : public StoreTest {
   /// Ends the writer.
   void end() { writer_.reset(); }
 
-  [[nodiscard]] coordinator::Store create(std::uint64_t num_runs = 100) const {
-    return coordinator::Store::create(file(), campaign_of(num_runs), "");
-  }
-
   [[nodiscard]] std::vector<std::string> take_completions() {
     std::vector<std::string> texts;
     for (const coordinator::Completion& completion : writer_->take_completions()) {

@@ -1,7 +1,6 @@
-#include "coordinator/table/html_table.hpp"
-
 #include <gmock/gmock.h>
 
+#include "coordinator/table/document_table.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 
 namespace proofmass::coordinator {

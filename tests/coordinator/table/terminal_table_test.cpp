@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
-#include "coordinator/table/markdown_table.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -1,5 +1,3 @@
-#include "core/statistics/bootstrap.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/statistics/interval.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/message_of.hpp"
 

@@ -45,15 +45,6 @@ inline std::vector<double> half_normal_column(std::size_t count, const Selection
   return column_of(count, selection, [](double u) { return std::abs(inverse_normal(u)); });
 }
 
-/// The rule against errors that are all there.
-inline StopCheck check_of(const StopRule& rule, std::span<const double> errors) {
-  ValuePasses passes(wanted_by(rule));
-  do {
-    for (const double error : errors) passes.add(error);
-  } while (passes.end_pass());
-  return check_stop_rule(rule, passes);
-}
-
 /// second − first, pair by pair.
 inline std::vector<double> differences_of(std::span<const double> first,
                                           std::span<const double> second) {

@@ -113,6 +113,19 @@ struct Found {
   double location = 0.0, scale = 0.0, tail = 0.0, any = 0.0;
 };
 
+/// Adds what is found of one repetition, the first parameter being the changed one.
+void add_to(Found& found, std::span<const ChangePValues> changes, double share) {
+  const auto adjusted = adjusted_changes(changes);
+  if (adjusted[0].location < significance) found.location += share;
+  if (adjusted[0].scale < significance) found.scale += share;
+  if (adjusted[0].tail < significance) found.tail += share;
+  if (std::ranges::any_of(adjusted, [](const ChangePValues& change) {
+        return std::min({change.location, change.scale, change.tail}) < significance;
+      })) {
+    found.any += share;
+  }
+}
+
 /// Nine parameters are drawn by `draw` in both campaigns, and one by `changed` in the second.
 Found found_in(const Case& one, const Draw& draw, const Draw& changed) {
   Found found;
@@ -125,14 +138,7 @@ Found found_in(const Case& one, const Draw& draw, const Draw& changed) {
       changes.push_back(compare(errors_of(one.num_first, first, draw),
                                 errors_of(one.num_second, second, i == 0 ? changed : draw)));
     }
-    const auto adjusted = adjusted_changes(changes);
-    const auto is_found = [](const ChangePValues& change) {
-      return std::min({change.location, change.scale, change.tail}) < significance;
-    };
-    if (adjusted[0].location < significance) found.location += share;
-    if (adjusted[0].scale < significance) found.scale += share;
-    if (adjusted[0].tail < significance) found.tail += share;
-    if (std::ranges::any_of(adjusted, is_found)) found.any += share;
+    add_to(found, changes, share);
   }
   return found;
 }
@@ -299,15 +305,7 @@ Found found_in_pairs(const Case& one, const Draw& draw, const Draw& change) {
       }
       changes.push_back(compare_pairs(first, second));
     }
-    const auto adjusted = adjusted_changes(changes);
-    if (adjusted[0].location < significance) found.location += share;
-    if (adjusted[0].scale < significance) found.scale += share;
-    if (adjusted[0].tail < significance) found.tail += share;
-    if (std::ranges::any_of(adjusted, [](const ChangePValues& change_of) {
-          return std::min({change_of.location, change_of.scale, change_of.tail}) < significance;
-        })) {
-      found.any += share;
-    }
+    add_to(found, changes, share);
   }
   return found;
 }

@@ -6,9 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/statistics/bootstrap.hpp"
 #include "core/statistics/comparison.hpp"
-#include "core/statistics/correlation.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
@@ -161,26 +159,6 @@ Pair correlated_pair(std::size_t n, std::uint64_t repetition) {
             test::normal_column(n, selection(repetition, 1))};
   for (std::size_t i = 0; i < n; ++i) pair.y[i] = 0.5 * pair.x[i] + std::sqrt(0.75) * pair.y[i];
   return pair;
-}
-
-TEST(IntervalCoverage, OfTheLinearCorrelation) {
-  for (const std::size_t n : {20u, 100u, 1000u}) {
-    expect_nominal(coverage(0.5, [&](std::uint64_t i) {
-      const Pair pair = correlated_pair(n, i);
-      return linear_correlation(pair.x, pair.y, 0.95)->interval;
-    }));
-  }
-}
-
-// Of jointly normal columns with correlation ½ the ranks have (6/π) asin ¼.
-TEST(IntervalCoverage, OfTheRankCorrelation) {
-  for (const std::size_t n : {20u, 100u, 1000u}) {
-    const double truth = 6.0 / std::numbers::pi * std::asin(0.25);
-    expect_nominal(coverage(truth, [&](std::uint64_t i) {
-      const Pair pair = correlated_pair(n, i);
-      return rank_correlation(pair.x, pair.y, 0.95)->interval;
-    }));
-  }
 }
 
 // Welch's case: unequal counts, unequal deviations.

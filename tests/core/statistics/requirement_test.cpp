@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,8 +28,15 @@ std::vector<double> errors_with(std::size_t num_below, std::size_t num_on_limit)
 /// The check of a number of runs that was fixed beforehand.
 RequirementCheck fixed_check(const Requirement& requirement, const std::vector<double>& errors,
                              std::uint64_t num_without_estimate) {
-  return check_requirement(requirement, errors, num_without_estimate,
-                           errors.size() + num_without_estimate);
+  const auto num_above =
+      std::ranges::count_if(errors, [&](double error) { return error >= requirement.limit; });
+  const std::uint64_t num_runs = errors.size() + num_without_estimate;
+  return check_requirement(
+      requirement,
+      {.num_runs = num_runs,
+       .num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate,
+       .num_without_estimate = num_without_estimate},
+      num_runs);
 }
 
 std::string refusal(std::string_view text) {
@@ -89,18 +98,18 @@ TEST(ParseRequirement, RefusesNumbersOutsideTheirRange) {
 // 0.99²⁹⁹ = 0.0495: 299 runs without an exceedance show it, 298 do not.
 TEST(CheckRequirement, IsMetWithEnoughRunsBelowTheLimit) {
   const RequirementCheck check = fixed_check(a_c12_99_95, errors_with(299, 0), 0);
-  EXPECT_EQ(check.verdict, Verdict::met);
+  EXPECT_EQ(check.verdict, RequirementVerdict::met);
   EXPECT_EQ(check.num_runs, 299u);
   EXPECT_EQ(check.num_exceedances, 0u);
   EXPECT_EQ(check.num_allowed, 0u);
-  EXPECT_EQ(check.bound->value, 1e-4);
+  EXPECT_EQ(check.bound_order, 1u);
   EXPECT_FALSE(check.num_runs_at_best.has_value());
 }
 
 TEST(CheckRequirement, IsUndecidedWithOneRunLess) {
   const RequirementCheck check = fixed_check(a_c12_99_95, errors_with(298, 0), 0);
-  EXPECT_EQ(check.verdict, Verdict::undecided);
-  EXPECT_FALSE(check.bound.has_value());
+  EXPECT_EQ(check.verdict, RequirementVerdict::undecided);
+  EXPECT_EQ(check.bound_order, 0u);
   // The look at 298 had no chance to be met: all of the risk is left, as for 0 runs below.
   EXPECT_EQ(check.num_runs_at_best, 377u);
   EXPECT_EQ(check.num_runs_at_this_rate, 377u);
@@ -130,9 +139,9 @@ TEST(CheckRequirement, AgreesWithItsBounds) {
         // One of one lies on the border, give or take a rounding.
         if (num_runs == 1) continue;
         const double allowed = 1.0 - tolerance.coverage;
-        EXPECT_EQ(check.verdict == Verdict::met, check.exceedance->upper <= allowed)
+        EXPECT_EQ(check.verdict == RequirementVerdict::met, check.exceedance->upper <= allowed)
             << num_exceedances << " of " << num_runs;
-        EXPECT_EQ(check.verdict == Verdict::not_met, check.exceedance->lower >= allowed)
+        EXPECT_EQ(check.verdict == RequirementVerdict::not_met, check.exceedance->lower >= allowed)
             << num_exceedances << " of " << num_runs;
       }
     }
@@ -158,7 +167,7 @@ TEST(Exceeds, IsAboutOneParameterOrAll) {
 // fixed, with which 4.90 % of the risk went: the rest is evidence of 1,043 (README.md).
 TEST(CheckRequirement, SaysHowManyRunsItTakesAfterAnExceedance) {
   const RequirementCheck check = fixed_check(a_c12_99_95, errors_with(299, 1), 0);
-  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_EQ(check.verdict, RequirementVerdict::undecided);
   EXPECT_EQ(check.num_exceedances, 1u);  // On the limit exceeds it.
   EXPECT_EQ(check.num_runs_at_best, 1137u);
   EXPECT_EQ(check.num_runs_at_this_rate, 3000u);
@@ -175,10 +184,10 @@ TEST(CheckRequirement, DecidesWithTheRunsThatItSaysIfTheRateStays) {
   EXPECT_EQ(num_then, 1350u);
   EXPECT_EQ(
       decide(tolerance, {.num_runs = num_then, .num_exceedances = num_then / 50}, 100).verdict,
-      Verdict::not_met);
+      RequirementVerdict::not_met);
   EXPECT_EQ(
       decide(tolerance, {.num_runs = num_then, .num_exceedances = num_then / 50 - 1}, 100).verdict,
-      Verdict::undecided);
+      RequirementVerdict::undecided);
 }
 
 // The same for other rates and tolerances, on either side.
@@ -192,8 +201,9 @@ TEST(CheckRequirement, FulfilsWhatItForetells) {
         if (check.num_runs_at_this_rate.value_or(100'000) >= 100'000) continue;
         const std::size_t num_then = *check.num_runs_at_this_rate;
         const std::size_t num_exceedances = num_then * num_on_limit / num_runs;
-        const auto errors = errors_with(num_then - num_exceedances, num_exceedances);
-        EXPECT_NE(check_requirement(requirement, errors, 0, num_runs).verdict, Verdict::undecided)
+        const ExceedanceCount then{.num_runs = num_then, .num_exceedances = num_exceedances};
+        EXPECT_NE(check_requirement(requirement, then, num_runs).verdict,
+                  RequirementVerdict::undecided)
             << num_on_limit << " of " << num_runs;
       }
     }
@@ -202,13 +212,13 @@ TEST(CheckRequirement, FulfilsWhatItForetells) {
 
 // P(Bin(100, 0.01) ≥ 3) = 7.9 %, ≥ 4: 1.8 %.
 TEST(CheckRequirement, IsNotMetOnceTooManyExceed) {
-  EXPECT_EQ(fixed_check(a_c12_99_95, errors_with(97, 3), 0).verdict, Verdict::undecided);
-  EXPECT_EQ(fixed_check(a_c12_99_95, errors_with(96, 4), 0).verdict, Verdict::not_met);
+  EXPECT_EQ(fixed_check(a_c12_99_95, errors_with(97, 3), 0).verdict, RequirementVerdict::undecided);
+  EXPECT_EQ(fixed_check(a_c12_99_95, errors_with(96, 4), 0).verdict, RequirementVerdict::not_met);
 }
 
 TEST(CheckRequirement, CountsRunsWithoutEstimateAsExceedances) {
   const RequirementCheck check = fixed_check(a_c12_99_95, errors_with(96, 1), 3);
-  EXPECT_EQ(check.verdict, Verdict::not_met);
+  EXPECT_EQ(check.verdict, RequirementVerdict::not_met);
   EXPECT_EQ(check.num_runs, 100u);
   EXPECT_EQ(check.num_exceedances, 4u);
 }
@@ -216,14 +226,14 @@ TEST(CheckRequirement, CountsRunsWithoutEstimateAsExceedances) {
 // As often as allowed: no number of runs decides.
 TEST(CheckRequirement, KnowsWhenNoNumberOfRunsDecides) {
   const RequirementCheck check = fixed_check(a_c12_99_95, errors_with(99, 1), 0);
-  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_EQ(check.verdict, RequirementVerdict::undecided);
   EXPECT_FALSE(check.num_runs_at_this_rate.has_value());
   EXPECT_EQ(check.num_runs_at_best, 663u);
 }
 
 TEST(CheckRequirement, OfNoRunsSaysHowManyItTakes) {
   const RequirementCheck check = fixed_check(a_c12_99_95, {}, 0);
-  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_EQ(check.verdict, RequirementVerdict::undecided);
   EXPECT_FALSE(check.exceedance.has_value());
   EXPECT_EQ(check.num_runs_at_best, 377u);
   EXPECT_EQ(check.num_runs_at_this_rate, 377u);
@@ -232,12 +242,81 @@ TEST(CheckRequirement, OfNoRunsSaysHowManyItTakes) {
 // The verdict and the tolerance bound are two ways to say the same.
 TEST(CheckRequirement, IsMetIfAndOnlyIfTheBoundIsBelowTheLimit) {
   const std::vector<double> errors = test::half_normal_column(700, {.seed = 31});
+  const double bound = wilks_upper(errors, {0.95, 0.9}, 5).value();
   for (double limit = 1.0; limit < 3.5; limit += 0.01) {
     const Requirement requirement{index(Parameter::k2c), limit, {0.95, 0.9}};
     const RequirementCheck check = fixed_check(requirement, errors, 5);
-    EXPECT_EQ(check.verdict == Verdict::met, check.bound->value < limit) << limit;
-    EXPECT_EQ(check.verdict == Verdict::met, check.num_exceedances <= check.num_allowed) << limit;
+    EXPECT_EQ(check.verdict == RequirementVerdict::met, bound < limit) << limit;
+    EXPECT_EQ(check.verdict == RequirementVerdict::met, check.num_exceedances <= check.num_allowed)
+        << limit;
   }
+}
+
+struct PublishedRuns {
+  double coverage, confidence;
+  std::vector<std::uint64_t> num_runs;  ///< For orders 1, 2, 3 ...
+};
+
+// Tables for one-sided limits: [Wilks1941] and its use in reactor safety (59, 93, 124 and on).
+TEST(WilksOrder, IsThatOfThePublishedNumbersOfRuns) {
+  const std::vector<PublishedRuns> table{
+      {0.95, 0.95, {59, 93, 124, 153, 181, 208, 234, 260, 286, 311}},
+      {0.95, 0.99, {90, 130, 165, 198, 229}},
+      {0.90, 0.95, {29, 46, 61, 76, 89, 103}},
+      {0.99, 0.95, {299, 473, 628, 773, 913}},
+      {0.99, 0.99, {459, 662, 838}}};
+  for (const PublishedRuns& row : table) {
+    for (std::size_t i = 0; i < row.num_runs.size(); ++i) {
+      const Tolerance tolerance{row.coverage, row.confidence};
+      EXPECT_EQ(wilks_order(tolerance, row.num_runs[i]), i + 1) << row.num_runs[i];
+      EXPECT_EQ(wilks_order(tolerance, row.num_runs[i] - 1), i) << row.num_runs[i];
+    }
+  }
+}
+
+// A million runs against 99.9 %: 1000 are expected above, less 1.645 deviations of 31.6.
+TEST(WilksOrder, OfAMillionRunsIsThatOfTheNormalLaw) {
+  EXPECT_NEAR(static_cast<double>(wilks_order({0.999, 0.95}, 1'000'000)), 1000.0 - 52.0, 2.0);
+}
+
+TEST(WilksUpper, IsTheValueOfItsOrder) {
+  std::vector<double> values(124);
+  for (std::size_t i = 0; i < values.size(); ++i) values[(i * 7) % 124] = static_cast<double>(i);
+  EXPECT_EQ(wilks_upper(values, {0.95, 0.95}), 121.0);  // The third of 123, 122, 121.
+}
+
+TEST(WilksUpper, CountsUnknownValuesAsTheLargest) {
+  const std::vector<double> values = test::uniform_column(122, {.seed = 4});
+  std::vector<double> with_largest = values;
+  with_largest.insert(with_largest.end(), {7.0, 7.0});
+  EXPECT_EQ(wilks_upper(values, {0.95, 0.95}, 2), wilks_upper(with_largest, {0.95, 0.95}));
+  EXPECT_FALSE(wilks_upper(values, {0.95, 0.95}, 6).has_value());
+}
+
+// The third largest of 124 is the bound: with two unknown ones that is the largest of the others,
+// with three it is unknown itself.
+TEST(WilksUpper, IsEmptyOnceUnknownValuesReachItsOrder) {
+  const std::vector<double> values = test::uniform_column(122, {.seed = 5});
+  const auto bound = wilks_upper(values, {0.95, 0.95}, 2);
+  ASSERT_TRUE(bound.has_value());
+  EXPECT_EQ(bound, *std::max_element(values.begin(), values.end()));
+  EXPECT_FALSE(wilks_upper(std::span(values).first(121), {0.95, 0.95}, 3).has_value());
+}
+
+TEST(WilksUpper, IsEmptyWithTooFewValues) {
+  EXPECT_FALSE(wilks_upper(std::vector<double>(58, 1.0), {0.95, 0.95}).has_value());
+  EXPECT_TRUE(wilks_upper(std::vector<double>(59, 1.0), {0.95, 0.95}).has_value());
+}
+
+TEST(Tolerance, RefusesFractionsOutsideTheirRange) {
+  EXPECT_EQ(test::message_of<InvalidArgument>([] {
+              (void)wilks_order({1.0, 0.95}, 10);
+            }),
+            "coverage = 1 (must be in (0, 1))");
+  EXPECT_EQ(test::message_of<InvalidArgument>([] {
+              (void)wilks_order({0.95, 0.0}, 10);
+            }),
+            "confidence = 0 (must be in (0, 1))");
 }
 
 }  // namespace

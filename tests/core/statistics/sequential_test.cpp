@@ -1,5 +1,3 @@
-#include "core/statistics/sequential.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,7 +83,7 @@ TEST(SequentialBounds, RefuseAConfidenceThatIsNone) {
   EXPECT_THROW((void)sequential_bounds(1.0, 2.0, 1.0), InvalidArgument);
 }
 
-using Rule = std::function<Verdict(const ExceedanceCount&)>;
+using Rule = std::function<RequirementVerdict(const ExceedanceCount&)>;
 
 /// What becomes of a campaign that asks a rule at the fixed run counts.
 struct Fate {
@@ -122,9 +120,9 @@ Fate fate_of(const Rule& rule, double rate, std::uint64_t num_runs_max) {
     }
     for (std::size_t k = 0; k < law.size(); ++k) {
       if (law[k] < 1e-18) continue;
-      const Verdict verdict = rule({.num_runs = n, .num_exceedances = k});
-      if (verdict == Verdict::undecided) continue;
-      (verdict == Verdict::met ? fate.met : fate.not_met) += law[k];
+      const RequirementVerdict verdict = rule({.num_runs = n, .num_exceedances = k});
+      if (verdict == RequirementVerdict::undecided) continue;
+      (verdict == RequirementVerdict::met ? fate.met : fate.not_met) += law[k];
       fate.mean_runs += law[k] * static_cast<double>(n);
       law[k] = 0.0;
     }
@@ -139,11 +137,11 @@ Fate fate_of(const Rule& rule, double rate, std::uint64_t num_runs_max) {
 
 constexpr Tolerance tolerance_99_95{.coverage = 0.99, .confidence = 0.95};
 
-Verdict decided(const ExceedanceCount& count) {
+RequirementVerdict decided(const ExceedanceCount& count) {
   return decide(tolerance_99_95, count, std::nullopt).verdict;
 }
 
-Verdict fixed_count(const ExceedanceCount& count) {
+RequirementVerdict fixed_count(const ExceedanceCount& count) {
   return decide(tolerance_99_95, count, count.num_runs).verdict;
 }
 
@@ -182,19 +180,19 @@ TEST(Decide, ComesToAnEndWhereThereIsSomethingToTell) {
 }
 
 TEST(Decide, TakesMoreRunsThanACountThatWasFixedBeforehand) {
-  EXPECT_EQ(decided({.num_runs = 376}), Verdict::undecided);
-  EXPECT_EQ(decided({.num_runs = 377}), Verdict::met);
-  EXPECT_EQ(fixed_count({.num_runs = 299}), Verdict::met);
-  EXPECT_EQ(decided({}), Verdict::undecided);
+  EXPECT_EQ(decided({.num_runs = 376}), RequirementVerdict::undecided);
+  EXPECT_EQ(decided({.num_runs = 377}), RequirementVerdict::met);
+  EXPECT_EQ(fixed_count({.num_runs = 299}), RequirementVerdict::met);
+  EXPECT_EQ(decided({}), RequirementVerdict::undecided);
 }
 
 TEST(Decide, GivesTheBoundsThatItDecidesBy) {
   const Decision decision = decide(tolerance_99_95, {.num_runs = 384}, std::nullopt);
-  EXPECT_EQ(decision.verdict, Verdict::met);
+  EXPECT_EQ(decision.verdict, RequirementVerdict::met);
   EXPECT_NEAR(decision.exceedance->upper, 0.0098126382, 1e-9);
   const Decision other =
       decide(tolerance_99_95, {.num_runs = 128, .num_exceedances = 20}, std::nullopt);
-  EXPECT_EQ(other.verdict, Verdict::not_met);
+  EXPECT_EQ(other.verdict, RequirementVerdict::not_met);
   EXPECT_NEAR(other.exceedance->lower, 0.0777337667, 1e-9);
 }
 
@@ -261,9 +259,10 @@ Report report_after(std::optional<std::uint64_t> num_fixed) {
                                    .num_exceedances = k};
       entry->second = runs_to_meet(tolerance_99_95, before, num_fixed).value_or(0);
     }
-    const bool is_met = count.num_runs == num_fixed
-                            ? decide(tolerance_99_95, count, num_fixed).verdict == Verdict::met
-                            : entry->second != 0 && entry->second <= count.num_runs;
+    const bool is_met =
+        count.num_runs == num_fixed
+            ? decide(tolerance_99_95, count, num_fixed).verdict == RequirementVerdict::met
+            : entry->second != 0 && entry->second <= count.num_runs;
     return Said{.is_met = is_met, .num_runs_next = entry->second};
   };
 }
@@ -287,7 +286,7 @@ std::uint64_t num_runs_for(std::uint64_t order, std::uint64_t num_runs) {
 
 /// What a verdict of a fixed number at each look says.
 Said said_of_fixed_count(const ExceedanceCount& count) {
-  return {.is_met = fixed_count(count) == Verdict::met,
+  return {.is_met = fixed_count(count) == RequirementVerdict::met,
           .num_runs_next = num_runs_for(count.num_exceedances + 1, count.num_runs)};
 }
 
@@ -295,7 +294,7 @@ Said said_of_fixed_count(const ExceedanceCount& count) {
 Report report_of_both() {
   return [then = report_after(std::nullopt)](const ExceedanceCount& count) {
     Said said = then(count);
-    if (count.num_runs == 299) said.is_met = fixed_count(count) == Verdict::met;
+    if (count.num_runs == 299) said.is_met = fixed_count(count) == RequirementVerdict::met;
     return said;
   };
 }
@@ -334,11 +333,11 @@ TEST(Decide, LeavesTheRestOfTheRiskToThoseWhoGoOn) {
     return decide(tolerance_99_95, {.num_runs = num_runs}, 299).verdict;
   };
   EXPECT_TRUE(decide(tolerance_99_95, {.num_runs = 299}, 299).is_of_fixed_size);
-  EXPECT_EQ(verdict_at(299), Verdict::met);
-  EXPECT_EQ(verdict_at(300), Verdict::undecided);
+  EXPECT_EQ(verdict_at(299), RequirementVerdict::met);
+  EXPECT_EQ(verdict_at(300), RequirementVerdict::undecided);
   const std::uint64_t next = *runs_to_meet(tolerance_99_95, {.num_runs = 300}, 299);
-  EXPECT_EQ(verdict_at(next - 1), Verdict::undecided);
-  EXPECT_EQ(verdict_at(next), Verdict::met);
+  EXPECT_EQ(verdict_at(next - 1), RequirementVerdict::undecided);
+  EXPECT_EQ(verdict_at(next), RequirementVerdict::met);
   EXPECT_GT(evidence_of_less(0.0, static_cast<double>(next), 0.01),
             1.0 / (0.05 - std::pow(0.99, 299.0)));
 }

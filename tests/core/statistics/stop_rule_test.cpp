@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "core/statistics/bootstrap.hpp"
+#include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
@@ -94,22 +94,22 @@ TEST(NextStopCheck, DependsOnlyOnTheListOfCounts) {
 TEST(CheckStopRule, IsReachedWhenTheIntervalIsNarrow) {
   StopRule rule = parse_stop_rule("std(a_c13) within 5%");
   const std::vector<double> errors = test::normal_column(1024, {.seed = 61});
-  const StopCheck check = test::check_of(rule, errors);
+  const StopCheck check = check_stop_rule(rule, errors);
   EXPECT_TRUE(check.is_reached);
   EXPECT_NEAR(*check.relative_half_width, 0.0433, 0.006);
   EXPECT_EQ(check.estimate, moments(errors).standard_deviation);
   EXPECT_EQ(check.interval->lower, bootstrap_deviation_interval(errors, 0.95)->lower);
 
   rule.relative_half_width = 0.03;
-  EXPECT_FALSE(test::check_of(rule, errors).is_reached);
+  EXPECT_FALSE(check_stop_rule(rule, errors).is_reached);
 }
 
 TEST(CheckStopRule, TakesTheIntervalOfItsStatistic) {
   const std::vector<double> errors = test::half_normal_column(400, {.seed = 62});
-  const StopCheck mean = test::check_of(parse_stop_rule("mean(k2c) within 9%"), errors);
+  const StopCheck mean = check_stop_rule(parse_stop_rule("mean(k2c) within 9%"), errors);
   EXPECT_EQ(mean.estimate, moments(errors).mean);
   EXPECT_EQ(mean.interval->upper, mean_interval(moments(errors), 0.95)->upper);
-  const StopCheck percentile_check = test::check_of(parse_stop_rule("p90(k2c) within 9%"), errors);
+  const StopCheck percentile_check = check_stop_rule(parse_stop_rule("p90(k2c) within 9%"), errors);
   EXPECT_EQ(percentile_check.estimate, percentile(sorted(errors), 0.9));
   EXPECT_EQ(percentile_check.interval->upper,
             percentile_interval(sorted(errors), 0.9, 0.95)->upper);
@@ -117,17 +117,17 @@ TEST(CheckStopRule, TakesTheIntervalOfItsStatistic) {
 
 TEST(CheckStopRule, IsNotReachedWithoutAnInterval) {
   const StopRule rule = parse_stop_rule("p99(k2c) within 50%");
-  const StopCheck check = test::check_of(rule, test::half_normal_column(100, {.seed = 63}));
+  const StopCheck check = check_stop_rule(rule, test::half_normal_column(100, {.seed = 63}));
   EXPECT_FALSE(check.is_reached);
   EXPECT_FALSE(check.relative_half_width.has_value());
-  EXPECT_FALSE(test::check_of(rule, std::span<const double>()).is_reached);
+  EXPECT_FALSE(check_stop_rule(rule, std::span<const double>()).is_reached);
 }
 
 // Half of 128 runs have no error at all; whether the median of all is 0 is open.
 TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
   std::vector<double> errors(66, 0.0);
   errors.resize(128, 1.0);
-  const StopCheck check = test::check_of(parse_stop_rule("p50(k2c) within 50%"), errors);
+  const StopCheck check = check_stop_rule(parse_stop_rule("p50(k2c) within 50%"), errors);
   EXPECT_EQ(check.estimate, 0.0);
   ASSERT_TRUE(check.interval.has_value());
   EXPECT_GT(check.interval->upper, 0.0);
@@ -163,7 +163,7 @@ TEST(CheckStopRule, IsReachedWhenARequirementIsDecided) {
 
 TEST(CheckStopRule, TakesAnExactZeroForKnown) {
   const StopRule rule = parse_stop_rule("std(k2c) within 5%");
-  EXPECT_TRUE(test::check_of(rule, std::vector<double>(128, 0.0)).is_reached);
+  EXPECT_TRUE(check_stop_rule(rule, std::vector<double>(128, 0.0)).is_reached);
 }
 
 }  // namespace

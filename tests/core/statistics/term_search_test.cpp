@@ -1,5 +1,3 @@
-#include "core/statistics/term_search.hpp"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/statistics/sensitivity.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/message_of.hpp"
 

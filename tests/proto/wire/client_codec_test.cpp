@@ -9,26 +9,33 @@
 
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::wire {
 namespace {
 
 constexpr std::uint64_t some_id = 0xfedc'ba98'7654'3210;
 
-template <typename Content>
-Content round_trip_request(const Content& content) {
-  const auto decoded = decode_request(encode(RequestPacket{some_id, content}));
+proto::RequestEnvelope round_trip(const proto::RequestEnvelope& request) {
+  auto decoded = decode_request(encode(test::numbered(some_id, request)));
   if (const auto* const error = std::get_if<DecodeError>(&decoded)) throw Error(error->text);
-  EXPECT_EQ(std::get<RequestPacket>(decoded).id, some_id);
-  return std::get<Content>(std::get<RequestPacket>(decoded).request);
+  EXPECT_EQ(std::get<proto::RequestEnvelope>(decoded).request_id(), some_id);
+  return std::get<proto::RequestEnvelope>(std::move(decoded));
 }
 
-template <typename Content>
-Content round_trip_reply(const Content& content) {
-  const auto decoded = decode_reply(encode(ReplyPacket{some_id, content}));
+proto::ReplyEnvelope round_trip(const proto::ReplyEnvelope& reply) {
+  auto decoded = decode_reply(encode(test::numbered(some_id, reply)));
   if (const auto* const error = std::get_if<DecodeError>(&decoded)) throw Error(error->text);
-  EXPECT_EQ(std::get<ReplyPacket>(decoded).id, some_id);
-  return std::get<Content>(std::get<ReplyPacket>(decoded).reply);
+  EXPECT_EQ(std::get<proto::ReplyEnvelope>(decoded).request_id(), some_id);
+  return std::get<proto::ReplyEnvelope>(std::move(decoded));
+}
+
+StatusReply round_trip(const StatusReply& status) {
+  return read(round_trip(test::reply_with(status)).status());
+}
+
+WorkersReply round_trip(const WorkersReply& workers) {
+  return read(round_trip(test::reply_with(workers)).workers());
 }
 
 Definition some_definition() {
@@ -40,51 +47,11 @@ Definition some_definition() {
 }
 
 TEST(SubmitRequest, KeepsTheDefinition) {
-  const SubmitRequest submit = round_trip_request(SubmitRequest{.definition = some_definition(),
-                                                                .priority = -100,
-                                                                .audit_fraction = 0.1,
-                                                                .stop_rule = "std(a_c13) within 5%",
-                                                                .failures_max = 0});
-  EXPECT_EQ(submit.priority, -100);
-  EXPECT_EQ(submit.audit_fraction, 0.1);
-  EXPECT_EQ(submit.stop_rule, "std(a_c13) within 5%");
-  EXPECT_EQ(submit.failures_max, 0U);
-  EXPECT_EQ(submit.definition, some_definition());
-  EXPECT_TRUE(std::signbit(submit.definition.tables[0].values[1]));
-}
-
-TEST(SubmitRequest, NeedsNeitherRuleNorBudget) {
-  const SubmitRequest submit = round_trip_request(SubmitRequest{.definition = some_definition()});
-  EXPECT_EQ(submit.stop_rule, "");
-  EXPECT_EQ(submit.failures_max, std::nullopt);
-}
-
-// A campaign that gets more runs keeps what the request leaves out; 0 is not the same.
-TEST(SubmitRequest, TellsZeroFromNothing) {
-  const SubmitRequest nothing = round_trip_request(SubmitRequest{.definition = some_definition()});
-  EXPECT_EQ(nothing.priority, std::nullopt);
-  EXPECT_EQ(nothing.audit_fraction, std::nullopt);
-  const SubmitRequest zero = round_trip_request(
-      SubmitRequest{.definition = some_definition(), .priority = 0, .audit_fraction = 0.0});
-  EXPECT_EQ(zero.priority, 0);
-  EXPECT_EQ(zero.audit_fraction, 0.0);
-}
-
-TEST(QuestionRequests, AreTold) {
-  (void)round_trip_request(StatusRequest{});
-  (void)round_trip_request(WorkersRequest{});
-}
-
-TEST(ControlRequest, KeepsActionAndCampaign) {
-  for (const auto action :
-       {ControlAction::pause, ControlAction::resume, ControlAction::cancel,
-        ControlAction::set_priority, ControlAction::retry, ControlAction::archive}) {
-    const auto control = round_trip_request(
-        ControlRequest{.action = action, .campaign = "hardy2013", .priority = -7});
-    EXPECT_EQ(control.priority, -7);
-    EXPECT_EQ(control.action, action);
-    EXPECT_EQ(control.campaign, "hardy2013");
-  }
+  proto::RequestEnvelope request = round_trip(test::submission(some_definition()));
+  const Definition definition = take_definition(*request.mutable_submit());
+  EXPECT_EQ(definition, some_definition());
+  EXPECT_TRUE(std::signbit(definition.tables[0].values[1]));
+  EXPECT_FALSE(request.submit().has_definition());
 }
 
 CampaignStatus some_status() {
@@ -119,51 +86,6 @@ StatusReply reply_with(const std::vector<CampaignStatus>& campaigns) {
   return reply;
 }
 
-TEST(QuestionRequests, SayWhereToBegin) {
-  EXPECT_EQ(round_trip_request(StatusRequest{.first_campaign = 512}).first_campaign, 512U);
-  EXPECT_EQ(round_trip_request(WorkersRequest{.after_worker_id = 9}).after_worker_id, 9U);
-}
-
-TEST(AnswerRequest, KeepsTheQuestion) {
-  const auto query = round_trip_request(AnswerRequest{.campaign = "a",
-                                                      .question = Question::query,
-                                                      .options = {"--format=csv", "--rows-max=3"},
-                                                      .statement = "SELECT 'Δ'"});
-  EXPECT_EQ(query.campaign, "a");
-  EXPECT_EQ(query.question, Question::query);
-  EXPECT_EQ(query.options, (std::vector<std::string>{"--format=csv", "--rows-max=3"}));
-  EXPECT_EQ(query.statement, "SELECT 'Δ'");
-  const std::string sha256 = std::string(63, '0') + "f";
-  const auto database = round_trip_request(AnswerRequest{
-      .campaign = "a", .question = Question::database, .known_size = 17, .known_sha256 = sha256});
-  EXPECT_EQ(database.known_size, 17U);
-  EXPECT_EQ(database.known_sha256, sha256);
-  const auto part = round_trip_request(AnswerPartRequest{.answer_id = some_id, .offset = 5});
-  EXPECT_EQ(part.answer_id, some_id);
-  EXPECT_EQ(part.offset, 5U);
-}
-
-TEST(AnswerReply, KeepsWhatIsToBeRead) {
-  const auto answer = round_trip_reply(AnswerReply{.answer_id = some_id,
-                                                   .size = 17,
-                                                   .sha256 = std::string(64, 'a'),
-                                                   .offset = 5,
-                                                   .exit_code = 3,
-                                                   .error_text = "wrong\n"});
-  EXPECT_EQ(answer.answer_id, some_id);
-  EXPECT_EQ(answer.size, 17U);
-  EXPECT_EQ(answer.sha256, std::string(64, 'a'));
-  EXPECT_EQ(answer.offset, 5U);
-  EXPECT_EQ(answer.exit_code, 3);
-  EXPECT_EQ(answer.error_text, "wrong\n");
-  EXPECT_EQ(round_trip_reply(AnswerPartReply{std::string("\0\xff", 2)}).content,
-            std::string("\0\xff", 2));
-}
-
-TEST(ReleaseHostRequest, KeepsTheHost) {
-  EXPECT_EQ(round_trip_request(ReleaseHostRequest{.host = "n7"}).host, "n7");
-}
-
 FactoryReport some_report() {
   return {.name = "fleet",
           .batch_system = "pbs",
@@ -188,36 +110,25 @@ void expect_some_report(const FactoryReport& report) {
   EXPECT_EQ(report.interval_s, 30U);
 }
 
-TEST(FactoryReport, KeepsEverything) { expect_some_report(round_trip_request(some_report())); }
+TEST(FactoryReport, KeepsEverything) {
+  expect_some_report(read(round_trip(test::request_of(some_report())).factory_report()));
+}
 
 // The words of a batch system may be in any language and of any length.
 TEST(FactoryReport, IsSentWithoutWhatATerminalWouldObey) {
   FactoryReport report = some_report();
   report.reason = "\x1b[2J" + std::string(5000, 'x');
-  EXPECT_EQ(round_trip_request(report).reason, "?[2J" + std::string(4092, 'x'));
-}
-
-TEST(RequestPart, KeepsItsBytes) {
-  const std::string slice("\0\xff x", 4);
-  const auto part =
-      round_trip_request(RequestPart{.total_size = 1000, .offset = 996, .slice = slice});
-  EXPECT_EQ(part.total_size, 1000U);
-  EXPECT_EQ(part.offset, 996U);
-  EXPECT_EQ(part.slice, slice);
+  EXPECT_EQ(round_trip(test::request_of(report)).factory_report().reason(),
+            "?[2J" + std::string(4092, 'x'));
 }
 
 TEST(RequestPart, OfTheLargestSizeFitsIntoAMessage) {
-  const RequestPart part{.total_size = submit_size_max,
-                         .offset = submit_size_max - request_part_size_max,
-                         .slice = std::string(request_part_size_max, 'x')};
-  const std::string bytes = encode(RequestPacket{~std::uint64_t{0}, part});
+  const proto::RequestPart part =
+      test::part(submit_size_max, submit_size_max - request_part_size_max,
+                 std::string(request_part_size_max, 'x'));
+  const std::string bytes = encode(test::numbered(~std::uint64_t{0}, test::request_of(part)));
   EXPECT_LE(bytes.size(), request_message_size_max);
-  EXPECT_TRUE(std::holds_alternative<RequestPacket>(decode_request(bytes)));
-}
-
-TEST(InterimReplies, AreTold) {
-  EXPECT_EQ(round_trip_reply(PartReply{.next_offset = 77}).next_offset, 77U);
-  (void)round_trip_reply(WaitReply{});
+  EXPECT_TRUE(std::holds_alternative<proto::RequestEnvelope>(decode_request(bytes)));
 }
 
 TEST(StatusReply, SaysWhatIsAmissAndHowMuchThereIs) {
@@ -227,7 +138,7 @@ TEST(StatusReply, SaysWhatIsAmissAndHowMuchThereIs) {
   sent.num_unserved_files = 70;
   sent.quarantined_hosts = {"n7"};
   sent.num_quarantined_hosts = 300;
-  const StatusReply status = round_trip_reply(sent);
+  const StatusReply status = round_trip(sent);
   EXPECT_EQ(status.num_campaigns, 1000U);
   ASSERT_EQ(status.unserved_files.size(), 1U);
   EXPECT_EQ(status.unserved_files[0].file, "a.db");
@@ -270,15 +181,18 @@ TEST(Replies, AreReadableWhateverTheySay) {
     const FactoryReport report{
         .name = text(), .batch_system = text(), .wait_s = number(), .reason = text()};
     status.factories = {{.report = report, .owner = text(), .silent_s = number()}};
-    EXPECT_NO_THROW((void)round_trip_reply(status));
+    EXPECT_NO_THROW((void)round_trip(status));
     const WorkerStatus worker{
         .id = {1 + below(9)}, .name = text(), .host = text(), .silent_s = number()};
-    EXPECT_NO_THROW((void)round_trip_reply(WorkersReply{.workers = {worker}, .num_workers = 1}));
-    EXPECT_NO_THROW((void)round_trip_reply(DoneReply{text()}));
-    EXPECT_NO_THROW((void)round_trip_reply(ErrorReply{text()}));
-    const std::string digest(64, '0');
-    EXPECT_NO_THROW((void)round_trip_reply(AnswerReply{
-        .answer_id = 1, .size = 9, .sha256 = digest, .exit_code = 255, .error_text = text()}));
+    EXPECT_NO_THROW((void)round_trip(WorkersReply{.workers = {worker}, .num_workers = 1}));
+    EXPECT_NO_THROW((void)round_trip(done_reply(text())));
+    EXPECT_NO_THROW((void)round_trip(error_reply(text())));
+    proto::ReplyEnvelope answer;
+    answer.mutable_answer()->set_answer_id(1);
+    answer.mutable_answer()->set_sha256(std::string(64, '0'));
+    answer.mutable_answer()->set_exit_code(255);
+    answer.mutable_answer()->set_error_text(text());
+    EXPECT_NO_THROW((void)round_trip(answer));
   }
 }
 
@@ -286,7 +200,7 @@ TEST(StatusReply, KeepsFactories) {
   StatusReply sent = reply_with({});
   sent.factories = {{.report = some_report(), .owner = "anna", .silent_s = 1.5},
                     {.report = some_report()}};
-  const StatusReply status = round_trip_reply(sent);
+  const StatusReply status = round_trip(sent);
   ASSERT_EQ(status.factories.size(), 2U);
   expect_some_report(status.factories[0].report);
   EXPECT_EQ(status.factories[0].owner, "anna");
@@ -295,13 +209,12 @@ TEST(StatusReply, KeepsFactories) {
 }
 
 TEST(StatusReply, KeepsEverything) {
-  const auto status =
-      round_trip_reply(StatusReply{.version = "0.1.0",
-                                   .model_version = "m-2",
-                                   .uptime_s = 0.3,
-                                   .num_workers = 8,
-                                   .num_slots = 9,
-                                   .campaigns = {some_status(), status_named("b")}});
+  const auto status = round_trip(StatusReply{.version = "0.1.0",
+                                             .model_version = "m-2",
+                                             .uptime_s = 0.3,
+                                             .num_workers = 8,
+                                             .num_slots = 9,
+                                             .campaigns = {some_status(), status_named("b")}});
   EXPECT_EQ(status.version, "0.1.0");
   EXPECT_EQ(status.model_version, "m-2");
   EXPECT_EQ(status.uptime_s, 0.3);
@@ -314,18 +227,13 @@ TEST(StatusReply, KeepsEverything) {
 
 TEST(StatusReply, KeepsACampaign) {
   const CampaignStatus sent = some_status();
-  const CampaignStatus campaign = round_trip_reply(reply_with({sent})).campaigns.at(0);
+  const CampaignStatus campaign = round_trip(reply_with({sent})).campaigns.at(0);
   EXPECT_EQ(campaign.name, sent.name);
   EXPECT_EQ(campaign.phase, sent.phase);
   EXPECT_EQ(campaign.priority, sent.priority);
-  EXPECT_EQ(campaign.num_runs, sent.num_runs);
-  EXPECT_EQ(campaign.num_done, sent.num_done);
-  EXPECT_EQ(campaign.num_without_estimate, sent.num_without_estimate);
-  EXPECT_EQ(campaign.num_given_up, sent.num_given_up);
-  EXPECT_EQ(campaign.num_lent, sent.num_lent);
-  EXPECT_EQ(campaign.num_duplicates, sent.num_duplicates);
-  EXPECT_EQ(campaign.num_audited, sent.num_audited);
-  EXPECT_EQ(campaign.num_mismatches, sent.num_mismatches);
+  for (const CampaignCounter& counter : campaign_counters) {
+    EXPECT_EQ(campaign.*counter.count, sent.*counter.count) << counter.name;
+  }
   EXPECT_EQ(campaign.rate_hz, sent.rate_hz);
   EXPECT_EQ(campaign.remaining_s, sent.remaining_s);
   EXPECT_EQ(campaign.storage_failure, sent.storage_failure);
@@ -333,7 +241,7 @@ TEST(StatusReply, KeepsACampaign) {
 
 TEST(StatusReply, MayNameAsManyCampaignsAsAreServed) {
   const std::vector<CampaignStatus> campaigns(campaigns_per_reply_max, some_status());
-  EXPECT_EQ(round_trip_reply(reply_with(campaigns)).campaigns.size(), campaigns_per_reply_max);
+  EXPECT_EQ(round_trip(reply_with(campaigns)).campaigns.size(), campaigns_per_reply_max);
 }
 
 TEST(StatusReply, HasRoomForAllThatItMayName) {
@@ -349,7 +257,7 @@ TEST(StatusReply, HasRoomForAllThatItMayName) {
   report.name = report.batch_system = name;
   report.reason = text;
   full.factories.assign(factories_max, {.report = report, .owner = name});
-  EXPECT_EQ(round_trip_reply(full).factories.size(), factories_max);
+  EXPECT_EQ(round_trip(full).factories.size(), factories_max);
 }
 
 TEST(WorkersReply, KeepsEverything) {
@@ -363,7 +271,7 @@ TEST(WorkersReply, KeepsEverything) {
                           .silent_s = 0.1,
                           .is_quarantined = true};
   const auto reply =
-      round_trip_reply(WorkersReply{.workers = {sent, {.id = {4}, .name = "x", .host = "y"}}});
+      round_trip(WorkersReply{.workers = {sent, {.id = {4}, .name = "x", .host = "y"}}});
   ASSERT_EQ(reply.workers.size(), 2U);
   const WorkerStatus& worker = reply.workers[0];
   EXPECT_EQ(worker.id, sent.id);
@@ -379,32 +287,31 @@ TEST(WorkersReply, KeepsEverything) {
 }
 
 TEST(TextReplies, KeepTheirText) {
-  EXPECT_EQ(round_trip_reply(DoneReply{"done\nwell"}).text, "done\nwell");
-  EXPECT_EQ(round_trip_reply(ErrorReply{"a = b (c)"}).text, "a = b (c)");
+  EXPECT_EQ(round_trip(done_reply("done\nwell")).done().text(), "done\nwell");
 }
 
 // A text may hold the path of a file, which may hold anything.
 TEST(TextReplies, AreSentWithoutWhatATerminalWouldObey) {
-  EXPECT_EQ(round_trip_reply(ErrorReply{"a\x1b[2Jb\tc\xff"
-                                        "d"})
-                .text,
-            "a?[2Jb?c?d");
+  const std::string text =
+      "a\x1b[2Jb\tc\xff"
+      "d";
+  EXPECT_EQ(round_trip(error_reply(text)).error().text(), "a?[2Jb?c?d");
 }
 
 TEST(TextReplies, AreCutToTheirLimit) {
-  EXPECT_EQ(round_trip_reply(DoneReply{std::string(5000, 'x')}).text, std::string(4096, 'x'));
+  EXPECT_EQ(round_trip(done_reply(std::string(5000, 'x'))).done().text(), std::string(4096, 'x'));
 }
 
-TEST(ReplyPacket, MayAnswerARequestThatCouldNotBeRead) {
-  const auto decoded = decode_reply(encode(ReplyPacket{0, ErrorReply{"x"}}));
-  EXPECT_EQ(std::get<ReplyPacket>(decoded).id, 0U);
+TEST(Reply, MayAnswerARequestThatCouldNotBeRead) {
+  const auto decoded = decode_reply(encode(error_reply("x")));
+  EXPECT_EQ(std::get<proto::ReplyEnvelope>(decoded).request_id(), 0U);
 }
 
-TEST(RequestPacket, OfTooManyBytesIsNotMade) {
+TEST(Request, OfTooManyBytesIsNotMade) {
   Definition definition = some_definition();
   definition.table_columns = {std::vector<double>(std::size_t{1} << 23), {}};
   try {
-    (void)encode(RequestPacket{1, SubmitRequest{.definition = definition}});
+    (void)encode(test::submission(definition));
     FAIL();
   } catch (const InvalidArgument& error) {
     const std::string text = error.what();

@@ -8,8 +8,8 @@
 #include <string>
 #include <variant>
 
-#include "proto/client.pb.h"
 #include "proto/wire/client_codec.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -29,10 +29,10 @@ DecodeError refusal_of_reply(const std::string& bytes) {
 }
 
 /// Why the request is refused after the change.
-std::string refusal(const ClientRequest& good,
+std::string refusal(const proto::RequestEnvelope& good,
                     const std::function<void(proto::RequestEnvelope&)>& change) {
   proto::RequestEnvelope envelope;
-  EXPECT_TRUE(envelope.ParseFromString(encode(RequestPacket{1, good})));
+  EXPECT_TRUE(envelope.ParseFromString(encode(test::numbered(1, good))));
   EXPECT_EQ(refusal_of_request(envelope.SerializeAsString()).text, "accepted");
   change(envelope);
   const DecodeError error = refusal_of_request(envelope.SerializeAsString());
@@ -40,10 +40,10 @@ std::string refusal(const ClientRequest& good,
   return error.text;
 }
 
-std::string refusal(const ClientReply& good,
+std::string refusal(const proto::ReplyEnvelope& good,
                     const std::function<void(proto::ReplyEnvelope&)>& change) {
   proto::ReplyEnvelope envelope;
-  EXPECT_TRUE(envelope.ParseFromString(encode(ReplyPacket{1, good})));
+  EXPECT_TRUE(envelope.ParseFromString(encode(test::numbered(1, good))));
   EXPECT_EQ(refusal_of_reply(envelope.SerializeAsString()).text, "accepted");
   change(envelope);
   const DecodeError error = refusal_of_reply(envelope.SerializeAsString());
@@ -52,12 +52,12 @@ std::string refusal(const ClientReply& good,
 }
 
 std::string refusal_of_submit(const std::function<void(proto::SubmitRequest&)>& change) {
-  return refusal(SubmitRequest{.definition = {.text = "a"}},
+  return refusal(test::submission({.text = "a"}),
                  [&](auto& envelope) { change(*envelope.mutable_submit()); });
 }
 
 std::string refusal_of_control(const std::function<void(proto::ControlRequest&)>& change) {
-  return refusal(ControlRequest{.action = ControlAction::pause, .campaign = "a"},
+  return refusal(test::control(ControlAction::pause, "a"),
                  [&](auto& envelope) { change(*envelope.mutable_control()); });
 }
 
@@ -70,7 +70,8 @@ std::string refusal_of_status(const std::function<void(proto::StatusReply&)>& ch
   good.version = "v";
   good.model_version = "m";
   good.campaigns = {campaign};
-  return refusal(good, [&](auto& envelope) { change(*envelope.mutable_status()); });
+  return refusal(test::reply_with(good),
+                 [&](auto& envelope) { change(*envelope.mutable_status()); });
 }
 
 std::string refusal_of_campaign(const std::function<void(proto::CampaignStatus&)>& change) {
@@ -79,7 +80,7 @@ std::string refusal_of_campaign(const std::function<void(proto::CampaignStatus&)
 
 std::string refusal_of_worker(const std::function<void(proto::WorkerStatus&)>& change) {
   const WorkersReply good{.workers = {{.id = {1}, .name = "w", .host = "h"}}};
-  return refusal(good,
+  return refusal(test::reply_with(good),
                  [&](auto& envelope) { change(*envelope.mutable_workers()->mutable_workers(0)); });
 }
 
@@ -108,12 +109,12 @@ TEST(MalformedRequest, MayBeLargeForACampaignOnly) {
 }
 
 std::string refusal_of_part(const std::function<void(proto::RequestPart&)>& change) {
-  return refusal(RequestPart{.total_size = 10, .offset = 4, .slice = "abc"},
+  return refusal(test::request_of(test::part(10, 4, "abc")),
                  [&](auto& envelope) { change(*envelope.mutable_part()); });
 }
 
 std::string refusal_of_question(const std::function<void(proto::AnswerRequest&)>& change) {
-  return refusal(AnswerRequest{.campaign = "a", .question = Question::query, .statement = "x"},
+  return refusal(test::question(proto::QUESTION_QUERY, {}, "x"),
                  [&](auto& envelope) { change(*envelope.mutable_answer()); });
 }
 
@@ -168,13 +169,14 @@ TEST(MalformedPart, MustNotBeLargerThanAMessage) {
 }
 
 TEST(MalformedRelease, MustNameAHost) {
-  EXPECT_EQ(refusal(ReleaseHostRequest{.host = "n7"},
+  EXPECT_EQ(refusal(test::release("n7"),
                     [](auto& envelope) { envelope.mutable_release_host()->set_host("a b"); }),
             "host = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 std::string refusal_of_report(const std::function<void(proto::FactoryReport&)>& change) {
-  return refusal(FactoryReport{.name = "fleet", .batch_system = "pbs", .interval_s = 30},
+  const FactoryReport good{.name = "fleet", .batch_system = "pbs", .interval_s = 30};
+  return refusal(test::request_of(good),
                  [&](auto& envelope) { change(*envelope.mutable_factory_report()); });
 }
 
@@ -205,7 +207,7 @@ std::string refusal_of_factory(const std::function<void(proto::FactoryStatus&)>&
   good.version = "v";
   good.model_version = "m";
   good.factories = {{.report = {.name = "fleet", .batch_system = "pbs", .interval_s = 30}}};
-  return refusal(good,
+  return refusal(test::reply_with(good),
                  [&](auto& envelope) { change(*envelope.mutable_status()->mutable_factories(0)); });
 }
 
@@ -265,14 +267,17 @@ TEST(MalformedRequest, WithoutContentIsRefused) {
 }
 
 TEST(MalformedRequest, HasANumber) {
-  EXPECT_EQ(refusal(StatusRequest{}, [](auto& envelope) { envelope.clear_request_id(); }),
+  EXPECT_EQ(refusal(status_request(), [](auto& envelope) { envelope.clear_request_id(); }),
             "request_id = 0 (must not be 0)");
 }
 
 TEST(MalformedRequest, OfAWorkerIsRefused) {
-  const std::string bye =
-      encode(Packet{.header = {.session = {1}, .epoch = {}, .sequence = 1}, .message = Bye{}});
-  EXPECT_NE(refusal_of_request(bye).text, "accepted");
+  proto::Envelope worker;
+  worker.set_protocol_version(protocol_version);
+  worker.set_session(1);
+  worker.set_sequence(1);
+  worker.mutable_bye()->set_reason(proto::LOSS_REASON_DRAINED);
+  EXPECT_NE(refusal_of_request(worker.SerializeAsString()).text, "accepted");
 }
 
 TEST(MalformedReply, OfTooManyBytesIsRefusedUnread) {
@@ -408,16 +413,16 @@ TEST(MalformedTexts, AreBoundedAndHarmlessToATerminal) {
   EXPECT_EQ(refusal_of_campaign(
                 [](auto& campaign) { campaign.set_storage_failure(std::string(4097, 'x')); }),
             "storage_failure = 4097 bytes (must be at most 4096)");
+  EXPECT_EQ(refusal(done_reply("a"),
+                    [](auto& envelope) { envelope.mutable_done()->set_text("\x1b[2J"); }),
+            "text = 4 bytes (must be printable ASCII and line ends)");
   EXPECT_EQ(
-      refusal(DoneReply{"a"}, [](auto& envelope) { envelope.mutable_done()->set_text("\x1b[2J"); }),
-      "text = 4 bytes (must be printable ASCII and line ends)");
-  EXPECT_EQ(
-      refusal(ErrorReply{"a"}, [](auto& envelope) { envelope.mutable_error()->set_text("\r"); }),
+      refusal(error_reply("a"), [](auto& envelope) { envelope.mutable_error()->set_text("\r"); }),
       "text = 1 bytes (must be printable ASCII and line ends)");
 }
 
 TEST(MalformedWorkersReply, NamesABoundedNumberOfWorkers) {
-  EXPECT_EQ(refusal(WorkersReply{},
+  EXPECT_EQ(refusal(test::reply_with(WorkersReply{}),
                     [](auto& envelope) {
                       for (int i = 0; i < 4097; ++i) envelope.mutable_workers()->add_workers();
                     }),

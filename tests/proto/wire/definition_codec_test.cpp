@@ -28,9 +28,9 @@ TEST(EncodedDefinition, GivesPartsThatMakeTheWhole) {
   std::size_t num_parts = 0;
   Progress progress = Progress::advanced;
   while (progress == Progress::advanced) {
-    const DefinitionPart part = encoded.part({.campaign = {5}, .offset = incoming.num_bytes()});
-    EXPECT_EQ(part.campaign, CampaignId{5});
-    EXPECT_LE(part.content.size(), definition_part_size_max);
+    const proto::DefinitionPart part = encoded.part({5}, incoming.num_bytes());
+    EXPECT_EQ(part.campaign(), 5U);
+    EXPECT_LE(part.content().size(), definition_part_size_max);
     progress = incoming.add(part);
     ++num_parts;
   }
@@ -43,13 +43,13 @@ TEST(EncodedDefinition, GivesPartsThatMakeTheWhole) {
 
 TEST(EncodedDefinition, GivesItsFirstPartToAWorkerThatHasMoreThanThereIs) {
   const EncodedDefinition encoded(small_definition);
-  EXPECT_EQ(encoded.part({.campaign = {5}, .offset = encoded.size()}).offset, 0U);
+  EXPECT_EQ(encoded.part({5}, encoded.size()).offset(), 0U);
 }
 
 TEST(IncomingDefinition, IgnoresWhatItHas) {
   const EncodedDefinition encoded(large_definition());
   IncomingDefinition incoming;
-  const DefinitionPart first = encoded.part({.campaign = {5}, .offset = 0});
+  const proto::DefinitionPart first = encoded.part({5}, 0);
   EXPECT_EQ(incoming.add(first), Progress::advanced);
   EXPECT_EQ(incoming.add(first), Progress::ignored);
   EXPECT_EQ(incoming.num_bytes(), definition_part_size_max);
@@ -61,15 +61,14 @@ TEST(IncomingDefinition, DoesNotMixTwoVersions) {
   const EncodedDefinition new_version(large_definition(2e-8));
   ASSERT_EQ(old_version.size(), new_version.size());
   IncomingDefinition incoming;
-  EXPECT_EQ(incoming.add(old_version.part({.campaign = {5}, .offset = 0})), Progress::advanced);
-  EXPECT_EQ(incoming.add(new_version.part({.campaign = {5}, .offset = incoming.num_bytes()})),
-            Progress::advanced);
+  EXPECT_EQ(incoming.add(old_version.part({5}, 0)), Progress::advanced);
+  EXPECT_EQ(incoming.add(new_version.part({5}, incoming.num_bytes())), Progress::advanced);
   EXPECT_EQ(incoming.num_bytes(), 0U);
 }
 
 TEST(IncomingDefinition, RefusesDamagedBytes) {
-  DefinitionPart part = EncodedDefinition(small_definition).part({.campaign = {5}, .offset = 0});
-  part.content.back() ^= 1;
+  proto::DefinitionPart part = EncodedDefinition(small_definition).part({5}, 0);
+  part.mutable_content()->back() ^= 1;
   IncomingDefinition incoming;
   ASSERT_EQ(incoming.add(part), Progress::complete);
   const auto taken = incoming.take();

@@ -1,6 +1,14 @@
 // What a peer may not send: each rule of the decoder, broken by one change of a good message.
 
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <iterator>
+#include <regex>
+
 #include "tests/proto/wire/refusal.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::wire {
@@ -10,57 +18,24 @@ using test::nan;
 using test::refusal;
 using test::refusal_of;
 
-const Hello good_hello{.worker_name = "w",
-                       .host = "h",
-                       .process_id = 1,
-                       .num_slots = 1,
-                       .model_version = "m",
-                       .build = "b",
-                       .reference_digest = 1,
-                       .former = FormerSession{.session = {1}}};
-const RunLease good_lease{.campaign = {1},
-                          .runs = {.first = {0}, .count = 2},
-                          .attempt = {1},
-                          .is_alone = false,
-                          .table_values = {1.0, 2.0}};
-const Welcome good_welcome{.worker = {1}, .heartbeat_interval_s = 1.0};
-const DefinitionPart good_part{
-    .campaign = {1}, .offset = 2, .total_size = 5, .checksum = 1, .content = "abc"};
-const ResultBatch good_batch{.campaign = {1},
-                             .attempt = {1},
-                             .results = {ComputedRun{.result = proofmass::test::zero_result({})}}};
-const HeldRuns good_runs{.campaign = {1}, .attempt = {1}, .ranges = {{.first = {0}, .count = 1}}};
-const GiveBack good_give_back{.reason = LossReason::drained, .runs = {good_runs}};
-const Heartbeat good_heartbeat{
-    .num_runs_max = 1,
-    .num_steps_done = 0,
-    .held = {good_runs},
-    .computing = {{.campaign = {1}, .ranges = good_runs.ranges, .num_steps_done = 1}}};
+using namespace proofmass::test;
 
-std::string refusal_of_hello(const std::function<void(proto::Hello&)>& change) {
-  return refusal(good_hello, [&](auto& envelope) { change(*envelope.mutable_hello()); });
-}
-std::string refusal_of_lease(const std::function<void(proto::RunLease&)>& change) {
-  return refusal(good_lease, [&](auto& envelope) { change(*envelope.mutable_run_lease()); });
-}
-std::string refusal_of_batch(const std::function<void(proto::ResultBatch&)>& change) {
-  return refusal(good_batch, [&](auto& envelope) { change(*envelope.mutable_result_batch()); });
-}
+const proto::Hello good_hello = [] {
+  proto::Hello hello = make_hello("w", "h", 1, "m");
+  *hello.mutable_former() = make_former({1});
+  return hello;
+}();
+const auto good_lease = make_lease({1}, {{0}, 2}, {1}, {1.0, 2.0});
+const auto good_welcome = make_welcome({1}, 1.0);
+const auto good_part = make_part({1}, 2, 5, 1, "abc");
+const auto good_batch = make_result_batch({1}, {1}, {{.result = zero_result({})}});
+const std::vector<RunRange> good_runs{{{0}, 1}};
+const auto good_give_back = make_give_back(LossReason::drained, {make_held({1}, {1}, good_runs)});
+const auto good_heartbeat =
+    make_heartbeat(1, {make_held({1}, {1}, good_runs)}, {make_computed_batch({1}, good_runs, 1)});
+
 std::string refusal_of_run(const std::function<void(proto::ComputedRun&)>& change) {
-  return refusal_of_batch([&](auto& batch) { change(*batch.mutable_results(0)); });
-}
-std::string refusal_of_welcome(const std::function<void(proto::Welcome&)>& change) {
-  return refusal(good_welcome, [&](auto& envelope) { change(*envelope.mutable_welcome()); });
-}
-std::string refusal_of_heartbeat(const std::function<void(proto::Heartbeat&)>& change) {
-  return refusal(good_heartbeat, [&](auto& envelope) { change(*envelope.mutable_heartbeat()); });
-}
-std::string refusal_of_give_back(const std::function<void(proto::GiveBack&)>& change) {
-  return refusal(good_give_back, [&](auto& envelope) { change(*envelope.mutable_give_back()); });
-}
-
-std::string refusal_of_part(const std::function<void(proto::DefinitionPart&)>& change) {
-  return refusal(good_part, [&](auto& envelope) { change(*envelope.mutable_definition_part()); });
+  return refusal(good_batch, [&](auto& batch) { change(*batch.mutable_results(0)); });
 }
 
 // Envelopes.
@@ -106,180 +81,172 @@ TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
 }
 
 TEST(MalformedEnvelope, HasASession) {
-  EXPECT_EQ(refusal(good_welcome, [](auto& envelope) { envelope.clear_session(); }),
+  EXPECT_EQ(refusal(in_envelope(good_welcome), [](auto& envelope) { envelope.clear_session(); }),
             "session = 0 (must not be 0)");
+}
+
+TEST(MalformedEnvelope, HasOneMessage) {
+  EXPECT_EQ(refusal(in_envelope(good_welcome), [](auto& envelope) { envelope.mutable_bye(); }),
+            "message = two (must be one)");
 }
 
 // Hello, Reject, ResultAck.
 
 TEST(MalformedHello, HasNamesThatMayBeLogged) {
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_worker_name("a b"); }),
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_worker_name("a b"); }),
             "worker_name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_host(""); }),
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_host(""); }),
             "host = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(
-      refusal_of_hello([](auto& hello) { hello.set_model_version("\n"); }),
+      refusal(good_hello, [](auto& hello) { hello.set_model_version("\n"); }),
       "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_build("1 2"); }),
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_build("1 2"); }),
             "build = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 TEST(MalformedHello, SaysOnlyOfACrashHowTheFormerProcessEnded) {
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.mutable_former()->clear_session(); }),
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.mutable_former()->clear_session(); }),
             "former session = 0 (must not be 0)");
-  EXPECT_EQ(refusal_of_hello(
-                [](auto& hello) { hello.mutable_former()->set_reason(proto::LOSS_REASON_SILENT); }),
-            "reason = 1 (must be one that this message may give)");
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.mutable_former()->set_signal(65); }),
+  EXPECT_EQ(
+      refusal(good_hello,
+              [](auto& hello) { hello.mutable_former()->set_reason(proto::LOSS_REASON_SILENT); }),
+      "reason = 1 (must be one that this message may give)");
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.mutable_former()->set_signal(65); }),
             "former signal = 65 (must be in [0, 64])");
 }
 
 TEST(MalformedHello, HasSlots) {
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_num_slots(0); }),
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(0); }),
             "num_slots = 0 (must be in [1, 4096])");
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_num_slots(4097); }),
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(4097); }),
             "num_slots = 4097 (must be in [1, 4096])");
 }
 
 TEST(MalformedReject, HasAKnownReasonAndABoundedText) {
-  const Reject good{.reason = RejectReason::full, .text = ""};
-  EXPECT_EQ(refusal(good, [](auto& envelope) { envelope.mutable_reject()->clear_reason(); }),
+  const auto good = make_reject(proto::REJECT_REASON_FULL);
+  EXPECT_EQ(refusal(good, [](auto& reject) { reject.clear_reason(); }),
             "reason = 0 (must be in [1, 6])");
-  EXPECT_EQ(
-      refusal(good,
-              [](auto& envelope) { envelope.mutable_reject()->set_text(std::string(4097, 'x')); }),
-      "text = 4097 bytes (must be at most 4096)");
+  EXPECT_EQ(refusal(good, [](auto& reject) { reject.set_text(std::string(4097, 'x')); }),
+            "text = 4097 bytes (must be at most 4096)");
 }
 
 TEST(MalformedResultAck, NamesRuns) {
-  const ResultAck good{.campaign = {1}, .runs = {{1}}};
-  EXPECT_EQ(refusal(good, [](auto& envelope) { envelope.mutable_result_ack()->clear_runs(); }),
+  const auto good = make_ack({1}, {{1}});
+  EXPECT_EQ(refusal(good, [](auto& ack) { ack.clear_runs(); }),
             "runs = 0 entries (must be in [1, 4096])");
-  EXPECT_EQ(
-      refusal(good, [](auto& envelope) { envelope.mutable_result_ack()->add_runs(1'000'000'000); }),
-      "run = 1000000000 (must be in [0, 999999999])");
+  EXPECT_EQ(refusal(good, [](auto& ack) { ack.add_runs(1'000'000'000); }),
+            "run = 1000000000 (must be in [0, 999999999])");
 }
 
 TEST(MalformedDefinitionPart, LiesWithinTheWhole) {
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(0); }),
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_total_size(0); }),
             "total_size = 0 (must be in [1, 67108864])");
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(definition_size_max + 1); }),
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_total_size(definition_size_max + 1); }),
             "total_size = 67108865 (must be in [1, 67108864])");
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(2); }),
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_total_size(2); }),
             "content size = 3 (must be in [1, 2])");
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(3); }),
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_offset(3); }),
             "offset = 3 (must be in [0, 2])");
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(~0ULL); }),
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_offset(~0ULL); }),
             "offset = 18446744073709551615 (must be in [0, 2])");
 }
 
 TEST(MalformedDefinitionPart, HasABoundedContent) {
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.clear_content(); }),
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.clear_content(); }),
             "content size = 0 (must be in [1, 5])");
-  EXPECT_EQ(refusal_of_part([](auto& part) {
-              part.set_total_size(definition_size_max);
-              part.set_content(std::string(definition_part_size_max + 1, 'x'));
-            }),
+  EXPECT_EQ(refusal(good_part,
+                    [](auto& part) {
+                      part.set_total_size(definition_size_max);
+                      part.set_content(std::string(definition_part_size_max + 1, 'x'));
+                    }),
             "content size = 262145 (must be in [1, 262144])");
 }
 
 TEST(MalformedCampaignRequest, AsksForAPartThatMayExist) {
-  EXPECT_EQ(refusal(CampaignRequest{.campaign = {1}},
-                    [](auto& envelope) {
-                      envelope.mutable_campaign_request()->set_offset(definition_size_max);
-                    }),
-            "offset = 67108864 (must be in [0, 67108863])");
+  EXPECT_EQ(
+      refusal(make_request({1}), [](auto& request) { request.set_offset(definition_size_max); }),
+      "offset = 67108864 (must be in [0, 67108863])");
 }
 
 TEST(MalformedForget, HasANumberOfRuns) {
   const auto with = [](std::uint64_t num_runs) {
-    return refusal(Forget{.campaign = {1}},
-                   [&](auto& envelope) { envelope.mutable_forget()->set_num_runs(num_runs); });
+    return refusal(make_forget({1}), [&](auto& forget) { forget.set_num_runs(num_runs); });
   };
   EXPECT_EQ(with(0), "num_runs = 0 (must be in [1, 1000000000])");
   EXPECT_EQ(with(num_runs_max + 1), "num_runs = 1000000001 (must be in [1, 1000000000])");
 }
 
 TEST(MalformedNotServed, HasRangesOfRuns) {
-  const NotServed good{.campaign = {1}, .ranges = good_runs.ranges};
-  EXPECT_EQ(refusal(good,
-                    [](auto& envelope) {
-                      envelope.mutable_not_served()->mutable_ranges(0)->set_count(0);
-                    }),
+  const auto good = make_not_served({1}, good_runs);
+  EXPECT_EQ(refusal(good, [](auto& not_served) { not_served.mutable_ranges(0)->set_count(0); }),
             "range count = 0 (must be in [1, 1000000000])");
   EXPECT_EQ(refusal(good,
-                    [](auto& envelope) {
-                      for (int i = 0; i < 4096; ++i) {
-                        envelope.mutable_not_served()->add_ranges()->set_count(1);
-                      }
+                    [](auto& not_served) {
+                      for (int i = 0; i < 4096; ++i) not_served.add_ranges()->set_count(1);
                     }),
             "ranges = 4097 entries (must be in [1, 4096])");
 }
 
 TEST(MalformedCampaignNumber, IsNotZero) {
   const std::string text = "campaign = 0 (must not be 0)";
-  EXPECT_EQ(refusal(CampaignRequest{.campaign = {1}},
-                    [](auto& envelope) { envelope.mutable_campaign_request()->clear_campaign(); }),
+  EXPECT_EQ(refusal(make_request({1}), [](auto& request) { request.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(good_part, [](auto& part) { part.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(make_not_served({1}), [](auto& not_served) { not_served.clear_campaign(); }),
             text);
-  EXPECT_EQ(refusal_of_part([](auto& part) { part.clear_campaign(); }), text);
-  EXPECT_EQ(refusal(NotServed{.campaign = {1}, .ranges = {}},
-                    [](auto& envelope) { envelope.mutable_not_served()->clear_campaign(); }),
+  EXPECT_EQ(refusal(make_forget({1}), [](auto& forget) { forget.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(make_ack({1}, {{1}}), [](auto& ack) { ack.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(make_retract({1}, good_runs), [](auto& retract) { retract.clear_campaign(); }),
             text);
-  EXPECT_EQ(refusal(Forget{.campaign = {1}},
-                    [](auto& envelope) { envelope.mutable_forget()->clear_campaign(); }),
-            text);
-  EXPECT_EQ(refusal(ResultAck{.campaign = {1}, .runs = {{1}}},
-                    [](auto& envelope) { envelope.mutable_result_ack()->clear_campaign(); }),
-            text);
-  EXPECT_EQ(refusal(Retract{.campaign = {1}, .ranges = good_runs.ranges},
-                    [](auto& envelope) { envelope.mutable_retract()->clear_campaign(); }),
-            text);
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.clear_campaign(); }), text);
-  EXPECT_EQ(refusal_of_batch([](auto& batch) { batch.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(good_batch, [](auto& batch) { batch.clear_campaign(); }), text);
   EXPECT_EQ(
-      refusal_of_heartbeat([](auto& heartbeat) { heartbeat.mutable_held(0)->clear_campaign(); }),
+      refusal(good_heartbeat, [](auto& heartbeat) { heartbeat.mutable_held(0)->clear_campaign(); }),
       text);
-  EXPECT_EQ(refusal_of_heartbeat(
-                [](auto& heartbeat) { heartbeat.mutable_computing(0)->clear_campaign(); }),
+  EXPECT_EQ(refusal(good_heartbeat,
+                    [](auto& heartbeat) { heartbeat.mutable_computing(0)->clear_campaign(); }),
             text);
 }
 
 // Heartbeat, GiveBack, Retract, Bye.
 
 TEST(MalformedHeartbeat, HasABoundedCredit) {
-  EXPECT_EQ(refusal_of_heartbeat([](auto& heartbeat) { heartbeat.set_num_runs_max(4097); }),
+  EXPECT_EQ(refusal(good_heartbeat, [](auto& heartbeat) { heartbeat.set_num_runs_max(4097); }),
             "num_runs_max = 4097 (must be in [0, 4096])");
 }
 
 TEST(MalformedHeartbeat, HasABoundedNumberOfRanges) {
-  EXPECT_EQ(refusal_of_heartbeat([](auto& heartbeat) {
-              for (int i = 0; i < 4096; ++i) *heartbeat.add_held() = heartbeat.held(0);
-            }),
+  EXPECT_EQ(refusal(good_heartbeat,
+                    [](auto& heartbeat) {
+                      for (int i = 0; i < 4096; ++i) *heartbeat.add_held() = heartbeat.held(0);
+                    }),
             "held = 4097 entries (must be in [0, 4096])");
-  EXPECT_EQ(refusal_of_heartbeat([](auto& heartbeat) {
-              for (int i = 0; i < 4096; ++i) *heartbeat.add_computing() = heartbeat.computing(0);
-            }),
+  EXPECT_EQ(refusal(good_heartbeat,
+                    [](auto& heartbeat) {
+                      for (int i = 0; i < 4096; ++i)
+                        *heartbeat.add_computing() = heartbeat.computing(0);
+                    }),
             "computing = 4097 entries (must be in [0, 4096])");
   const auto fill = [](auto& ranges) {
     for (int i = 0; i < 4095; ++i) *ranges.Add() = ranges.Get(0);
   };
   const std::string text = "number of ranges = 4097 (must be in [0, 4096])";
-  EXPECT_EQ(refusal_of_heartbeat([&](auto& heartbeat) {
-              *heartbeat.add_held() = heartbeat.held(0);
-              fill(*heartbeat.mutable_held(1)->mutable_ranges());
-            }),
+  EXPECT_EQ(refusal(good_heartbeat,
+                    [&](auto& heartbeat) {
+                      *heartbeat.add_held() = heartbeat.held(0);
+                      fill(*heartbeat.mutable_held(1)->mutable_ranges());
+                    }),
             text);
-  EXPECT_EQ(refusal_of_heartbeat([&](auto& heartbeat) {
-              *heartbeat.add_computing() = heartbeat.computing(0);
-              fill(*heartbeat.mutable_computing(1)->mutable_ranges());
-            }),
+  EXPECT_EQ(refusal(good_heartbeat,
+                    [&](auto& heartbeat) {
+                      *heartbeat.add_computing() = heartbeat.computing(0);
+                      fill(*heartbeat.mutable_computing(1)->mutable_ranges());
+                    }),
             text);
 }
 
 TEST(MalformedRanges, AreThereAndWithinAnyCampaign) {
   const auto with = [](const std::function<void(proto::Retract&)>& change) {
-    return refusal(Retract{.campaign = {1}, .ranges = good_runs.ranges},
-                   [&](auto& envelope) { change(*envelope.mutable_retract()); });
+    return refusal(make_retract({1}, good_runs), change);
   };
   EXPECT_EQ(with([](auto& retract) { retract.clear_ranges(); }),
             "ranges = 0 entries (must be in [1, 4096])");
@@ -296,54 +263,53 @@ TEST(MalformedRanges, AreThereAndWithinAnyCampaign) {
 }
 
 TEST(MalformedGiveBack, SaysWhatAndWhy) {
-  EXPECT_EQ(refusal_of_give_back([](auto& give_back) { give_back.clear_runs(); }),
+  EXPECT_EQ(refusal(good_give_back, [](auto& give_back) { give_back.clear_runs(); }),
             "runs = 0 entries (must be in [1, 4096])");
-  EXPECT_EQ(refusal_of_give_back([](auto& give_back) { give_back.clear_reason(); }),
+  EXPECT_EQ(refusal(good_give_back, [](auto& give_back) { give_back.clear_reason(); }),
             "reason = 0 (must be one that this message may give)");
-  EXPECT_EQ(refusal_of_give_back(
-                [](auto& give_back) { give_back.set_reason(proto::LOSS_REASON_CRASHED); }),
+  EXPECT_EQ(refusal(good_give_back,
+                    [](auto& give_back) { give_back.set_reason(proto::LOSS_REASON_CRASHED); }),
             "reason = 2 (must be one that this message may give)");
   EXPECT_EQ(
-      refusal_of_give_back([](auto& give_back) { give_back.mutable_runs(0)->clear_attempt(); }),
+      refusal(good_give_back, [](auto& give_back) { give_back.mutable_runs(0)->clear_attempt(); }),
       "attempt = 0 (must not be 0)");
 }
 
 TEST(MalformedBye, SaysWhy) {
-  EXPECT_EQ(
-      refusal(Bye{.reason = LossReason::drained},
-              [](auto& envelope) { envelope.mutable_bye()->set_reason(proto::LOSS_REASON_HUNG); }),
-      "reason = 4 (must be one that this message may give)");
+  EXPECT_EQ(refusal(make_bye(LossReason::drained),
+                    [](auto& bye) { bye.set_reason(proto::LOSS_REASON_HUNG); }),
+            "reason = 4 (must be one that this message may give)");
 }
 
 // RunLease.
 
 TEST(MalformedRunLease, HasAnAttempt) {
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.set_attempt(0); }),
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_attempt(0); }),
             "attempt = 0 (must not be 0)");
 }
 
 TEST(MalformedRunLease, HasRunsThatExist) {
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.set_num_runs(0); }),
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_num_runs(0); }),
             "num_runs = 0 (must be in [1, 4096])");
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.set_num_runs(4097); }),
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_num_runs(4097); }),
             "num_runs = 4097 (must be in [1, 4096])");
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.set_first_run(999'999'999); }),
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_first_run(999'999'999); }),
             "first_run = 999999999 (must be in [0, 999999998])");
 }
 
 TEST(MalformedRunLease, HasFiniteTableValuesForEachRun) {
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.add_table_values(1.0); }),
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.add_table_values(1.0); }),
             "table_values = 3 entries (must be the same number for each run, at most 60)");
-  EXPECT_EQ(refusal_of_lease([](auto& lease) { lease.set_table_values(0, nan); }),
+  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_table_values(0, nan); }),
             "table_values = not finite (must be finite)");
 }
 
 // ResultBatch.
 
 TEST(MalformedResultBatch, HasAttemptAndResults) {
-  EXPECT_EQ(refusal_of_batch([](auto& batch) { batch.set_attempt(0); }),
+  EXPECT_EQ(refusal(good_batch, [](auto& batch) { batch.set_attempt(0); }),
             "attempt = 0 (must not be 0)");
-  EXPECT_EQ(refusal_of_batch([](auto& batch) { batch.clear_results(); }),
+  EXPECT_EQ(refusal(good_batch, [](auto& batch) { batch.clear_results(); }),
             "results = 0 entries (must be in [1, 4096])");
 }
 
@@ -404,14 +370,46 @@ TEST(MalformedComputedRun, HasFiniteNumbers) {
             "elapsed_s = -1 (must be >= 0)");
 }
 
+// The protocol's file names the limits, and texts for people have the numbers.
+TEST(LimitsOfMessages, AreInDocumentsAsTheyAreInTheCode) {
+  const auto content = [](const std::string& file) {
+    std::ifstream stream(std::string(PROOFMASS_SOURCE_DIR "/") + file);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  std::string headers;
+  for (const char* const file :
+       {"proto/wire/messages.hpp", "core/campaign/definition.hpp", "core/runs.hpp"}) {
+    headers += content(file);
+  }
+  const std::string messages = content("proto/proofmass.proto");
+  const std::regex limit("//[^\n]*?([a-z_]+_max)\\b");
+  std::size_t num_limits = 0;
+  for (std::sregex_iterator next(messages.begin(), messages.end(), limit), end; next != end;
+       ++next, ++num_limits) {
+    EXPECT_THAT(headers, testing::HasSubstr(" " + next->str(1) + " = "));
+  }
+  EXPECT_GE(num_limits, 15U);
+  EXPECT_FALSE(std::regex_search(messages, std::regex("at most [0-9]|[01] to (?!128)[0-9]{2}")));
+  const std::string sizes = fmt::format(
+      "{} MiB for a message to the coordinator and {} MiB to a worker or client, {} MiB for a "
+      "definition, {},{:03} runs",
+      router_message_size_max >> 20, message_size_max >> 20, definition_size_max >> 20,
+      runs_per_lease_max / 1000, runs_per_lease_max % 1000);
+  EXPECT_THAT(content("proto/README.md"), testing::HasSubstr(sizes));
+  EXPECT_THAT(content("worker/README.md"),
+              testing::HasSubstr(
+                  fmt::format("16 slots, at most {},{:03}", slots_max / 1000, slots_max % 1000)));
+}
+
 // Welcome.
 
 TEST(MalformedWelcome, HasANumberAndAnInterval) {
-  EXPECT_EQ(refusal_of_welcome([](auto& welcome) { welcome.set_worker_id(0); }),
+  EXPECT_EQ(refusal(good_welcome, [](auto& welcome) { welcome.set_worker_id(0); }),
             "worker_id = 0 (must not be 0)");
   for (const auto& [value, text] : {std::pair{0.0, "0"}, {nan, "nan"}, {3601.0, "3601"}}) {
-    EXPECT_EQ(refusal_of_welcome([&](auto& welcome) { welcome.set_heartbeat_interval_s(value); }),
-              std::string("heartbeat_interval_s = ") + text + " (must be in (0, 3600])");
+    EXPECT_EQ(
+        refusal(good_welcome, [&](auto& welcome) { welcome.set_heartbeat_interval_s(value); }),
+        std::string("heartbeat_interval_s = ") + text + " (must be in (0, 3600])");
   }
 }
 

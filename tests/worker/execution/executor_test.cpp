@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::worker {
@@ -23,11 +24,14 @@ std::shared_ptr<const Campaign> definition() {
   return std::make_shared<const MicroscopeCampaign>();
 }
 
-wire::RunLease lease(std::uint64_t first, std::uint64_t count,
-                     wire::CampaignId campaign = first_campaign) {
-  return {.campaign = campaign, .runs = {{first}, count}, .attempt = {3}, .table_values = {}};
+proto::RunLease lease(std::uint64_t first, std::uint64_t count,
+                      wire::CampaignId campaign = first_campaign) {
+  return test::make_lease(campaign, {{first}, count}, {3});
 }
 
+void submit(Executor& executor, const proto::RunLease& lease) {
+  executor.submit(lease, std::array{wire::runs_of(lease)});
+}
 /// Runs that yield their index as number of draws, the size of their batch as number of rounds and
 /// their first table value as truth.
 std::vector<RunResult> results_of(std::span<const RunRequest> requests) {
@@ -90,8 +94,8 @@ Indices indices_of(const std::vector<FinishedRun>& runs) {
 
 TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
   Bench bench(prepare_counting(2));
-  bench.executor.submit(lease(10, 3));
-  bench.executor.submit(lease(40, 1));
+  submit(bench.executor, lease(10, 3));
+  submit(bench.executor, lease(40, 1));
   const std::vector<FinishedRun> runs = bench.wait_for(4);
   EXPECT_EQ(indices_of(runs), (Indices{10, 11, 12, 40}));
   for (const FinishedRun& run : runs) {
@@ -105,9 +109,8 @@ TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
 
 TEST(Executor, HandsEachRunItsTableValues) {
   Bench bench(prepare_counting(1));
-  wire::RunLease two = lease(0, 2);
-  two.table_values = {1.5, -1.0, 2.5, -2.0};
-  bench.executor.submit(two);
+  const auto two = test::make_lease(first_campaign, {{0}, 2}, {3}, {1.5, -1.0, 2.5, -2.0});
+  submit(bench.executor, two);
   const std::vector<FinishedRun> runs = bench.wait_for(2);
   EXPECT_EQ(runs[0].computed.result.truth[0], 1.5);
   EXPECT_EQ(runs[1].computed.result.truth[0], 2.5);
@@ -138,10 +141,10 @@ struct Gate {
 TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4});
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   gate.entered.acquire();
-  bench.executor.submit(lease(10, 3));
-  bench.executor.submit(lease(20, 3));
+  submit(bench.executor, lease(10, 3));
+  submit(bench.executor, lease(20, 3));
   gate.open.release(3);
   const std::vector<FinishedRun> runs = bench.wait_for(7);
   EXPECT_EQ(indices_of(runs), (Indices{0, 10, 11, 12, 20, 21, 22}));
@@ -154,7 +157,7 @@ TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
 TEST(Executor, GivesEachRunTheTimeOfItsBatchAndAShareOfIt) {
   Bench bench(prepare_counting(1), {.num_threads = 1, .batch_size_max = 4});
   EXPECT_FALSE(bench.executor.usual_batch_time().has_value());
-  bench.executor.submit(lease(0, 4));
+  submit(bench.executor, lease(0, 4));
   const std::vector<FinishedRun> runs = bench.wait_for(4);
   for (const FinishedRun& run : runs) {
     EXPECT_EQ(run.computed.elapsed_s, runs[0].computed.elapsed_s);
@@ -170,13 +173,13 @@ TEST(Executor, KnowsTheTimeOfTheLastBatchAmongTheLargest) {
   const auto usual_s = [&] {
     return std::chrono::duration<double>(*bench.executor.usual_batch_time()).count();
   };
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   const double single_s = bench.wait_for(1)[0].computed.elapsed_s;
   EXPECT_EQ(single_s, usual_s());
-  bench.executor.submit(lease(10, 4));
+  submit(bench.executor, lease(10, 4));
   const double full_s = bench.wait_for(4)[0].computed.elapsed_s;
   EXPECT_EQ(full_s, usual_s());
-  bench.executor.submit(lease(20, 2));
+  submit(bench.executor, lease(20, 2));
   (void)bench.wait_for(2);
   EXPECT_EQ(full_s, usual_s());
 }
@@ -190,8 +193,8 @@ TEST(Executor, ComputesABatchOnEachThread) {
     return gate.prepare()(of);
   };
   Bench bench(prepare, {.num_threads = 2, .batch_size_max = 2});
-  bench.executor.submit(lease(0, 3));
-  bench.executor.submit(lease(3, 2));
+  submit(bench.executor, lease(0, 3));
+  submit(bench.executor, lease(3, 2));
   gate.entered.acquire();
   gate.entered.acquire();
   gate.open.release(3);
@@ -204,13 +207,14 @@ TEST(Executor, ComputesABatchOnEachThread) {
 TEST(Executor, TellsWhatIsBeingComputedAndHowFarItIs) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4});
-  bench.executor.submit(lease(20, 2));
+  submit(bench.executor, lease(20, 2));
   gate.entered.acquire();
-  bench.executor.submit(lease(3, 1));
+  submit(bench.executor, lease(3, 1));
   const std::vector<RunningBatch> running = bench.executor.computing();
   ASSERT_EQ(running.size(), 1U) << "what waits is not being computed";
-  const wire::ComputedBatch expected{first_campaign, {{{20}, 2}}, 1};
-  EXPECT_EQ(running[0].progress, expected);
+  EXPECT_EQ(running[0].campaign, first_campaign);
+  EXPECT_EQ(running[0].ranges, (std::vector<RunRange>{{{20}, 2}}));
+  EXPECT_EQ(running[0].num_steps_done, 1U);
   ASSERT_TRUE(running[0].time_left.has_value());
   EXPECT_GT(*running[0].time_left, Duration::zero());
   gate.open.release(2);
@@ -222,7 +226,7 @@ TEST(Executor, ExpectsTheStepsToComeToTakeAsLongAsThoseThatAreDone) {
   Gate gate;
   Bench bench(gate.prepare());
   const TimePoint before = std::chrono::steady_clock::now();
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   gate.entered.acquire();
   const Duration left = bench.executor.computing().at(0).time_left.value();
   EXPECT_LE(left, 9 * (std::chrono::steady_clock::now() - before));
@@ -235,13 +239,13 @@ TEST(Executor, ExpectsTheStepsToComeToTakeAsLongAsThoseThatAreDone) {
 TEST(Executor, ComputesARunThatIsToBeAloneInABatchOfItsOwn) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4});
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   gate.entered.acquire();
-  wire::RunLease suspect = lease(5, 1);
-  suspect.is_alone = true;
-  bench.executor.submit(lease(1, 1));
-  bench.executor.submit(suspect);
-  bench.executor.submit(lease(2, 1));
+  proto::RunLease suspect = lease(5, 1);
+  suspect.set_is_alone(true);
+  submit(bench.executor, lease(1, 1));
+  submit(bench.executor, suspect);
+  submit(bench.executor, lease(2, 1));
   gate.open.release(3);
   const std::vector<FinishedRun> runs = bench.wait_for(4);
   EXPECT_EQ(indices_of(runs), (Indices{0, 1, 2, 5}));
@@ -254,7 +258,7 @@ TEST(Executor, ComputesARunThatIsToBeAloneInABatchOfItsOwn) {
 TEST(Executor, DropsOnlyWhatWaits) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 2});
-  bench.executor.submit(lease(0, 5));
+  submit(bench.executor, lease(0, 5));
   gate.entered.acquire();
   const std::array wanted{RunRange{{1}, 3}};
   EXPECT_EQ(bench.executor.drop_waiting(first_campaign, wanted), (std::vector<RunIndex>{{2}, {3}}));
@@ -266,13 +270,13 @@ TEST(Executor, DropsOnlyWhatWaits) {
 TEST(Executor, DropsABatchOnceAndComputesTheRunsAgainIfTheyComeAgain) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 2});
-  bench.executor.submit(lease(0, 2));
+  submit(bench.executor, lease(0, 2));
   gate.entered.acquire();
   const std::uint64_t number = bench.executor.computing().at(0).number;
   EXPECT_TRUE(bench.executor.drop_batch(number));
   EXPECT_FALSE(bench.executor.drop_batch(number));
   EXPECT_TRUE(bench.executor.computing().empty());
-  bench.executor.submit(lease(1, 1));
+  submit(bench.executor, lease(1, 1));
   gate.open.release(2);
   EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{1});
   EXPECT_TRUE(bench.executor.take_finished().empty());
@@ -290,8 +294,8 @@ TEST(Executor, DropsABatchThatIsJustFinishing) {
     }};
   };
   Bench bench(prepare);
-  bench.executor.submit(lease(0, 1));
-  bench.executor.submit(lease(1, 1));
+  submit(bench.executor, lease(0, 1));
+  submit(bench.executor, lease(1, 1));
   entered.acquire();
   EXPECT_TRUE(bench.executor.drop_batch(bench.executor.computing().at(0).number));
   open.release(2);
@@ -301,13 +305,13 @@ TEST(Executor, DropsABatchThatIsJustFinishing) {
 TEST(Executor, DropsTheRunsAtHandWhenItAbandons) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 2, .batch_size_max = 2});
-  bench.executor.submit(lease(0, 5));
+  submit(bench.executor, lease(0, 5));
   gate.entered.acquire();
   gate.entered.acquire();
   bench.executor.abandon();
   gate.open.release(2);
 
-  bench.executor.submit(lease(5, 1));
+  submit(bench.executor, lease(5, 1));
   gate.entered.acquire();
   gate.open.release();
   EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{5});
@@ -330,7 +334,7 @@ TEST(Executor, EndsInTheMiddleOfRuns) {
   std::counting_semaphore<> entered{0};
   {
     Bench bench(prepare_endless(entered), {.num_threads = 2, .batch_size_max = 3});
-    bench.executor.submit(lease(0, 1000));
+    submit(bench.executor, lease(0, 1000));
     entered.acquire();
     entered.acquire();
   }
@@ -348,11 +352,11 @@ TEST(Executor, EndsInTimeUnlessAThreadHangs) {
     return gate.prepare()(campaign);
   };
   Bench bench(prepare, {.num_threads = 2});
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   gate.entered.acquire();
   preparing.acquire();
   bench.executor.define(second_campaign, definition());
-  bench.executor.submit(lease(0, 1, second_campaign));
+  submit(bench.executor, lease(0, 1, second_campaign));
   preparing.acquire();
   EXPECT_FALSE(bench.executor.end_within(std::chrono::milliseconds(1)));
   gate.open.release();
@@ -389,9 +393,9 @@ TEST(Executor, ComputesRunsOfSeveralCampaigns) {
   std::atomic<int> num_prepared = 0;
   Bench bench(prepare_by_seed(num_prepared), {.num_threads = 2, .batch_size_max = 4});
   bench.executor.define(second_campaign, definition_with(22));
-  bench.executor.submit(lease(0, 2));
-  bench.executor.submit(lease(0, 2, second_campaign));
-  bench.executor.submit(lease(2, 2));
+  submit(bench.executor, lease(0, 2));
+  submit(bench.executor, lease(0, 2, second_campaign));
+  submit(bench.executor, lease(2, 2));
   for (const FinishedRun& run : bench.wait_for(6)) {
     EXPECT_EQ(run.computed.result.num_draws, run.campaign == second_campaign ? 22U : 1U);
   }
@@ -403,8 +407,8 @@ TEST(Executor, LetsRunsOfACampaignWaitUntilItIsDefined) {
   Bench bench(prepare_by_seed(num_prepared));
   EXPECT_TRUE(bench.executor.is_defined(first_campaign));
   EXPECT_FALSE(bench.executor.is_defined(second_campaign));
-  bench.executor.submit(lease(4, 1, second_campaign));
-  bench.executor.submit(lease(5, 1));
+  submit(bench.executor, lease(4, 1, second_campaign));
+  submit(bench.executor, lease(5, 1));
   EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{5});
   bench.executor.define(second_campaign, definition_with(7));
   EXPECT_EQ(bench.wait_for(1)[0].computed.result.num_draws, 7U);
@@ -415,9 +419,9 @@ TEST(Executor, KeepsTheCampaignsThatWereUsedLast) {
   Bench bench(prepare_by_seed(num_prepared),
               {.num_threads = 1, .batch_size_max = 1, .num_campaigns_max = 2});
   bench.executor.define(second_campaign, definition_with(2));
-  bench.executor.submit(lease(0, 1, second_campaign));
+  submit(bench.executor, lease(0, 1, second_campaign));
   (void)bench.wait_for(1);
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   (void)bench.wait_for(1);
   bench.executor.define({3}, definition_with(3));
   EXPECT_TRUE(bench.executor.is_defined(first_campaign));
@@ -428,10 +432,10 @@ TEST(Executor, KeepsTheCampaignsThatWereUsedLast) {
 TEST(Executor, KeepsCampaignsThatHaveRuns) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 1, .num_campaigns_max = 1});
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   gate.entered.acquire();
   bench.executor.define(second_campaign, definition());
-  bench.executor.submit(lease(0, 1, second_campaign));
+  submit(bench.executor, lease(0, 1, second_campaign));
   bench.executor.define({3}, definition());
   EXPECT_TRUE(bench.executor.is_defined(first_campaign));
   EXPECT_TRUE(bench.executor.is_defined(second_campaign));
@@ -443,7 +447,7 @@ TEST(Executor, KeepsCampaignsThatHaveRuns) {
 TEST(Executor, ForgetsACampaignWithItsRunsAndResults) {
   Gate gate;
   Bench bench(gate.prepare());
-  bench.executor.submit(lease(0, 3));
+  submit(bench.executor, lease(0, 3));
   gate.entered.acquire();
   gate.open.release();
   gate.entered.acquire();  // Of the second run: the result of the first is there.
@@ -454,7 +458,7 @@ TEST(Executor, ForgetsACampaignWithItsRunsAndResults) {
   gate.open.release();
 
   bench.executor.define(second_campaign, definition());
-  bench.executor.submit(lease(9, 1, second_campaign));
+  submit(bench.executor, lease(9, 1, second_campaign));
   gate.open.release();
   bench.wait_for_change();
   EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{9});
@@ -473,11 +477,11 @@ TEST(Executor, PreparesACampaignThatIsDefinedAgainWhileItIsPrepared) {
     return prepare_by_seed(num_prepared)(campaign);
   };
   Bench bench(prepare, {.num_threads = 1, .batch_size_max = 2});
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   is_preparing.acquire();
   bench.executor.forget(first_campaign);
   bench.executor.define(first_campaign, definition_with(2));
-  bench.executor.submit(lease(1, 2));
+  submit(bench.executor, lease(1, 2));
   go_on.release();
   for (const FinishedRun& run : bench.wait_for(2)) EXPECT_EQ(run.computed.result.num_draws, 2U);
 }
@@ -487,7 +491,7 @@ TEST(Executor, SaysWhyItCannotGoOn) {
       [](const Campaign&) -> PreparedCampaign { throw std::runtime_error("out of memory"); },
       {.num_threads = 3, .batch_size_max = 1});
   EXPECT_FALSE(bench.executor.failure().has_value());
-  bench.executor.submit(lease(0, 1));
+  submit(bench.executor, lease(0, 1));
   bench.wait_for_change();
   EXPECT_EQ(bench.executor.failure(), "out of memory");
 }

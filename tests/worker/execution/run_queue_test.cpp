@@ -4,19 +4,26 @@
 
 #include <array>
 
+#include "tests/support/messages.hpp"
+
 namespace proofmass::worker {
 namespace {
 
 using Indices = std::vector<std::uint64_t>;
 
-wire::RunLease lease(std::uint64_t campaign, std::uint64_t first, std::uint64_t count) {
-  return {.campaign = {campaign}, .runs = {{first}, count}, .attempt = {1}, .table_values = {}};
+proto::RunLease lease(std::uint64_t campaign, std::uint64_t first, std::uint64_t count) {
+  return test::make_lease({campaign}, {{first}, count});
 }
 
-wire::RunLease alone(std::uint64_t campaign, std::uint64_t run) {
-  wire::RunLease suspect = lease(campaign, run, 1);
-  suspect.is_alone = true;
+proto::RunLease alone(std::uint64_t campaign, std::uint64_t run) {
+  proto::RunLease suspect = lease(campaign, run, 1);
+  suspect.set_is_alone(true);
   return suspect;
+}
+
+/// All runs of the lease.
+void add(RunQueue& queue, const proto::RunLease& lease) {
+  queue.add(lease, std::array{wire::runs_of(lease)});
 }
 
 bool always(wire::CampaignId) { return true; }
@@ -29,9 +36,9 @@ Indices indices(const Assignment& assignment) {
 
 TEST(RunQueue, HandsOutRunsAcrossLeasesInTheOrderInWhichTheyCame) {
   RunQueue queue;
-  queue.add(lease(1, 10, 3));
-  queue.add(lease(1, 40, 1));
-  queue.add(lease(1, 5, 2));
+  add(queue, lease(1, 10, 3));
+  add(queue, lease(1, 40, 1));
+  add(queue, lease(1, 5, 2));
   EXPECT_EQ(indices(queue.take(5, always)), (Indices{10, 11, 12, 40, 5}));
   EXPECT_EQ(indices(queue.take(16, always)), Indices{6});
   EXPECT_TRUE(queue.take(16, always).requests.empty());
@@ -39,9 +46,9 @@ TEST(RunQueue, HandsOutRunsAcrossLeasesInTheOrderInWhichTheyCame) {
 
 TEST(RunQueue, PutsRunsOfOneCampaignTogether) {
   RunQueue queue;
-  queue.add(lease(1, 0, 2));
-  queue.add(lease(2, 0, 2));
-  queue.add(lease(1, 7, 1));
+  add(queue, lease(1, 0, 2));
+  add(queue, lease(2, 0, 2));
+  add(queue, lease(1, 7, 1));
   const Assignment first = queue.take(4, always);
   EXPECT_EQ(first.campaign, wire::CampaignId{1});
   EXPECT_EQ(indices(first), (Indices{0, 1, 7}));
@@ -50,8 +57,8 @@ TEST(RunQueue, PutsRunsOfOneCampaignTogether) {
 
 TEST(RunQueue, PassesOverACampaignThatIsNotReady) {
   RunQueue queue;
-  queue.add(lease(1, 0, 2));
-  queue.add(lease(2, 5, 1));
+  add(queue, lease(1, 0, 2));
+  add(queue, lease(2, 5, 1));
   const auto is_ready = [](wire::CampaignId campaign) { return campaign.value == 2; };
   EXPECT_EQ(queue.take(4, is_ready).campaign, wire::CampaignId{2});
   EXPECT_TRUE(queue.take(4, is_ready).requests.empty());
@@ -62,11 +69,11 @@ TEST(RunQueue, PassesOverACampaignThatIsNotReady) {
 // First in the queue, in the middle, and two of them in a row.
 TEST(RunQueue, LeavesARunThatIsToBeAloneAlone) {
   RunQueue queue;
-  queue.add(alone(1, 9));
-  queue.add(lease(1, 0, 2));
-  queue.add(alone(1, 5));
-  queue.add(alone(1, 6));
-  queue.add(lease(1, 2, 1));
+  add(queue, alone(1, 9));
+  add(queue, lease(1, 0, 2));
+  add(queue, alone(1, 5));
+  add(queue, alone(1, 6));
+  add(queue, lease(1, 2, 1));
   EXPECT_EQ(indices(queue.take(16, always)), Indices{9});
   EXPECT_EQ(indices(queue.take(16, always)), (Indices{0, 1, 2}));
   EXPECT_EQ(indices(queue.take(16, always)), Indices{5});
@@ -75,41 +82,42 @@ TEST(RunQueue, LeavesARunThatIsToBeAloneAlone) {
 
 TEST(RunQueue, MakesSmallerBatchesOfALeaseThatWantsThem) {
   RunQueue queue;
-  wire::RunLease last = lease(1, 0, 5);
-  last.batch_runs_max = 2;
-  queue.add(last);
-  queue.add(lease(1, 7, 6));
+  proto::RunLease last = lease(1, 0, 5);
+  last.set_batch_runs_max(2);
+  add(queue, last);
+  add(queue, lease(1, 7, 6));
   EXPECT_EQ(indices(queue.take(4, always)), (Indices{0, 1}));
   EXPECT_EQ(indices(queue.take(1, always)), Indices{2});
   EXPECT_EQ(indices(queue.take(4, always)), (Indices{3, 4}));
   EXPECT_EQ(indices(queue.take(4, always)), (Indices{7, 8, 9, 10}));
-  queue.add(last);
+  add(queue, last);
   EXPECT_EQ(indices(queue.take(4, always)), (Indices{11, 12, 0, 1})) << "as the first run's lease";
 }
 
 TEST(RunQueue, MakesNoLargerBatchesThanTheWorkerCanWhateverALeaseWants) {
   RunQueue queue;
-  wire::RunLease hostile = lease(1, 0, 5);
-  hostile.batch_runs_max = 0xffffffff;
-  queue.add(hostile);
+  proto::RunLease hostile = lease(1, 0, 5);
+  hostile.set_batch_runs_max(0xffffffff);
+  add(queue, hostile);
   EXPECT_EQ(indices(queue.take(4, always)), (Indices{0, 1, 2, 3}));
 }
 
+// The worker has run 8 already.
 TEST(RunQueue, HandsEachRunItsTableValues) {
   RunQueue queue;
-  wire::RunLease two = lease(1, 0, 2);
-  two.table_values = {1.5, -1.0, 2.5, -2.0};
-  queue.add(two);
+  const auto three = test::make_lease({1}, {{7}, 3}, {1}, {1.5, -1.0, 2.5, -2.0, 3.5, -3.0});
+  queue.add(three, std::array{RunRange{{7}, 1}, RunRange{{9}, 1}});
   const Assignment assignment = queue.take(3, always);
+  ASSERT_EQ(indices(assignment), (Indices{7, 9}));
   EXPECT_EQ(assignment.requests[0].table_values, (std::vector<double>{1.5, -1.0}));
-  EXPECT_EQ(assignment.requests[1].table_values, (std::vector<double>{2.5, -2.0}));
+  EXPECT_EQ(assignment.requests[1].table_values, (std::vector<double>{3.5, -3.0}));
 }
 
 TEST(RunQueue, DropsWhatIsHereOfTheRangesOfACampaign) {
   RunQueue queue;
-  queue.add(lease(1, 5, 5));
-  queue.add(lease(1, 0, 2));
-  queue.add(lease(2, 0, 10));
+  add(queue, lease(1, 5, 5));
+  add(queue, lease(1, 0, 2));
+  add(queue, lease(2, 0, 10));
   (void)queue.take(2, always);
   const std::vector<RunIndex> dropped =
       queue.drop({1}, std::array{RunRange{{0}, 1}, RunRange{{4}, 5}});
@@ -120,8 +128,8 @@ TEST(RunQueue, DropsWhatIsHereOfTheRangesOfACampaign) {
 
 TEST(RunQueue, DropsACampaign) {
   RunQueue queue;
-  queue.add(lease(1, 0, 3));
-  queue.add(lease(2, 7, 1));
+  add(queue, lease(1, 0, 3));
+  add(queue, lease(2, 7, 1));
   queue.drop({1});
   EXPECT_FALSE(queue.has({1}));
   EXPECT_TRUE(queue.has({2}));

@@ -13,14 +13,14 @@ TEST_F(ConversationTest, AsksForACampaignUntilItComes) {
   register_here();
   receive(lease(0, 1, 1, campaign_2));
   EXPECT_EQ(execution.waiting.size(), 1U) << "they wait for the definition";
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().campaign(), campaign_2.value);
   receive(lease(1, 1, 1, campaign_2));
   tick_after(900ms);
   EXPECT_TRUE(sent.empty());
   tick_after(100ms);
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().campaign(), campaign_2.value);
 
-  const wire::DefinitionPart answer = definition(campaign_2);
+  const proto::DefinitionPart answer = definition(campaign_2);
   receive(answer);
   EXPECT_TRUE(execution.is_defined(campaign_2));
   receive(answer);  // To the other request.
@@ -32,9 +32,9 @@ TEST_F(ConversationTest, AsksNoMoreForACampaignWithoutRuns) {
   start();
   register_here();
   receive(lease(0, 1));
-  (void)take_sent<wire::CampaignRequest>();
-  receive(wire::Retract{campaign_1, {{{0}, 1}}});
-  (void)take_sent<wire::GiveBack>();
+  (void)take_sent<proto::CampaignRequest>();
+  receive(test::make_retract(campaign_1, {{{0}, 1}}));
+  (void)take_sent<proto::GiveBack>();
   tick_after(1500ms);
   receive(definition(campaign_1));
   EXPECT_FALSE(execution.is_defined(campaign_1));
@@ -45,20 +45,20 @@ TEST_F(ConversationTest, ForgetsACampaign) {
   (void)compute(lease(10, 1));
   receive(lease(11, 1));
   receive(lease(5, 1, 1, campaign_2));
-  (void)take_sent<wire::CampaignRequest>();
-  receive(wire::Forget{campaign_1});
+  (void)take_sent<proto::CampaignRequest>();
+  receive(test::make_forget(campaign_1));
   EXPECT_EQ(execution.forgotten, std::vector{campaign_1});
   EXPECT_EQ(conversation->num_unacknowledged(), 0U);
   EXPECT_EQ(conversation->num_unfinished(), 1U);
 }
 
 /// Of more than one part, as far as the conversation is concerned.
-std::vector<wire::DefinitionPart> split(const wire::DefinitionPart& whole) {
-  wire::DefinitionPart first = whole;
-  wire::DefinitionPart second = whole;
-  first.content.resize(100);
-  second.content.erase(0, 100);
-  second.offset = 100;
+std::vector<proto::DefinitionPart> split(const proto::DefinitionPart& whole) {
+  proto::DefinitionPart first = whole;
+  proto::DefinitionPart second = whole;
+  first.mutable_content()->resize(100);
+  second.mutable_content()->erase(0, 100);
+  second.set_offset(100);
   return {first, second};
 }
 
@@ -66,17 +66,17 @@ TEST_F(ConversationTest, AsksForADefinitionPartByPart) {
   start();
   register_here();
   receive(lease(0, 1));
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 0U);
   const auto parts = split(definition(campaign_1));
   receive(parts[1]);  // Not asked for: what comes before it is missing.
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 0U);
   receive(parts[0]);
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 100U);
   receive(parts[0]);  // Repeated by the network.
   tick_after(999ms);
   EXPECT_TRUE(sent.empty());
   tick_after(1ms);
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U) << "it was lost";
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 100U) << "it was lost";
   EXPECT_FALSE(execution.is_defined(campaign_1));
   receive(parts[1]);
   EXPECT_TRUE(execution.is_defined(campaign_1));
@@ -86,17 +86,17 @@ TEST_F(ConversationTest, BeginsADefinitionAnewThatHasChanged) {
   start();
   register_here();
   receive(lease(0, 1));
-  (void)take_sent<wire::CampaignRequest>();
+  (void)take_sent<proto::CampaignRequest>();
   MicroscopeCampaign extended;
   extended.num_runs += 1;
   const auto old_parts = split(definition(campaign_1));
   const auto new_parts = split(definition(campaign_1, extended));
   receive(old_parts[0]);
-  (void)take_sent<wire::CampaignRequest>();
+  (void)take_sent<proto::CampaignRequest>();
   receive(new_parts[1]);
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 0U);
   receive(new_parts[0]);
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 100U);
   receive(new_parts[1]);
   EXPECT_TRUE(execution.is_defined(campaign_1));
 }
@@ -105,20 +105,18 @@ TEST_F(ConversationTest, AsksAgainForADefinitionThatMakesNoSense) {
   start();
   register_here();
   receive(lease(0, 1));
-  (void)take_sent<wire::CampaignRequest>();
-  wire::DefinitionPart damaged = definition(campaign_1);
-  damaged.content.front() ^= 1;
+  (void)take_sent<proto::CampaignRequest>();
+  proto::DefinitionPart damaged = definition(campaign_1);
+  damaged.mutable_content()->front() ^= 1;
   receive(damaged);
   EXPECT_FALSE(execution.is_defined(campaign_1));
   for (int i = 0; i < 59; ++i) {
     tick_after(1s);
-    std::erase_if(sent, [](const wire::Packet& packet) {
-      return std::holds_alternative<wire::Heartbeat>(packet.message);
-    });
+    std::erase_if(sent, [](const proto::Envelope& message) { return message.has_heartbeat(); });
     EXPECT_TRUE(sent.empty()) << i;
   }
   tick_after(1s);
-  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 0U);
   sent.clear();
   receive(definition(campaign_1));
   EXPECT_TRUE(execution.is_defined(campaign_1));
@@ -135,10 +133,10 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
   start();
   register_here();
   receive(lease(0, 1));
-  (void)take_sent<wire::CampaignRequest>();
+  (void)take_sent<proto::CampaignRequest>();
   Definition other = definition_of(MicroscopeCampaign{});
   other.text.insert(0, "# \u00e9\n");
-  receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
+  receive(wire::EncodedDefinition(other).part(campaign_1, 0));
   EXPECT_FALSE(execution.is_defined(campaign_1));
   EXPECT_EQ(take_events(*conversation),
             std::vector<std::string>{"malformed_definition campaign=0000000000000001 definition:1: "
@@ -151,7 +149,7 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
                     "file = \"" + std::string(1000, 'x') + "\"\n");
   tick_after(60s);
   sent.clear();  // It has asked again.
-  receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
+  receive(wire::EncodedDefinition(other).part(campaign_1, 0));
   EXPECT_LT(take_events(*conversation).at(0).size(), 500U);
   receive(definition(campaign_1));
   EXPECT_TRUE(execution.is_defined(campaign_1));
@@ -167,7 +165,7 @@ TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
   start();
   register_here();
   receive(lease(0, 2));
-  (void)take_sent<wire::CampaignRequest>();
+  (void)take_sent<proto::CampaignRequest>();
   receive(definition(campaign_1, definition_with_table()));
   expect_ending(Ending::Kind::failed, "table_values = 1 for each run (must be 0)");
 }
@@ -175,10 +173,9 @@ TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
 TEST_F(ConversationTest, EndsIfALeaseHasOtherTableValuesThanTheOneBefore) {
   start();
   register_here();
-  wire::RunLease two = lease(0, 2);
-  two.table_values = {1.5, 2.5};
+  const proto::RunLease two = test::make_lease(campaign_1, {{0}, 2}, {1}, {1.5, 2.5});
   receive(two);
-  (void)take_sent<wire::CampaignRequest>();
+  (void)take_sent<proto::CampaignRequest>();
   receive(definition(campaign_1, definition_with_table()));
   EXPECT_FALSE(conversation->ending().has_value());
   receive(lease(2, 1));

@@ -16,7 +16,7 @@ TEST_F(ConversationTest, EndsIfNothingCanBeComputed) {
   execution.finish_lease();
   execution.failure_text = "out of memory";
   conversation->on_progress(now);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::failed);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_FAILED);
   expect_ending(Ending::Kind::failed, "out of memory");
   EXPECT_EQ(conversation->unacknowledged().size(), 1U) << "what was finished can be kept";
 }
@@ -24,7 +24,7 @@ TEST_F(ConversationTest, EndsIfNothingCanBeComputed) {
 TEST_F(ConversationTest, DropsEverythingWhenToldToStop) {
   register_with_campaign();
   receive(lease(0, 2));
-  receive(wire::Stop{});
+  receive(proto::Stop());
   EXPECT_EQ(execution.num_abandons, 1);
   expect_ending(Ending::Kind::done, "told to stop");
 }
@@ -32,17 +32,17 @@ TEST_F(ConversationTest, DropsEverythingWhenToldToStop) {
 TEST_F(ConversationTest, DeliversWhatItHoldsWhenDrainedByTheCoordinator) {
   register_with_campaign();
   receive(lease(0, 1));
-  receive(wire::Drain{});
-  const auto heartbeat = take_sent<wire::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_runs_max, 0U);
-  EXPECT_EQ(heartbeat.held, held(0, 1));
-  receive(wire::Drain{});
+  receive(proto::Drain());
+  const auto heartbeat = take_sent<proto::Heartbeat>();
+  EXPECT_EQ(heartbeat.num_runs_max(), 0U);
+  EXPECT_EQ(test::vector_of(heartbeat.held()), held(0, 1));
+  receive(proto::Drain());
   execution.finish_lease();
   conversation->on_progress(now);
-  (void)take_sent<wire::ResultBatch>();
+  (void)take_sent<proto::ResultBatch>();
   EXPECT_FALSE(conversation->ending().has_value());
   acknowledge({{0}});
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::drained);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
   expect_ending(Ending::Kind::done, "drained");
 }
 
@@ -50,12 +50,12 @@ TEST_F(ConversationTest, DeliversWhatItHoldsWhenDrainedByTheCoordinator) {
 TEST_F(ConversationTest, GivesBackALeaseThatComesTooLate) {
   register_with_campaign();
   receive(lease(0, 1));
-  receive(wire::Drain{});
-  (void)take_sent<wire::Heartbeat>();
+  receive(proto::Drain());
+  (void)take_sent<proto::Heartbeat>();
   receive(lease(0, 3));
-  const auto answer = take_sent<wire::GiveBack>();
-  EXPECT_EQ(answer.reason, wire::LossReason::drained);
-  EXPECT_EQ(answer.runs, held(1, 2));
+  const auto answer = take_sent<proto::GiveBack>();
+  EXPECT_EQ(answer.reason(), proto::LOSS_REASON_DRAINED);
+  EXPECT_EQ(test::vector_of(answer.runs()), held(1, 2));
   EXPECT_EQ(execution.waiting.size(), 1U);
   receive(lease(0, 1));
 }
@@ -66,20 +66,20 @@ TEST_F(ConversationTest, GivesBackWhatHasNotBegunWhenAskedToEnd) {
   execution.begin_batch();
   receive(lease(2, 3));
   conversation->on_drain_request(now);
-  const auto heartbeat = take_sent<wire::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_runs_max, 0U) << "before it gives back, or the runs would come again";
-  EXPECT_EQ(heartbeat.held, held(0, 5));
-  const auto given_back = take_sent<wire::GiveBack>();
-  EXPECT_EQ(given_back.reason, wire::LossReason::preempted);
-  EXPECT_EQ(given_back.runs, held(2, 3));
+  const auto heartbeat = take_sent<proto::Heartbeat>();
+  EXPECT_EQ(heartbeat.num_runs_max(), 0U) << "before it gives back, or the runs would come again";
+  EXPECT_EQ(test::vector_of(heartbeat.held()), held(0, 5));
+  const auto given_back = take_sent<proto::GiveBack>();
+  EXPECT_EQ(given_back.reason(), proto::LOSS_REASON_PREEMPTED);
+  EXPECT_EQ(test::vector_of(given_back.runs()), held(2, 3));
 
   conversation->on_drain_request(now);
   execution.finish_batch();
   conversation->on_progress(now);
-  (void)take_sent<wire::ResultBatch>();
+  (void)take_sent<proto::ResultBatch>();
   EXPECT_FALSE(conversation->ending().has_value()) << "the results are not acknowledged";
   acknowledge({{0}, {1}});
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
@@ -90,16 +90,16 @@ TEST_F(ConversationTest, GivesBackRunsOfEachCampaign) {
   receive(lease(7, 1, 1, campaign_2));
   receive(lease(3, 1));
   conversation->on_drain_request(now);
-  (void)take_sent<wire::Heartbeat>();
-  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(2, 2));
-  EXPECT_EQ(take_sent<wire::GiveBack>().runs.at(0).campaign, campaign_2);
-  (void)take_sent<wire::Bye>();
+  (void)take_sent<proto::Heartbeat>();
+  EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 2));
+  EXPECT_EQ(take_sent<proto::GiveBack>().runs(0).campaign(), campaign_2.value);
+  (void)take_sent<proto::Bye>();
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
 TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
   start();
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   conversation->on_drain_request(now);
   EXPECT_TRUE(sent.empty()) << "nobody knows it";
   expect_ending(Ending::Kind::done, "nothing left to do");
@@ -110,9 +110,9 @@ TEST_F(ConversationTest, LeavesAtOnceWhenAskedAgain) {
   receive(lease(0, 2));
   execution.begin_batch();
   conversation->on_drain_request(now);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   conversation->on_abandon_request();
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   EXPECT_EQ(execution.num_abandons, 1);
   expect_ending(Ending::Kind::done, "asked to end at once");
 }
@@ -128,18 +128,18 @@ TEST_F(ConversationTest, GivesBackBatchesThatDoNotFitIntoTheTime) {
   execution.batches[0].time_left = 14s;
   execution.batches[1].time_left = 16s;
   conversation->on_drain_request(now);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   tick_after(0s);
-  const auto given_back = take_sent<wire::GiveBack>();
-  EXPECT_EQ(given_back.reason, wire::LossReason::preempted);
-  EXPECT_EQ(given_back.runs, held(1, 1));
+  const auto given_back = take_sent<proto::GiveBack>();
+  EXPECT_EQ(given_back.reason(), proto::LOSS_REASON_PREEMPTED);
+  EXPECT_EQ(test::vector_of(given_back.runs()), held(1, 1));
   EXPECT_EQ(execution.batches.size(), 2U);
 
   execution.batches[0].time_left = 0s;
   tick_after(15s);
-  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(0, 1));
-  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(2, 1));
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(0, 1));
+  EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 1));
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
@@ -151,7 +151,7 @@ TEST_F(ConversationTest, EndsWhenTheDrainTakesTooLong) {
   tick_after(19s);
   sent.clear();
   tick_after(1s);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
 }
 
@@ -160,14 +160,14 @@ TEST_F(ConversationTest, DeliversToANewCoordinatorWhileItDrains) {
   register_with_campaign();
   (void)compute(lease(0, 1));
   conversation->on_drain_request(now);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   reject_unregistered(wire::Epoch{6});
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   receive(welcome, wire::Epoch{6});
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
-  (void)take_sent<wire::ResultBatch>();
-  receive(wire::ResultAck{campaign_1, {{0}}}, wire::Epoch{6});
-  (void)take_sent<wire::Bye>();
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
+  (void)take_sent<proto::ResultBatch>();
+  receive(test::make_ack(campaign_1, {{0}}), wire::Epoch{6});
+  (void)take_sent<proto::Bye>();
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
@@ -176,23 +176,23 @@ TEST_F(ConversationTest, DeliversToANewCoordinatorWhileItDrains) {
 TEST_F(ConversationTest, WorksForANewCoordinatorAfterTheDrainOfTheFormer) {
   register_with_campaign();
   (void)compute(lease(0, 1));
-  receive(wire::Drain{});
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  receive(proto::Drain());
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
   reject_unregistered(first_epoch);  // Of the same process: it is still draining.
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   receive(welcome, first_epoch);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
-  (void)take_sent<wire::ResultBatch>();
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
+  (void)take_sent<proto::ResultBatch>();
   reject_unregistered(wire::Epoch{6});
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   receive(welcome, wire::Epoch{6});
-  EXPECT_GT(take_sent<wire::Heartbeat>().num_runs_max, 0U);
-  (void)take_sent<wire::ResultBatch>();
-  receive(wire::ResultAck{campaign_1, {{0}}}, wire::Epoch{6});
+  EXPECT_GT(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
+  (void)take_sent<proto::ResultBatch>();
+  receive(test::make_ack(campaign_1, {{0}}), wire::Epoch{6});
   EXPECT_FALSE(conversation->ending().has_value());
-  receive(wire::Drain{}, wire::Epoch{6});
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::drained);
+  receive(proto::Drain(), wire::Epoch{6});
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
   expect_ending(Ending::Kind::done, "drained");
 }
 
@@ -202,12 +202,12 @@ TEST_F(ConversationTest, GivesBackByNotNamingRunsIfItIsNotRegistered) {
   (void)compute(lease(0, 1));
   receive(lease(1, 5));
   reject_unregistered(wire::Epoch{6});
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   conversation->on_drain_request(now);
   EXPECT_TRUE(sent.empty());
   receive(welcome, wire::Epoch{6});
-  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(0, 1));
-  (void)take_sent<wire::ResultBatch>();
+  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), held(0, 1));
+  (void)take_sent<proto::ResultBatch>();
 }
 
 // Batches take 60 s: with half of that to spare and twice 5 s to deliver and to end, it is time at
@@ -222,15 +222,15 @@ TEST_F(ConversationTest, DrainsInTimeBeforeItsWalltimeIsOver) {
   EXPECT_FALSE(conversation->is_leaving());
   sent.clear();
   tick_after(61s);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
-  const auto given_back = take_sent<wire::GiveBack>();
-  EXPECT_EQ(given_back.reason, wire::LossReason::walltime);
-  EXPECT_EQ(given_back.runs, held(1, 1));
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
+  const auto given_back = take_sent<proto::GiveBack>();
+  EXPECT_EQ(given_back.reason(), proto::LOSS_REASON_WALLTIME);
+  EXPECT_EQ(test::vector_of(given_back.runs()), held(1, 1));
   execution.finish_batch();
   conversation->on_progress(now);
-  (void)take_sent<wire::ResultBatch>();
+  (void)take_sent<proto::ResultBatch>();
   acknowledge({{0}});
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_WALLTIME);
 }
 
 // A quarter of the workers of a job leaves in each quarter of those 60 s, but for chance.
@@ -259,9 +259,9 @@ TEST_F(ConversationTest, EndsBeforeItsWalltimeIsOver) {
   receive(lease(0, 1));
   execution.begin_batch();
   tick_after(90s);
-  (void)take_sent<wire::Heartbeat>();
-  EXPECT_EQ(take_sent<wire::GiveBack>().reason, wire::LossReason::walltime);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+  (void)take_sent<proto::Heartbeat>();
+  EXPECT_EQ(take_sent<proto::GiveBack>().reason(), proto::LOSS_REASON_WALLTIME);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_WALLTIME);
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
@@ -269,12 +269,12 @@ TEST_F(ConversationTest, EndsBeforeItsWalltimeIsOver) {
 TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenDrainedByTheCoordinator) {
   register_with_campaign({.walltime_end = now + 100s});
   receive(lease(0, 1));
-  receive(wire::Drain{});
+  receive(proto::Drain());
   sent.clear();
   tick_after(90s);
-  (void)take_sent<wire::Heartbeat>();
-  EXPECT_EQ(take_sent<wire::GiveBack>().reason, wire::LossReason::walltime);
-  (void)take_sent<wire::Bye>();
+  (void)take_sent<proto::Heartbeat>();
+  EXPECT_EQ(take_sent<proto::GiveBack>().reason(), proto::LOSS_REASON_WALLTIME);
+  (void)take_sent<proto::Bye>();
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
@@ -287,14 +287,15 @@ TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenAskedToEnd) {
   execution.begin_batch();
   execution.batches[0].time_left = 50s;
   conversation->on_drain_request(now);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   tick_after(0s);
-  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(2, 1)) << "it would end after the walltime";
+  EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 1))
+      << "it would end after the walltime";
   tick_after(24s);
   EXPECT_FALSE(conversation->ending().has_value());
   sent.clear();
   tick_after(1s);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
 }
 
@@ -311,7 +312,7 @@ TEST_F(ConversationTest, HeedsTheDrainTimeAlsoWhenItsWalltimeIsNearlyOver) {
   EXPECT_FALSE(conversation->ending().has_value());
   sent.clear();
   tick_after(1s);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
 }
 
@@ -324,7 +325,7 @@ TEST_F(ConversationTest, GetsNoTimeBeyondItsWalltimeByBeingAskedToEnd) {
   conversation->on_drain_request(now);
   EXPECT_TRUE(sent.empty());
   tick_after(5s);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_WALLTIME);
   expect_ending(Ending::Kind::done, "out of time with 1 results not acknowledged");
 }
 
@@ -333,10 +334,10 @@ TEST_F(ConversationTest, LeavesAfterTheIdleTimeout) {
   now += 299s;
   conversation->on_slept(298s);
   tick_after(1s);  // The coordinator has been silent for 2 s, and the worker idle for as long.
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   EXPECT_FALSE(conversation->ending().has_value());
   tick_after(298s);
-  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::drained);
+  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
   expect_ending(Ending::Kind::done, "no run for 300 s");
 }
 
@@ -344,27 +345,27 @@ TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {
   register_with_campaign({.resend_after = std::chrono::hours(1), .idle_timeout = 300s});
   receive(lease(0, 1));
   tick_after(400s);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   execution.finish_lease();
   conversation->on_progress(now);
-  (void)take_sent<wire::ResultBatch>();
+  (void)take_sent<proto::ResultBatch>();
   tick_after(400s);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   acknowledge({{0}});
   tick_after(299s);
-  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<proto::Heartbeat>();
   EXPECT_FALSE(conversation->ending().has_value());
   tick_after(1s);
-  (void)take_sent<wire::Bye>();
+  (void)take_sent<proto::Bye>();
   expect_ending(Ending::Kind::done, "no run for 300 s");
 }
 
 TEST_F(ConversationTest, StaysIdleWithoutATimeout) {
   register_with_campaign();
   for (int i = 0; i < 50; ++i) {
-    receive(wire::HeartbeatAck{});
+    receive(proto::HeartbeatAck());
     tick_after(3000s);
-    (void)take_sent<wire::Heartbeat>();
+    (void)take_sent<proto::Heartbeat>();
   }
   EXPECT_FALSE(conversation->ending().has_value());
 }

@@ -13,10 +13,19 @@
 
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/runs.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "worker/net/conversation.hpp"
 
 namespace proofmass::worker {
+
+/// Some runs of a lease.
+struct WaitingRuns {
+  wire::CampaignId campaign;
+  RunRange runs;
+  bool is_alone = false;
+  std::uint32_t batch_runs_max = 0;
+};
 
 /// An execution that computes when the test says so.
 class FakeExecution final : public Execution {
@@ -25,11 +34,15 @@ class FakeExecution final : public Execution {
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign>) override {
     EXPECT_TRUE(defined.insert(campaign).second);
   }
-  void submit(wire::RunLease lease) override { waiting.push_back(std::move(lease)); }
+  void submit(const proto::RunLease& lease, std::span<const RunRange> ranges) override {
+    for (const RunRange& runs : ranges) {
+      waiting.push_back({{lease.campaign()}, runs, lease.is_alone(), lease.batch_runs_max()});
+    }
+  }
   std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
                                      std::span<const RunRange> ranges) override {
     std::vector<RunIndex> dropped;
-    for (const wire::RunLease& lease : std::exchange(waiting, {})) {
+    for (const WaitingRuns& lease : std::exchange(waiting, {})) {
       for (const RunIndex run : indices_of(std::array{lease.runs})) {
         const auto has_run = [&](const RunRange& range) {
           return range.first <= run && run.value < range.end();
@@ -37,8 +50,7 @@ class FakeExecution final : public Execution {
         if (lease.campaign == campaign && std::ranges::any_of(ranges, has_run)) {
           dropped.push_back(run);
         } else {
-          waiting.push_back(
-              {lease.campaign, {run, 1}, lease.attempt, lease.is_alone, lease.batch_runs_max, {}});
+          waiting.push_back({lease.campaign, {run, 1}, lease.is_alone, lease.batch_runs_max});
         }
       }
     }
@@ -61,26 +73,27 @@ class FakeExecution final : public Execution {
 
   /// The oldest lease becomes a batch.
   void begin_batch() {
-    const wire::RunLease lease = take_oldest();
+    const WaitingRuns lease = take_oldest();
     batches.push_back({.number = batches.size() + 1,
-                       .progress = {lease.campaign, {lease.runs}, 0},
+                       .campaign = lease.campaign,
+                       .ranges = {lease.runs},
                        .time_left = std::nullopt});
   }
   /// The oldest lease is computed.
   void finish_lease() {
-    const wire::RunLease lease = take_oldest();
+    const WaitingRuns lease = take_oldest();
     finish(lease.campaign, {lease.runs});
   }
   /// The oldest batch is.
   void finish_batch() {
     const RunningBatch batch = batches.front();
     batches.erase(batches.begin());
-    finish(batch.progress.campaign, batch.progress.ranges);
+    finish(batch.campaign, batch.ranges);
   }
 
   std::set<wire::CampaignId> defined;
   std::vector<wire::CampaignId> forgotten;
-  std::deque<wire::RunLease> waiting;
+  std::deque<WaitingRuns> waiting;
   std::vector<RunningBatch> batches;
   std::vector<FinishedRun> finished;
   std::optional<Duration> batch_time;
@@ -88,8 +101,8 @@ class FakeExecution final : public Execution {
   int num_abandons = 0;
 
  private:
-  wire::RunLease take_oldest() {
-    const wire::RunLease lease = waiting.front();
+  WaitingRuns take_oldest() {
+    const WaitingRuns lease = waiting.front();
     waiting.pop_front();
     return lease;
   }
@@ -107,54 +120,63 @@ constexpr wire::Epoch first_epoch{5};
 constexpr wire::CampaignId campaign_1{1};
 constexpr wire::CampaignId campaign_2{2};
 
-inline wire::RunLease lease(std::uint64_t first, std::uint64_t count, std::uint32_t attempt = 1,
-                            wire::CampaignId campaign = campaign_1) {
-  return {.campaign = campaign, .runs = {{first}, count}, .attempt = {attempt}, .table_values = {}};
+inline proto::RunLease lease(std::uint64_t first, std::uint64_t count, std::uint32_t attempt = 1,
+                             wire::CampaignId campaign = campaign_1) {
+  return test::make_lease(campaign, {{first}, count}, {attempt});
 }
 
 /// A definition of one part.
-inline wire::DefinitionPart definition(wire::CampaignId campaign,
-                                       const MicroscopeCampaign& content = {}) {
-  return wire::EncodedDefinition(definition_of(content, TableColumns::left_out))
-      .part({.campaign = campaign});
+inline proto::DefinitionPart definition(wire::CampaignId campaign,
+                                        const MicroscopeCampaign& content = {}) {
+  return wire::EncodedDefinition(definition_of(content, TableColumns::left_out)).part(campaign, 0);
 }
 
-inline std::vector<wire::HeldRuns> held(std::uint64_t first, std::uint64_t count,
-                                        std::uint32_t attempt = 1) {
-  return {{campaign_1, {attempt}, {{{first}, count}}}};
+inline std::vector<proto::HeldRuns> held(std::uint64_t first, std::uint64_t count,
+                                         std::uint32_t attempt = 1) {
+  return {test::make_held(campaign_1, {attempt}, {{{first}, count}})};
 }
 
 /// A conversation; each test ends with a check that nothing was sent that it has not named.
 class ConversationTest : public testing::Test {
  protected:
-  wire::Packet take_packet() {
+  proto::Envelope take_envelope() {
     if (sent.empty()) throw std::logic_error("nothing was sent");
-    wire::Packet packet = sent.front();
+    proto::Envelope envelope = sent.front();
     sent.pop_front();
-    return packet;
+    return envelope;
   }
   template <typename Content>
   Content take_sent() {
-    return std::get<Content>(take_packet().message);
+    return test::content_of<Content>(take_envelope());
   }
 
-  void receive(wire::Message message, wire::Epoch epoch = first_epoch) {
-    conversation->on_packet({{session, epoch, ++num_received}, std::move(message)}, now);
+  template <typename Content>
+  void receive(const Content& content, wire::Epoch epoch = first_epoch) {
+    receive_in(session, content, epoch, ++num_received);
+  }
+  template <typename Content>
+  void receive_in(wire::SessionId of, const Content& content, wire::Epoch epoch = first_epoch,
+                  std::uint64_t number = 1) {
+    proto::Envelope envelope = test::in_envelope(content);
+    envelope.set_session(of.value);
+    envelope.set_epoch(epoch.value);
+    envelope.set_sequence(number);
+    conversation->on_message(envelope, now);
   }
   void reject_unregistered(wire::Epoch epoch = first_epoch) {
-    receive(wire::Reject{.reason = wire::RejectReason::not_registered, .text = ""}, epoch);
+    receive(test::make_reject(proto::REJECT_REASON_NOT_REGISTERED), epoch);
   }
   void tick_after(Duration time) { conversation->on_tick(now += time); }
 
   void start(const ConversationConfig& config = {}) {
     conversation.emplace(
-        session, hello, execution, [this](const wire::Packet& packet) { sent.push_back(packet); },
-        now, config);
+        session, hello, execution,
+        [this](proto::Envelope message) { sent.push_back(std::move(message)); }, now, config);
   }
   void register_here() {
-    (void)take_sent<wire::Hello>();
+    (void)take_sent<proto::Hello>();
     receive(welcome);
-    (void)take_sent<wire::Heartbeat>();
+    (void)take_sent<proto::Heartbeat>();
   }
   /// Registered, and knows the first campaign.
   void register_with_campaign(const ConversationConfig& config = {}) {
@@ -163,13 +185,13 @@ class ConversationTest : public testing::Test {
     execution.defined.insert(campaign_1);
   }
   /// A lease of these runs arrives and is computed; its results have been sent.
-  wire::ResultBatch compute(const wire::RunLease& lent) {
+  proto::ResultBatch compute(const proto::RunLease& lent) {
     receive(lent);
     execution.finish_lease();
     conversation->on_progress(now);
-    return take_sent<wire::ResultBatch>();
+    return take_sent<proto::ResultBatch>();
   }
-  void acknowledge(std::vector<RunIndex> runs) { receive(wire::ResultAck{campaign_1, runs}); }
+  void acknowledge(std::vector<RunIndex> runs) { receive(test::make_ack(campaign_1, runs)); }
 
   void expect_ending(Ending::Kind kind, const std::string& reason) {
     ASSERT_TRUE(conversation->ending().has_value());
@@ -177,22 +199,14 @@ class ConversationTest : public testing::Test {
     EXPECT_EQ(conversation->ending()->reason, reason);
   }
 
-  void TearDown() override {
-    EXPECT_TRUE(sent.empty()) << "first of kind " << sent.front().message.index();
-  }
+  void TearDown() override { EXPECT_TRUE(sent.empty()) << sent.front().ShortDebugString(); }
 
-  const wire::Hello hello{.worker_name = "w",
-                          .host = "h",
-                          .process_id = 1,
-                          .num_slots = 1,
-                          .model_version = "m",
-                          .build = "b",
-                          .former = {}};
-  const wire::Welcome welcome{.worker = {1}, .heartbeat_interval_s = 2.0};
+  const proto::Hello hello = test::make_hello("w", "h", 1, "m");
+  const proto::Welcome welcome = test::make_welcome({1}, 2.0);
   wire::SessionId session = own_session;
   TimePoint now = TimePoint{} + std::chrono::hours(1);
   FakeExecution execution;
-  std::deque<wire::Packet> sent;
+  std::deque<proto::Envelope> sent;
   std::uint64_t num_received = 0;
   std::optional<Conversation> conversation;
 };

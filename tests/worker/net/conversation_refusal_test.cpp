@@ -6,13 +6,11 @@ namespace proofmass::worker {
 namespace {
 
 using namespace std::chrono_literals;
-using wire::RejectReason;
+using proto::RejectReason;
 
 class RefusalTest : public ConversationTest {
  protected:
-  void refuse(RejectReason reason) {
-    receive(wire::Reject{.reason = reason, .text = "not now"}, first_epoch);
-  }
+  void refuse(RejectReason reason) { receive(test::make_reject(reason, "not now"), first_epoch); }
   [[nodiscard]] std::vector<std::string> events() {
     std::vector<std::string> texts;
     for (const wire::Event& event : conversation->take_events()) texts.push_back(to_text(event));
@@ -28,16 +26,16 @@ class RefusalTest : public ConversationTest {
 
 TEST_F(RefusalTest, IsFinalIfItIsIncompatible) {
   start();
-  (void)take_sent<wire::Hello>();
-  refuse(RejectReason::incompatible);
+  (void)take_sent<proto::Hello>();
+  refuse(proto::REJECT_REASON_INCOMPATIBLE);
   expect_ending(Ending::Kind::failed, "refused by the coordinator: not now");
 }
 
 // The list of keys may have been cut off for a moment: then the handshakes fail, too.
 TEST_F(RefusalTest, IsFinalIfTheKeyIsRevokedForMinutes) {
   start();
-  (void)take_sent<wire::Hello>();
-  refuse(RejectReason::revoked);
+  (void)take_sent<proto::Hello>();
+  refuse(proto::REJECT_REASON_REVOKED);
   const TimePoint revoked_at = now;
   int num_connections = 0;
   while (now - revoked_at < 299s) {
@@ -53,8 +51,8 @@ TEST_F(RefusalTest, IsFinalIfTheKeyIsRevokedForMinutes) {
 
 TEST_F(RefusalTest, IsForgottenIfTheKeyIsListedAgain) {
   start();
-  (void)take_sent<wire::Hello>();
-  refuse(RejectReason::revoked);
+  (void)take_sent<proto::Hello>();
+  refuse(proto::REJECT_REASON_REVOKED);
   tick_after(200s);
   conversation->on_connected(now);
   receive(welcome);
@@ -66,9 +64,9 @@ TEST_F(RefusalTest, IsForgottenIfTheKeyIsListedAgain) {
 }
 
 TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {
-  for (const RejectReason reason : {RejectReason::full, RejectReason::quarantined}) {
+  for (const RejectReason reason : {proto::REJECT_REASON_FULL, proto::REJECT_REASON_QUARANTINED}) {
     start();
-    (void)take_sent<wire::Hello>();
+    (void)take_sent<proto::Hello>();
     Duration least = 15s;
     for (int i = 0; i < 5; ++i) {
       refuse(reason);
@@ -76,7 +74,7 @@ TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {
       const Duration passed = time_until_next_message();
       EXPECT_GE(passed, least);
       EXPECT_LE(passed, least + least / 4 + 100ms);
-      (void)take_sent<wire::Hello>();
+      (void)take_sent<proto::Hello>();
       EXPECT_FALSE(conversation->take_reconnection());
       least = std::min<Duration>(2 * least, 60s);
     }
@@ -84,7 +82,7 @@ TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {
               std::vector<std::string>{"refused reason=\"not now\" (asks again every 15 to 60 s)"})
         << "once";
     receive(welcome);
-    (void)take_sent<wire::Heartbeat>();
+    (void)take_sent<proto::Heartbeat>();
     EXPECT_TRUE(conversation->is_registered());
     EXPECT_FALSE(conversation->ending().has_value());
   }
@@ -93,7 +91,7 @@ TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {
 TEST_F(RefusalTest, NeedsAnotherConnectionIfSomethingBrokeTheRules) {
   register_with_campaign();
   (void)compute(lease(10, 1));
-  refuse(RejectReason::malformed);
+  refuse(proto::REJECT_REASON_MALFORMED);
   EXPECT_FALSE(conversation->is_registered());
   EXPECT_FALSE(conversation->take_reconnection()) << "not at once";
   Duration passed{};
@@ -106,18 +104,17 @@ TEST_F(RefusalTest, NeedsAnotherConnectionIfSomethingBrokeTheRules) {
   EXPECT_GE(passed, 15s);
   EXPECT_FALSE(conversation->take_reconnection()) << "once";
   conversation->on_connected(now);
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   receive(welcome);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(10, 1));
-  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), 1U) << "what it computed is kept";
+  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), held(10, 1));
+  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), 1) << "what it computed is kept";
 }
 
 // Who cannot be understood at all is told so without the name of a session.
 TEST_F(RefusalTest, IsHeardUnderAnySession) {
   start();
-  (void)take_sent<wire::Hello>();
-  conversation->on_packet(
-      {{{1}, first_epoch, 1}, wire::Reject{.reason = RejectReason::malformed, .text = "bad"}}, now);
+  (void)take_sent<proto::Hello>();
+  receive_in({1}, test::make_reject(proto::REJECT_REASON_MALFORMED, "bad"));
   tick_after(1s);
   EXPECT_TRUE(sent.empty());
 }
@@ -125,7 +122,7 @@ TEST_F(RefusalTest, IsHeardUnderAnySession) {
 TEST_F(RefusalTest, GoesOnComputingMeanwhile) {
   register_with_campaign();
   receive(lease(10, 2));
-  refuse(RejectReason::full);
+  refuse(proto::REJECT_REASON_FULL);
   EXPECT_EQ(execution.num_abandons, 0);
   execution.finish_lease();
   conversation->on_progress(now);
@@ -135,29 +132,29 @@ TEST_F(RefusalTest, GoesOnComputingMeanwhile) {
 // The network may hold a refusal back until a later Hello was accepted.
 TEST_F(RefusalTest, ThatIsOvertakenByTheWelcomeMeansNothing) {
   start();
-  (void)take_sent<wire::Hello>();
-  conversation->on_packet({{own_session, first_epoch, 2}, welcome}, now);
-  (void)take_sent<wire::Heartbeat>();
-  for (const RejectReason reason : {RejectReason::full, RejectReason::not_registered}) {
-    conversation->on_packet(
-        {{own_session, first_epoch, 1}, wire::Reject{.reason = reason, .text = ""}}, now);
+  (void)take_sent<proto::Hello>();
+  receive_in(own_session, welcome, first_epoch, 2);
+  (void)take_sent<proto::Heartbeat>();
+  for (const RejectReason reason :
+       {proto::REJECT_REASON_FULL, proto::REJECT_REASON_NOT_REGISTERED}) {
+    receive_in(own_session, test::make_reject(reason));
     EXPECT_TRUE(conversation->is_registered());
   }
 }
 
 TEST_F(RefusalTest, LongAfterTheOneBeforeBeginsAnew) {
   start();
-  (void)take_sent<wire::Hello>();
-  refuse(RejectReason::full);
+  (void)take_sent<proto::Hello>();
+  refuse(proto::REJECT_REASON_FULL);
   (void)time_until_next_message();
-  (void)take_sent<wire::Hello>();
-  refuse(RejectReason::full);
+  (void)take_sent<proto::Hello>();
+  refuse(proto::REJECT_REASON_FULL);
   now += 300s;
   conversation->on_tick(now);
-  (void)take_sent<wire::Hello>();
-  refuse(RejectReason::full);
+  (void)take_sent<proto::Hello>();
+  refuse(proto::REJECT_REASON_FULL);
   EXPECT_LE(time_until_next_message(), 19s);
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
 }
 
 }  // namespace

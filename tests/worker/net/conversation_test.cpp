@@ -12,18 +12,21 @@ using namespace std::chrono_literals;
 
 TEST_F(ConversationTest, SaysHelloUntilItIsWelcome) {
   start();
-  const wire::Packet first = take_packet();
-  EXPECT_EQ(std::get<wire::Hello>(first.message).worker_name, "w");
-  EXPECT_EQ(first.header, (wire::Header{own_session, wire::Epoch{}, 1}));
+  const proto::Envelope first = take_envelope();
+  EXPECT_EQ(first.hello().worker_name(), "w");
+  EXPECT_EQ(first.session(), own_session.value);
+  EXPECT_EQ(first.epoch(), 0U);
+  EXPECT_EQ(first.sequence(), 1U);
   tick_after(240ms);
   EXPECT_TRUE(sent.empty());
   tick_after(80ms);  // A quarter more is the most that chance adds.
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
 
   receive(welcome);
-  const wire::Packet heartbeat = take_packet();
-  EXPECT_EQ(heartbeat.header, (wire::Header{own_session, first_epoch, 3}));
-  EXPECT_EQ(std::get<wire::Heartbeat>(heartbeat.message).num_runs_max, wire::runs_per_lease_max);
+  const proto::Envelope heartbeat = take_envelope();
+  EXPECT_EQ(heartbeat.epoch(), first_epoch.value);
+  EXPECT_EQ(heartbeat.sequence(), 3U);
+  EXPECT_EQ(heartbeat.heartbeat().num_runs_max(), wire::runs_per_lease_max);
   receive(welcome);  // The answer to the other Hello changes nothing.
   tick_after(1s);
 }
@@ -47,7 +50,7 @@ TEST_F(ConversationTest, SaysHelloAtOtherTimesThanOtherWorkers) {
   for (std::uint64_t worker = 1; worker <= 20; ++worker) {
     std::size_t num_sent = 0;
     Conversation other(
-        {worker}, hello, execution, [&](const wire::Packet&) { ++num_sent; }, now);
+        {worker}, hello, execution, [&](const proto::Envelope&) { ++num_sent; }, now);
     int num_ticks = 0;
     while (num_sent < 2) other.on_tick(now + ++num_ticks * 1ms);
     ticks_at_second_hello.insert(num_ticks);
@@ -58,10 +61,10 @@ TEST_F(ConversationTest, SaysHelloAtOtherTimesThanOtherWorkers) {
 // The first Hello is lost if the connection was not there yet.
 TEST_F(ConversationTest, SaysHelloAgainOnceItIsConnected) {
   start();
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   now += 10ms;
   conversation->on_connected(now);
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   tick_after(100ms);
 }
 
@@ -70,8 +73,8 @@ TEST_F(ConversationTest, SaysAllItHoldsOnceItIsConnectedAgain) {
   register_with_campaign();
   (void)compute(lease(10, 1));
   conversation->on_connected(now);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(10, 1));
-  (void)take_sent<wire::ResultBatch>();
+  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), held(10, 1));
+  (void)take_sent<proto::ResultBatch>();
 }
 
 TEST_F(ConversationTest, GoesOnComputingWhenItRegistersAgain) {
@@ -79,7 +82,7 @@ TEST_F(ConversationTest, GoesOnComputingWhenItRegistersAgain) {
   (void)compute(lease(10, 1));
   receive(lease(11, 2));
   reject_unregistered(wire::Epoch{6});
-  EXPECT_EQ(take_packet().header.epoch, wire::Epoch{});
+  EXPECT_EQ(take_envelope().epoch(), 0U);
   EXPECT_EQ(execution.num_abandons, 0);
   EXPECT_EQ(execution.waiting.size(), 1U);
   receive(lease(20, 1));  // Of the registration that is over.
@@ -90,29 +93,29 @@ TEST_F(ConversationTest, GoesOnComputingWhenItRegistersAgain) {
   EXPECT_TRUE(sent.empty()) << "nobody would take the results";
 
   receive(welcome, wire::Epoch{6});
-  const wire::Packet heartbeat = take_packet();
-  EXPECT_EQ(heartbeat.header.epoch, wire::Epoch{6});
-  EXPECT_EQ(std::get<wire::Heartbeat>(heartbeat.message).held, held(10, 3));
-  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), 3U);
+  const proto::Envelope heartbeat = take_envelope();
+  EXPECT_EQ(heartbeat.epoch(), 6U);
+  EXPECT_EQ(test::vector_of(heartbeat.heartbeat().held()), held(10, 3));
+  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), 3);
 }
 
 TEST_F(ConversationTest, SaysHelloOnceIfItIsRejectedTwice) {
   register_with_campaign();
   reject_unregistered();
   reject_unregistered();
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
 }
 
 TEST_F(ConversationTest, IgnoresWhatWasMeantForOthers) {
   register_with_campaign();
-  conversation->on_packet({{{78}, first_epoch, 1}, wire::Stop{}}, now);  // A former session.
-  receive(wire::Stop{}, wire::Epoch{4});                                 // A former coordinator.
+  receive_in({78}, proto::Stop());         // A former session.
+  receive(proto::Stop(), wire::Epoch{4});  // A former coordinator.
   EXPECT_FALSE(conversation->ending().has_value());
 }
 
 TEST_F(ConversationTest, GivesUpACoordinatorThatIsSilent) {
   start({.give_up_after = 60s});
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   now += 10s;
   receive(welcome);
   tick_after(59s);
@@ -124,7 +127,7 @@ TEST_F(ConversationTest, GivesUpACoordinatorThatIsSilent) {
 
 TEST_F(ConversationTest, DoesNotCountTheTimeInWhichItWasStopped) {
   start({.give_up_after = 60s});
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   conversation->on_slept(3600s);
   tick_after(3659s);
   EXPECT_FALSE(conversation->ending().has_value());
@@ -149,9 +152,9 @@ TEST_F(ConversationTest, ShowsThatItLives) {
   tick_after(1900ms);
   EXPECT_TRUE(sent.empty());
   tick_after(100ms);
-  const auto heartbeat = take_sent<wire::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_steps_done, 11U);
-  EXPECT_TRUE(heartbeat.held.empty());
+  const auto heartbeat = take_sent<proto::Heartbeat>();
+  EXPECT_EQ(heartbeat.num_steps_done(), 11U);
+  EXPECT_TRUE(heartbeat.held().empty());
 }
 
 TEST_F(ConversationTest, SaysAllThatItHolds) {
@@ -162,12 +165,12 @@ TEST_F(ConversationTest, SaysAllThatItHolds) {
   receive(lease(15, 1));
   receive(lease(20, 1, 2));
   tick_after(2s);
-  const auto heartbeat = take_sent<wire::Heartbeat>();
-  const std::vector<wire::HeldRuns> expected{{campaign_1, {1}, {{{10}, 6}}},
-                                             {campaign_1, {2}, {{{20}, 1}}}};
-  EXPECT_EQ(heartbeat.held, expected);
-  ASSERT_EQ(heartbeat.computing.size(), 1U);
-  EXPECT_EQ(heartbeat.computing[0], (wire::ComputedBatch{campaign_1, {{{12}, 3}}, 0}));
+  const auto heartbeat = take_sent<proto::Heartbeat>();
+  const std::vector<proto::HeldRuns> expected{test::make_held(campaign_1, {1}, {{{10}, 6}}),
+                                              test::make_held(campaign_1, {2}, {{{20}, 1}})};
+  EXPECT_EQ(test::vector_of(heartbeat.held()), expected);
+  ASSERT_EQ(heartbeat.computing_size(), 1);
+  EXPECT_EQ(heartbeat.computing(0), test::make_computed_batch(campaign_1, {{{12}, 3}}));
 }
 
 TEST_F(ConversationTest, SaysSoonWhatItComputesNow) {
@@ -177,19 +180,19 @@ TEST_F(ConversationTest, SaysSoonWhatItComputesNow) {
   tick_after(900ms);
   EXPECT_TRUE(sent.empty());
   tick_after(100ms);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().computing.size(), 1U);
+  EXPECT_EQ(take_sent<proto::Heartbeat>().computing_size(), 1);
   tick_after(1900ms);
   EXPECT_TRUE(sent.empty()) << "it computes the same";
   execution.finish_batch();
   tick_after(0s);
-  EXPECT_TRUE(take_sent<wire::Heartbeat>().computing.empty());
+  EXPECT_TRUE(take_sent<proto::Heartbeat>().computing().empty());
 }
 
 TEST_F(ConversationTest, CountsUnacknowledgedResultsAgainstItsCredit) {
   register_with_campaign();
   (void)compute(lease(0, 96));
   tick_after(2s);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 4000U);
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 4000U);
 }
 
 // Leases.
@@ -207,9 +210,9 @@ TEST_F(ConversationTest, TakesFromALeaseWhatItDoesNotHold) {
   register_with_campaign();
   (void)compute(lease(1, 1));
   receive(lease(3, 1));
-  wire::RunLease all = lease(0, 6, 2);
-  all.is_alone = true;
-  all.batch_runs_max = 7;
+  proto::RunLease all = lease(0, 6, 2);
+  all.set_is_alone(true);
+  all.set_batch_runs_max(7);
   receive(all);
   ASSERT_EQ(execution.waiting.size(), 4U);
   EXPECT_EQ(execution.waiting[1].runs, (RunRange{{0}, 1}));
@@ -219,21 +222,6 @@ TEST_F(ConversationTest, TakesFromALeaseWhatItDoesNotHold) {
   EXPECT_EQ(execution.waiting[3].batch_runs_max, 7U);
 }
 
-TEST_F(ConversationTest, HandsOverTheTableValuesOfTheRunsThatItTakes) {
-  start();
-  register_here();
-  execution.defined.insert(campaign_1);
-  wire::RunLease one = lease(1, 1);
-  one.table_values = {1.0, 1.5};
-  receive(one);
-  wire::RunLease all = lease(0, 3);
-  all.table_values = {0.0, 0.5, 1.0, 1.5, 2.0, 2.5};
-  receive(all);
-  ASSERT_EQ(execution.waiting.size(), 3U);
-  EXPECT_EQ(execution.waiting[1].table_values, (std::vector<double>{0.0, 0.5}));
-  EXPECT_EQ(execution.waiting[2].table_values, (std::vector<double>{2.0, 2.5}));
-}
-
 // The runs were taken from this worker and lent to it again before it said that it has them.
 TEST_F(ConversationTest, NamesTheLargestAttemptUnderWhichItWasLentARun) {
   register_with_campaign();
@@ -241,10 +229,10 @@ TEST_F(ConversationTest, NamesTheLargestAttemptUnderWhichItWasLentARun) {
   receive(lease(10, 1, 3));
   receive(lease(10, 1, 2));
   tick_after(2s);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(10, 1, 3));
+  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), held(10, 1, 3));
   execution.finish_lease();
   conversation->on_progress(now);
-  EXPECT_EQ(take_sent<wire::ResultBatch>().attempt, wire::Attempt{3});
+  EXPECT_EQ(take_sent<proto::ResultBatch>().attempt(), 3U);
 }
 
 TEST_F(ConversationTest, GivesBackWhatIsNotBeingComputed) {
@@ -252,13 +240,13 @@ TEST_F(ConversationTest, GivesBackWhatIsNotBeingComputed) {
   receive(lease(0, 2));
   execution.begin_batch();
   receive(lease(2, 4, 2));
-  receive(wire::Retract{campaign_1, {{{1}, 2}, {{4}, 10}}});
-  const auto answer = take_sent<wire::GiveBack>();
-  EXPECT_EQ(answer.reason, wire::LossReason::retracted);
-  const std::vector<wire::HeldRuns> expected{{campaign_1, {2}, {{{2}, 1}, {{4}, 2}}}};
-  EXPECT_EQ(answer.runs, expected);
+  receive(test::make_retract(campaign_1, {{{1}, 2}, {{4}, 10}}));
+  const auto answer = take_sent<proto::GiveBack>();
+  EXPECT_EQ(answer.reason(), proto::LOSS_REASON_RETRACTED);
+  const std::vector expected{test::make_held(campaign_1, {2}, {{{2}, 1}, {{4}, 2}})};
+  EXPECT_EQ(test::vector_of(answer.runs()), expected);
   EXPECT_EQ(conversation->num_unfinished(), 3U);
-  receive(wire::Retract{campaign_1, {{{1}, 2}, {{4}, 10}}});
+  receive(test::make_retract(campaign_1, {{{1}, 2}, {{4}, 10}}));
   EXPECT_TRUE(sent.empty()) << "it has none of them";
 }
 
@@ -266,11 +254,11 @@ TEST_F(ConversationTest, GivesBackWhatIsNotBeingComputed) {
 
 TEST_F(ConversationTest, SendsResultsOfALeaseTogether) {
   register_with_campaign();
-  const wire::ResultBatch batch = compute(lease(10, 2, 4));
-  EXPECT_EQ(batch.campaign, campaign_1);
-  EXPECT_EQ(batch.attempt, wire::Attempt{4});
-  ASSERT_EQ(batch.results.size(), 2U);
-  EXPECT_EQ(batch.results[1].result.run, RunIndex{11});
+  const proto::ResultBatch batch = compute(lease(10, 2, 4));
+  EXPECT_EQ(batch.campaign(), campaign_1.value);
+  EXPECT_EQ(batch.attempt(), 4U);
+  ASSERT_EQ(batch.results_size(), 2);
+  EXPECT_EQ(batch.results(1).run(), 11U);
 }
 
 TEST_F(ConversationTest, RepeatsResultsUntilTheyAreAcknowledged) {
@@ -280,14 +268,14 @@ TEST_F(ConversationTest, RepeatsResultsUntilTheyAreAcknowledged) {
   EXPECT_EQ(conversation->num_unacknowledged(), 1U);
 
   tick_after(5s);
-  const auto again = take_sent<wire::ResultBatch>();
-  ASSERT_EQ(again.results.size(), 1U);
-  EXPECT_EQ(again.results[0].result.run, RunIndex{11});
-  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(11, 1));
+  const auto again = take_sent<proto::ResultBatch>();
+  ASSERT_EQ(again.results_size(), 1);
+  EXPECT_EQ(again.results(0).run(), 11U);
+  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), held(11, 1));
 
   acknowledge({{11}});
   tick_after(60s);
-  EXPECT_TRUE(take_sent<wire::Heartbeat>().held.empty());
+  EXPECT_TRUE(take_sent<proto::Heartbeat>().held().empty());
 }
 
 // After 5, 10, 20, 40, 60, 60 s.
@@ -298,9 +286,7 @@ TEST_F(ConversationTest, RepeatsResultsEverMoreSeldom) {
   for (int time_s = 1; time_s <= 200; ++time_s) {
     tick_after(1s);
     while (!sent.empty()) {
-      if (std::holds_alternative<wire::ResultBatch>(take_packet().message)) {
-        repeated_at_s.push_back(time_s);
-      }
+      if (take_envelope().has_result_batch()) repeated_at_s.push_back(time_s);
     }
   }
   EXPECT_EQ(repeated_at_s, (std::vector<int>{5, 15, 35, 75, 135, 195}));
@@ -309,7 +295,7 @@ TEST_F(ConversationTest, RepeatsResultsEverMoreSeldom) {
 TEST_F(ConversationTest, IgnoresAnAcknowledgementOfAnotherCampaign) {
   register_with_campaign();
   (void)compute(lease(10, 1));
-  receive(wire::ResultAck{campaign_2, {{10}}});
+  receive(test::make_ack(campaign_2, {{10}}));
   EXPECT_EQ(conversation->num_unacknowledged(), 1U);
 }
 
@@ -318,11 +304,11 @@ TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
   wire::LeasedResult result{campaign_2, {3}, {}};
   result.computed.result = test::zero_result({.run = {9}});
   conversation->restore({result});
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   receive(welcome);
-  const std::vector<wire::HeldRuns> expected{{campaign_2, {3}, {{{9}, 1}}}};
-  EXPECT_EQ(take_sent<wire::Heartbeat>().held, expected);
-  EXPECT_EQ(take_sent<wire::ResultBatch>().attempt, wire::Attempt{3});
+  const std::vector expected{test::make_held(campaign_2, {3}, {{{9}, 1}})};
+  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), expected);
+  EXPECT_EQ(take_sent<proto::ResultBatch>().attempt(), 3U);
   EXPECT_EQ(conversation->unacknowledged().at(0).computed.result.run, RunIndex{9});
 }
 
@@ -335,14 +321,14 @@ TEST_F(ConversationTest, SendsManyResultsOneMessageATick) {
     results[i].computed.result = test::zero_result({.run = {i}});
   }
   conversation->restore(results);
-  (void)take_sent<wire::Hello>();
+  (void)take_sent<proto::Hello>();
   receive(welcome);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
-  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), wire::runs_per_lease_max);
+  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
+  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), int{wire::runs_per_lease_max});
   tick_after(100ms);
-  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), wire::runs_per_lease_max);
+  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), int{wire::runs_per_lease_max});
   tick_after(100ms);
-  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), 1U);
+  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), 1);
   tick_after(100ms);
 }
 

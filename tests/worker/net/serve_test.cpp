@@ -14,6 +14,7 @@
 #include "proto/wire/definition_codec.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/faults/planned_faults.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "worker/execution/executor.hpp"
 #include "worker/spool/spool.hpp"
@@ -43,13 +44,18 @@ class Coordinator {
       if (!socket_.recv(peer) || !socket_.recv(frame)) throw std::runtime_error("nothing came");
       peer_ = peer.to_string();
       const auto decoded = wire::decode(frame.to_string_view());
-      const auto& packet = std::get<wire::Packet>(decoded);
-      EXPECT_EQ(packet.header.session, session);
-      if (const auto* const content = std::get_if<Content>(&packet.message)) return *content;
+      const auto& envelope = std::get<proto::Envelope>(decoded);
+      EXPECT_EQ(envelope.session(), session.value);
+      if (test::holds<Content>(envelope)) return test::content_of<Content>(envelope);
     }
   }
-  void send(wire::Message message) {
-    send_bytes(wire::encode({{session, epoch, ++num_sent_}, std::move(message)}));
+  template <typename Content>
+  void send(const Content& content) {
+    proto::Envelope envelope = test::in_envelope(content);
+    envelope.set_session(session.value);
+    envelope.set_epoch(epoch.value);
+    envelope.set_sequence(++num_sent_);
+    send_bytes(wire::encode(envelope));
   }
   /// The connection on which the last message came.
   [[nodiscard]] const std::string& peer() const { return peer_; }
@@ -58,15 +64,14 @@ class Coordinator {
     socket_.send(zmq::buffer(bytes));
   }
   /// The worker registers, asks for the campaign and delivers the first two runs.
-  wire::ResultBatch have_two_runs_computed() {
-    (void)receive<wire::Hello>();
-    send(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 1.0});
-    (void)receive<wire::Heartbeat>();
-    send(
-        wire::RunLease{.campaign = campaign, .runs = {{0}, 2}, .attempt = {1}, .table_values = {}});
-    (void)receive<wire::CampaignRequest>();
-    send(wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part({.campaign = campaign}));
-    return receive<wire::ResultBatch>();
+  proto::ResultBatch have_two_runs_computed() {
+    (void)receive<proto::Hello>();
+    send(test::make_welcome({1}, 1.0));
+    (void)receive<proto::Heartbeat>();
+    send(test::make_lease(campaign, {{0}, 2}, {1}));
+    (void)receive<proto::CampaignRequest>();
+    send(wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part(campaign, 0));
+    return receive<proto::ResultBatch>();
   }
 
  private:
@@ -94,13 +99,7 @@ class ServeTest : public testing::Test {
   ServeTest() {
     config.endpoint = "ipc://" + (directory / "socket").string();
     config.session = session;
-    config.hello = {.worker_name = "w",
-                    .host = "h",
-                    .process_id = 1,
-                    .num_slots = 1,
-                    .model_version = "m",
-                    .build = "b",
-                    .former = {}};
+    config.hello = test::make_hello("w", "h", 1, "m");
   }
 
   /// Serves in a thread of its own, which gets its signals.
@@ -125,10 +124,10 @@ class ServeTest : public testing::Test {
 TEST_F(ServeTest, ComputesForACoordinatorUntilItIsDrained) {
   Coordinator coordinator(config.endpoint);
   std::future<Ending> ending = start_worker();
-  EXPECT_EQ(coordinator.have_two_runs_computed().results.size(), 2U);
-  coordinator.send(wire::ResultAck{campaign, {{0}, {1}}});
-  coordinator.send(wire::Drain{});
-  EXPECT_EQ(coordinator.receive<wire::Bye>().reason, wire::LossReason::drained);
+  EXPECT_EQ(coordinator.have_two_runs_computed().results_size(), 2);
+  coordinator.send(test::make_ack(campaign, {{0}, {1}}));
+  coordinator.send(proto::Drain());
+  EXPECT_EQ(coordinator.receive<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
   const Ending end = ending.get();
   EXPECT_EQ(end.kind, Ending::Kind::done);
   EXPECT_EQ(end.reason, "drained");
@@ -139,19 +138,19 @@ TEST_F(ServeTest, DrainsAtASignal) {
   std::future<Ending> ending = start_worker();
   (void)coordinator.have_two_runs_computed();
   pthread_kill(worker_thread.get(), SIGTERM);
-  EXPECT_EQ(coordinator.receive<wire::Heartbeat>().held.size(), 1U) << "not acknowledged yet";
-  coordinator.send(wire::ResultAck{campaign, {{0}, {1}}});
-  EXPECT_EQ(coordinator.receive<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(coordinator.receive<proto::Heartbeat>().held().size(), 1U) << "not acknowledged yet";
+  coordinator.send(test::make_ack(campaign, {{0}, {1}}));
+  EXPECT_EQ(coordinator.receive<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   EXPECT_EQ(ending.get().reason, "nothing left to do");
 }
 
 TEST_F(ServeTest, IsNotDisturbedByRubbish) {
   Coordinator coordinator(config.endpoint);
   std::future<Ending> ending = start_worker();
-  (void)coordinator.receive<wire::Hello>();
+  (void)coordinator.receive<proto::Hello>();
   coordinator.send_bytes("rubbish");
-  coordinator.send(wire::Stop{});  // Of no coordinator that the worker has registered with.
-  coordinator.send(wire::Reject{.reason = wire::RejectReason::incompatible, .text = "enough"});
+  coordinator.send(proto::Stop());  // Of no coordinator that the worker has registered with.
+  coordinator.send(test::make_reject(proto::REJECT_REASON_INCOMPATIBLE, "enough"));
   EXPECT_EQ(ending.get().reason, "refused by the coordinator: enough");
 }
 
@@ -162,12 +161,12 @@ TEST_F(ServeTest, ComesAgainOnAnotherConnectionIfItIsClosedOut) {
   std::future<Ending> ending = start_worker();
   (void)coordinator.have_two_runs_computed();
   const std::string first_connection = coordinator.peer();
-  coordinator.send(wire::Reject{.reason = wire::RejectReason::malformed, .text = "bad"});
-  (void)coordinator.receive<wire::Hello>();
+  coordinator.send(test::make_reject(proto::REJECT_REASON_MALFORMED, "bad"));
+  (void)coordinator.receive<proto::Hello>();
   EXPECT_NE(coordinator.peer(), first_connection);
-  coordinator.send(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 1.0});
-  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 2U);
-  coordinator.send(wire::Stop{});
+  coordinator.send(test::make_welcome({1}, 1.0));
+  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 2);
+  coordinator.send(proto::Stop());
   EXPECT_EQ(ending.get().reason, "told to stop");
 }
 
@@ -177,26 +176,26 @@ TEST_F(ServeTest, KeepsItsSpoolWhileACampaignIsNotServed) {
   Coordinator coordinator(config.endpoint);
   std::future<Ending> first = start_worker();
   (void)coordinator.have_two_runs_computed();
-  coordinator.send(wire::Stop{});
+  coordinator.send(proto::Stop());
   EXPECT_EQ(first.get().reason, "told to stop");
 
   std::future<Ending> second = start_worker();
-  (void)coordinator.receive<wire::Hello>();
-  coordinator.send(wire::Welcome{.worker = {2}, .heartbeat_interval_s = 0.05});
-  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 2U);
-  coordinator.send(wire::NotServed{.campaign = campaign, .ranges = {}});
-  while (coordinator.receive<wire::Heartbeat>().set_aside.empty()) {
+  (void)coordinator.receive<proto::Hello>();
+  coordinator.send(test::make_welcome({2}, 0.05));
+  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 2);
+  coordinator.send(test::make_not_served(campaign));
+  while (coordinator.receive<proto::Heartbeat>().set_aside().empty()) {
   }
-  coordinator.send(wire::Stop{});
+  coordinator.send(proto::Stop());
   EXPECT_EQ(second.get().reason, "told to stop");
   EXPECT_EQ(Spool(*config.spool, "m").former_results().size(), 2U);
 
   std::future<Ending> third = start_worker();
-  (void)coordinator.receive<wire::Hello>();
-  coordinator.send(wire::Welcome{.worker = {3}, .heartbeat_interval_s = 1.0});
-  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 2U);
-  coordinator.send(wire::Forget{.campaign = campaign, .num_runs = 2});
-  coordinator.send(wire::Drain{});
+  (void)coordinator.receive<proto::Hello>();
+  coordinator.send(test::make_welcome({3}, 1.0));
+  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 2);
+  coordinator.send(test::make_forget(campaign, 2));
+  coordinator.send(proto::Drain());
   EXPECT_EQ(third.get().reason, "drained");
   EXPECT_FALSE(std::filesystem::exists(*config.spool));
 }
@@ -206,19 +205,19 @@ TEST_F(ServeTest, KeepsResultsForTheNextWorkerInItsSpool) {
   Coordinator coordinator(config.endpoint);
   std::future<Ending> first = start_worker();
   (void)coordinator.have_two_runs_computed();
-  coordinator.send(wire::ResultAck{campaign, {{0}}});
-  coordinator.send(wire::Stop{});
+  coordinator.send(test::make_ack(campaign, {{0}}));
+  coordinator.send(proto::Stop());
   EXPECT_EQ(first.get().reason, "told to stop");
   EXPECT_TRUE(std::filesystem::exists(*config.spool));
 
   std::future<Ending> second = start_worker();
-  (void)coordinator.receive<wire::Hello>();
-  coordinator.send(wire::Welcome{.worker = {2}, .heartbeat_interval_s = 1.0});
-  const auto batch = coordinator.receive<wire::ResultBatch>();
-  ASSERT_EQ(batch.results.size(), 1U);
-  EXPECT_EQ(batch.results[0].result.run, RunIndex{1});
-  coordinator.send(wire::ResultAck{campaign, {{1}}});
-  coordinator.send(wire::Drain{});
+  (void)coordinator.receive<proto::Hello>();
+  coordinator.send(test::make_welcome({2}, 1.0));
+  const auto batch = coordinator.receive<proto::ResultBatch>();
+  ASSERT_EQ(batch.results_size(), 1);
+  EXPECT_EQ(batch.results(0).run(), 1U);
+  coordinator.send(test::make_ack(campaign, {{1}}));
+  coordinator.send(proto::Drain());
   EXPECT_EQ(second.get().reason, "drained");
   EXPECT_FALSE(std::filesystem::exists(*config.spool));
 }
@@ -241,22 +240,21 @@ TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
   config.conversation.resend_after = std::chrono::milliseconds(50);
   Coordinator coordinator(config.endpoint);
   std::future<Ending> ending = start_worker();
-  (void)coordinator.receive<wire::Hello>();
+  (void)coordinator.receive<proto::Hello>();
   for (int i = 0; i < 20; ++i) {
-    coordinator.send(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 0.01});
+    coordinator.send(test::make_welcome({1}, 0.01));
   }
-  (void)coordinator.receive<wire::Heartbeat>();
+  (void)coordinator.receive<proto::Heartbeat>();
+  for (int i = 0; i < 20; ++i) {
+    coordinator.send(test::make_lease(campaign, {{0}, 1}, {1}));
+  }
+  (void)coordinator.receive<proto::CampaignRequest>();
   for (int i = 0; i < 20; ++i) {
     coordinator.send(
-        wire::RunLease{.campaign = campaign, .runs = {{0}, 1}, .attempt = {1}, .table_values = {}});
+        wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part(campaign, 0));
   }
-  (void)coordinator.receive<wire::CampaignRequest>();
-  for (int i = 0; i < 20; ++i) {
-    coordinator.send(
-        wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part({.campaign = campaign}));
-  }
-  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 1U);
-  for (int i = 0; i < 20; ++i) coordinator.send(wire::Stop{});
+  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 1);
+  for (int i = 0; i < 20; ++i) coordinator.send(proto::Stop());
   EXPECT_EQ(ending.get().reason, "told to stop");
   wire::plan_faults({});
 }

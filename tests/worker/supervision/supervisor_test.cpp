@@ -97,9 +97,9 @@ class SupervisorTest : public testing::Test {
   /// Notes what the child was told, and returns how many were started before it.
   int note(const ChildStart& start) {
     if (start.former) {
-      board.former_session = start.former->session.value;
-      board.former_reason = static_cast<int>(start.former->reason);
-      board.former_signal = start.former->signal;
+      board.former_session = start.former->session();
+      board.former_reason = static_cast<int>(start.former->reason());
+      board.former_signal = start.former->signal();
     } else if (board.num_starts == 0) {
       board.first_session = start.session.value;
     }

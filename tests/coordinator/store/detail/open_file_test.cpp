@@ -14,7 +14,9 @@ constexpr TimePoint start{};
 
 EventEntry event(const std::string& kind) { return {.kind = kind, .text = ""}; }
 
-LostRuns loss() { return {.runs = {RunIndex{0}, 1}, .attempt = {1}, .worker = test::session_1}; }
+ReturnedRuns loss() {
+  return {.runs = {RunIndex{0}, 1}, .attempt = {1}, .worker = test::session_1};
+}
 
 std::vector<std::string> kinds_of(const std::vector<Entry>& entries) {
   std::vector<std::string> kinds;

@@ -18,7 +18,7 @@ TEST_F(SchemaTest, MarksTheFileAsACampaign) {
   database.execute(
       "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
       " VALUES (1, 'a', '1', 1, '', 'm', '')");
-  check_campaign_file(database, file());
+  check_campaign_file(database);
 }
 
 // What is asked of the file by others: each parameter with its unit.

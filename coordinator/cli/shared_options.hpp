@@ -1,0 +1,52 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/page/page.hpp"
+
+namespace proofmass::coordinator {
+
+// Options that several commands have.
+
+/// Declares --runs, --seed and --set.
+/// @param overrides  Lives as long as the command.
+void add_override_options(CLI::App& command, Overrides& overrides);
+
+/// When a campaign ends before all of its runs are finished.
+struct StopOptions {
+  std::string rule;                           ///< See parse_stop_rule(); empty for none.
+  std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate.
+};
+
+/// A requirement about a quantity of the model, for help texts: `gain < 1e-3 for 99% with 95%`.
+[[nodiscard]] std::string example_requirement();
+
+/// Declares --until and --failures.
+/// @param options  Lives as long as the command.
+void add_stop_options(CLI::App& command, StopOptions& options);
+
+/// Declares --audit.
+/// @param audit_fraction  Lives as long as the command.
+void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction);
+
+/// Arguments about the live page.
+struct PageOptions {
+  std::string address;                              ///< As it was given; empty: no page.
+  std::optional<std::filesystem::path> token_file;  ///< --page-token-file.
+};
+
+/// Declares `--page` and `--page-token-file`. The flag takes an address only behind a `=`, so that
+/// a file name after it is not taken for one.
+void add_page_options(CLI::App& app, PageOptions& options);
+
+/// Nothing if no page is wanted.
+/// @throws UsageError `page token file = PATH (rule)`, Error as parse_page_address() and
+///         PageConfig::validate() do.
+[[nodiscard]] std::optional<PageConfig> page_config_of(const PageOptions& options);
+
+}  // namespace proofmass::coordinator

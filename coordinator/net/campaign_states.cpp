@@ -1,0 +1,352 @@
+// How the databases of campaigns go from state to state.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/net/campaign_service.hpp"
+#include "coordinator/net/outcome.hpp"
+#include "coordinator/store/campaign_peek.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+std::string not_at_rest(std::string_view campaign) {
+  return fmt::format("campaign = {} (its database is being read or changed; try again)", campaign);
+}
+
+}  // namespace
+
+// Unserved, served and closed.
+
+void CampaignService::add(FileLook look) {
+  const CampaignRecord& campaign = look.record;
+  const std::optional<CampaignRecord> same_name = find(campaign.status.name);
+  const bool is_again =
+      look.store && closed_.contains(campaign.id) && same_name && same_name->id == campaign.id;
+  const bool is_there = same_name || served_.contains(campaign.id) || closed_.contains(campaign.id);
+  if (is_there && !is_again) {
+    throw Error(fmt::format("campaign = {} in {} (is served already, from another file)",
+                            campaign.status.name, campaign.file.string()));
+  }
+  if (!is_again) order_.push_back(campaign.id);
+  if (look.store) return serve(std::move(look));
+  on_ended(state_, campaign.id, campaign.status.num_runs);
+  closed_.emplace(campaign.id, campaign);
+}
+
+void CampaignService::serve(FileLook look) {
+  const CampaignId id = look.record.id;
+  const TimePoint now = context_.now();
+  const bool is_finished = look.stored.control.phase == Phase::finished;
+  served_.emplace(id, Served{.record = std::move(look.record),
+                             .rate = RateMeter(now),
+                             .written = look.stored.control,
+                             .plan = look.plan,
+                             .is_decided = is_finished,
+                             .num_failures_before = look.num_failures,
+                             .is_end_told = is_finished,
+                             .summary = {}});
+  closed_.erase(id);
+  writer_.open(id, *std::move(look.store));
+  on_campaign(state_, id, look.stored, now, outbox_);
+}
+
+void CampaignService::take(FileLook look) {
+  const std::filesystem::path file = look.record.file;
+  if (look.failure.empty()) {
+    const std::string failure = failure_of([&] { add(std::move(look)); });
+    if (failure.empty()) {
+      if (unserved_.erase(file) == 0) return;
+      return outbox_.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
+    }
+    look = {.record = {.file = file}, .failure = failure};
+  }
+  const auto known = unserved_.find(file);
+  const bool is_news = known == unserved_.end() || known->second.failure != look.failure;
+  if (is_news) {
+    outbox_.log({.severity = Severity::error,
+                 .kind = "campaign_not_served",
+                 .fields = {Field::reason(look.failure)}});
+  }
+  unserved_.insert_or_assign(file, std::move(look));
+}
+
+KnownCampaigns CampaignService::known() const {
+  KnownCampaigns known;
+  for (const auto& [id, served] : served_) known.add(served.record);
+  for (const auto& [id, closed] : closed_) known.add(closed);
+  return known;
+}
+
+void CampaignService::unlist(CampaignId id) {
+  closed_.erase(id);
+  std::erase(order_, id);
+  on_unlisted(state_, id);
+}
+
+// The directory.
+
+void CampaignService::review_directory() {
+  const CampaignDirectory* const directory = context_.config.directory;
+  const TimePoint now = context_.now();
+  if (directory == nullptr || is_looking_) return;
+  if (now - looked_at_ < context_.config.writer.retry_after) return;
+  is_looking_ = true;
+  std::vector<CampaignRecord> closed;
+  for (const auto& [id, campaign] : closed_) closed.push_back(campaign);
+  context_.background.post_next([this, directory, now, start = context_.start, known = known(),
+                                 closed = std::move(closed)]() -> Background::Finish {
+    const auto findings = std::make_shared<Findings>(look(*directory, known, closed, start));
+    return [this, findings, now] {
+      is_looking_ = false;
+      looked_at_ = now;
+      take_findings(std::move(*findings));
+    };
+  });
+}
+
+CampaignService::Findings CampaignService::look(const CampaignDirectory& directory,
+                                                KnownCampaigns known,
+                                                const std::vector<CampaignRecord>& closed,
+                                                const CoordinatorStart& start) {
+  Findings findings;
+  const std::string failure = failure_of([&] {
+    for (const CampaignRecord& one : closed) {
+      if (!one.stamp || stamp_of(one.file) == one.stamp) continue;
+      known.remove(one);
+      findings.changed.push_back(one);
+    }
+    findings.looks = look_at_all(directory, known, start);
+  });
+  // Without a file: that of the directory itself.
+  if (!failure.empty()) {
+    findings = {};
+    findings.looks.emplace_back().failure = failure;
+  }
+  return findings;
+}
+
+void CampaignService::take_findings(Findings findings) {
+  std::set<std::filesystem::path> seen;
+  for (const FileLook& look : findings.looks) seen.insert(look.record.file);
+  const auto log_gone = [&](const std::filesystem::path& file, Severity severity) {
+    outbox_.log(
+        {.severity = severity, .kind = "campaign_file_gone", .fields = {{"file", file.string()}}});
+  };
+  for (const CampaignRecord& changed : findings.changed) {
+    const auto found = closed_.find(changed.id);
+    // It may have been looked at again since.
+    if (found == closed_.end() || found->second.stamp != changed.stamp) continue;
+    unlist(changed.id);
+    if (!seen.contains(changed.file)) log_gone(changed.file, Severity::warning);
+  }
+  const std::set<std::filesystem::path> files = known().files;
+  for (FileLook& look : findings.looks) {
+    // It may have been submitted meanwhile.
+    if (!files.contains(look.record.file)) take(std::move(look));
+  }
+  if (seen.contains(std::filesystem::path())) return;  // The directory could not be read.
+  std::erase_if(unserved_, [&, files_now = known().files](const auto& item) {
+    const std::filesystem::path& file = item.first;
+    if (seen.contains(file)) return false;
+    if (!files_now.contains(file)) {
+      log_gone(file, Severity::info);
+    } else {
+      outbox_.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
+    }
+    return true;
+  });
+}
+
+bool CampaignService::is_all_served() const {
+  return std::ranges::all_of(unserved_, [](const auto& item) { return item.second.is_copy; });
+}
+
+std::vector<wire::UnservedFile> CampaignService::unserved(std::size_t count_max) const {
+  std::vector<wire::UnservedFile> files;
+  for (const auto& [file, look] : unserved_) {
+    if (files.size() == count_max) break;
+    files.push_back({.file = file.string(), .reason = look.failure});
+  }
+  return files;
+}
+
+// From served to closed.
+
+bool CampaignService::is_settled(CampaignId id, const Served& served) const {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const bool has_statistics = !served.is_summary_due && !served.summary.valid();
+  const bool is_quiet =
+      campaign.delivered.empty() && campaign.num_comparing == 0 && campaign.storage_failure.empty();
+  return has_statistics && is_quiet && !served.is_held && served.written.phase == phase_of(id);
+}
+
+bool CampaignService::is_finished_and_settled(CampaignId id, const Served& served) const {
+  return is_settled(id, served) && phase_of(id) == Phase::finished &&
+         is_finished(state_.campaigns.at(id));
+}
+
+// A file that is open can be copied if somebody removes it. So the last ones stay open.
+void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
+  const std::size_t count_max = context_.config.finished_open_max;
+  // Without a directory, a file that was closed could not be opened again.
+  if (context_.config.directory == nullptr || ended.size() <= count_max) return;
+  const auto ended_at = [this](CampaignId id) { return served_.at(id).ended_at; };
+  std::ranges::stable_sort(ended, {}, ended_at);
+  ended.resize(ended.size() - count_max);
+  for (const CampaignId id : ended) {
+    const std::optional<TimePoint> tried_at = served_.at(id).closing_at;
+    if (!tried_at || now - *tried_at >= context_.config.writer.retry_after) {
+      begin_closing(id, [](bool) {});
+    }
+  }
+}
+
+void CampaignService::review_rest(CampaignId id, Served& served) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const bool is_quiet = campaign.lent.empty() && campaign.audits.empty() &&
+                        campaign.delivered.empty() && campaign.num_comparing == 0;
+  const bool is_at_rest = is_quiet && phase_of(id) != Phase::active && !served.is_summary_due &&
+                          !served.summary.valid() && !served.is_held;
+  if (is_at_rest && !served.is_at_rest) writer_.rest(id);
+  served.is_at_rest = is_at_rest;
+}
+
+// Nobody must be reading an old state of the file: then it is closed later.
+void CampaignService::begin_closing(CampaignId id, std::function<void(bool is_closing)> then) {
+  served_.at(id).is_held = true;
+  context_.background.post_next([this, id, then = std::move(then)]() -> Background::Finish {
+    bool is_folded = false;
+    // The writer says why it cannot write.
+    (void)failure_of([&] { writer_.access(id, [&](Store& store) { is_folded = !store.rest(); }); });
+    return [this, id, is_folded, then] {
+      Served& served = served_.at(id);
+      served.is_held = false;
+      served.closing_at = context_.now();
+      bool is_closing = is_folded && is_settled(id, served) && has_ended(phase_of(id));
+      try {
+        if (is_closing) close_ended(id);
+      } catch (const std::exception& error) {
+        say_not_closed(error.what());
+        is_closing = false;
+      }
+      then(is_closing);
+    };
+  });
+}
+
+// The dispatch forgets the campaign first: nothing is written any more when the file is closed.
+void CampaignService::close_ended(CampaignId id) {
+  CampaignRecord closed = record_of(id);
+  closed.is_closed = true;
+  closed.num_waiting = 0;
+  closed.status.rate_hz = 0.0;
+  closed.status.remaining_s.reset();
+  const std::filesystem::path file = closed.file;
+  history_.note_closed(id);
+  on_removed(state_, id, outbox_);
+  on_ended(state_, id, closed.status.num_runs);
+  served_.erase(id);
+  closed_.emplace(id, std::move(closed));
+  context_.background.post_next([this, id, file,
+                                 epoch = context_.start.epoch]() -> Background::Finish {
+    std::optional<std::string> reason;
+    const std::string failure = failure_of([&] {
+      Store store = writer_.close(id);
+      std::vector<Entry> entries;
+      for (const SessionId session : store.attached_sessions()) {
+        entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
+      }
+      if (!entries.empty()) (void)store.write(entries);
+      store.end_coordinator(epoch);
+      reason = store.rest();
+    });
+    if (!failure.empty()) reason = failure;
+    // The stamp of no file has a file looked at again, which serves one whose log is still needed.
+    const std::optional<FileStamp> stamp = reason ? FileStamp{} : stamp_of(file);
+    return [this, id, stamp, reason] {
+      const auto found = closed_.find(id);
+      if (found == closed_.end()) return;
+      found->second.stamp = stamp;
+      if (reason) return say_not_closed(*reason);
+      outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name}}});
+    };
+  });
+}
+
+void CampaignService::archive(CampaignId id, const Respond& respond) {
+  if (context_.config.directory == nullptr) {
+    throw Error(
+        "this coordinator has no directory, which archived campaigns need; start it with "
+        "--directory");
+  }
+  const auto found = served_.find(id);
+  if (found == served_.end()) return move_to_archive(id, respond);
+  if (!is_settled(id, found->second)) {
+    throw Error(fmt::format("campaign = {} (something is still to be stored; try again)",
+                            found->second.record.status.name));
+  }
+  begin_closing(id, [this, id, respond, name = found->second.record.status.name](bool is_closing) {
+    if (is_closing) return move_to_archive(id, respond);
+    respond(wire::error_reply(not_at_rest(name)));
+  });
+}
+
+// What closes the file was posted before.
+void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
+  const CampaignRecord& campaign = closed_.at(id);
+  context_.background.post_next([this, id, respond, file = campaign.file,
+                                 name = campaign.status.name]() -> Background::Finish {
+    std::filesystem::path place;
+    const std::string failure = failure_of([&] {
+      // A log that is left behind has results, and nobody could use the name again.
+      if (has_journal(file)) throw Error(not_at_rest(name));
+      place = context_.config.directory->archive(file);
+    });
+    return [this, id, respond, place, failure, name] {
+      if (!failure.empty()) return respond(wire::error_reply(failure));
+      // Looking at the directory may have found out before that the file is gone.
+      if (closed_.contains(id)) unlist(id);
+      outbox_.log(
+          {.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place.string()}}});
+      respond(wire::done_reply(
+          fmt::format("campaign {}: its database is {} now", name, place.string())));
+    };
+  });
+}
+
+void CampaignService::say_not_closed(std::string_view reason) {
+  outbox_.log({.severity = Severity::warning,
+               .kind = "campaign_not_closed",
+               .fields = {Field::reason(reason)}});
+}
+
+std::vector<ServedCampaign> CampaignService::close() {
+  std::vector<ServedCampaign> campaigns;
+  for (const CampaignId id : order_) {
+    if (!served_.contains(id)) continue;
+    Served& served = served_.at(id);
+    if (served.summary.valid()) served.summary.wait();
+    Store store = writer_.close(id);
+    try {
+      store.end_coordinator(context_.start.epoch);
+    } catch (const std::exception& error) {
+      say_not_closed(error.what());
+    }
+    const CampaignState& campaign = state_.campaigns.at(id);
+    campaigns.push_back(
+        {.file = served.record.file, .store = std::move(store), .definition = campaign.definition});
+  }
+  served_.clear();
+  return campaigns;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,287 @@
+#include "coordinator/net/directory_look.hpp"
+
+#include <fmt/format.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/store_error.hpp"
+#include "core/error.hpp"
+#include "core/runs.hpp"
+#include "proto/link/faults.hpp"
+#include "proto/link/machine.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
+  const Store& store = campaign.store;
+  StoredCampaign stored{.definition = campaign.definition,
+                        .control = store.control(),
+                        .finished = store.finished_runs(),
+                        .elsewhere = campaign.elsewhere,
+                        .compared = store.compared_runs()};
+  if (given_up == GivenUpRuns::retry) return stored;
+  stored.given_up = store.given_up_runs();
+  stored.blamed = store.blamed_runs();
+  return stored;
+}
+
+FileLook failed_look(const std::filesystem::path& file, const std::string& failure) {
+  return {.record = {.file = file}, .failure = failure};
+}
+
+FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
+  FileLook look = failed_look(
+      file, fmt::format("{}: campaign {} is in another file as well", file.string(), name));
+  look.is_copy = true;
+  return look;
+}
+
+FileLook ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek,
+                        const std::optional<FileStamp>& stamp) {
+  return {.record = {.id = peek.id,
+                     .file = file,
+                     .status = {.name = peek.name,
+                                .phase = peek.phase,
+                                .priority = peek.priority,
+                                .num_runs = peek.num_runs,
+                                .num_done = peek.num_finished,
+                                .num_given_up = peek.num_given_up,
+                                .owner = peek.owner},
+                     .is_closed = true,
+                     .stamp = stamp},
+          .created_utc = peek.created_utc};
+}
+
+/// How many of the files that are looked at hold a campaign, by its name.
+using NumFiles = std::map<std::string, int>;
+
+/// Of which campaign a file is.
+struct Identity {
+  CampaignId id;
+  std::string name;
+};
+
+/// Empty if the file cannot be read; why is said when it is looked at.
+std::optional<Identity> identity_of(const std::filesystem::path& file) {
+  try {
+    const CampaignPeek peek = peek_campaign(file);
+    return Identity{.id = peek.id, .name = peek.name};
+  } catch (const std::exception&) {
+    if (!has_journal(file)) return std::nullopt;
+  }
+  try {
+    const Store store = Store::open_read_only(file);
+    return Identity{.id = store.id(), .name = store.name()};
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
+/// Results in a file and its log; −1 if it cannot be read.
+std::int64_t num_results(const std::filesystem::path& file) {
+  try {
+    const Store store = Store::open_read_only(file);
+    return static_cast<std::int64_t>(num_runs_in(store.finished_runs()));
+  } catch (const std::exception&) {
+    return -1;
+  }
+}
+
+/// The most results come first; of as many, the file that has the campaign's name.
+void order_copies(std::vector<std::filesystem::path>& copies, const std::string& name) {
+  std::map<std::filesystem::path, std::pair<std::int64_t, bool>> merits;
+  for (const std::filesystem::path& file : copies) {
+    merits[file] = {num_results(file), file.stem() == name};
+  }
+  std::ranges::stable_sort(copies, std::ranges::greater(),
+                           [&](const auto& file) { return merits.at(file); });
+}
+
+/// Lets the files of each campaign that is not known change places with each other: the one that is
+/// to be served comes first, so that no older copy stands for the campaign.
+NumFiles order_files(std::vector<std::filesystem::path>& files, const KnownCampaigns& known) {
+  NumFiles num_files;
+  std::map<CampaignId, std::vector<std::size_t>> places;
+  std::map<CampaignId, std::string> names;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const std::optional<Identity> identity = identity_of(files[i]);
+    if (!identity) continue;
+    ++num_files[identity->name];
+    if (known.ids.contains(identity->id)) continue;
+    places[identity->id].push_back(i);
+    names[identity->id] = identity->name;
+  }
+  for (const auto& [id, indices] : places) {
+    if (indices.size() == 1) continue;
+    std::vector<std::filesystem::path> copies;
+    for (const std::size_t index : indices) copies.push_back(files[index]);
+    order_copies(copies, names.at(id));
+    for (std::size_t i = 0; i < indices.size(); ++i) files[indices[i]] = copies[i];
+  }
+  return num_files;
+}
+
+/// By its bytes and without its log: it may be a file that is served under another name. Nothing
+/// if that does not tell, as a coordinator that was killed while it folded its log in leaves it.
+std::optional<CampaignPeek> peek_without_log(const std::filesystem::path& file) {
+  try {
+    return peek_campaign(file);
+  } catch (const StoreError&) {
+    if (!has_journal(file)) throw;
+    return std::nullopt;
+  }
+}
+
+/// Any program may have written the file, and clients refuse a list in which one name is wrong.
+void require_shown(const std::filesystem::path& file, std::string_view name, std::string_view owner,
+                   int priority) {
+  const bool has_names = wire::is_name(name) && (owner.empty() || wire::is_name(owner));
+  if (has_names && std::abs(std::int64_t{priority}) <= wire::priority_max) return;
+  throw Error(fmt::format(
+      "campaign database = {} (its name, owner or priority breaks the rules of a campaign file)",
+      file.string()));
+}
+
+FileLook opened(const CampaignDirectory& directory, const std::filesystem::path& file,
+                const KnownCampaigns& known, const NumFiles& num_files,
+                const CoordinatorStart& start) {
+  const std::optional<FileStamp> stamp = stamp_of(file);  // Before anything is read.
+  if (const std::optional<CampaignPeek> peek = peek_without_log(file)) {
+    require_shown(file, peek->name, peek->owner, peek->priority);
+    const bool is_known = known.ids.contains(peek->id) || known.names.contains(peek->name);
+    const auto found = num_files.find(peek->name);
+    const bool has_rival = is_known || found == num_files.end() || found->second > 1;
+    // Of several files a damaged one must not stand for the campaign.
+    if (has_rival && !has_journal(file)) (void)peek_campaign(file, PeekDepth::pages);
+    if (is_known) return copy_of(file, peek->name);
+    if (peek->is_at_rest) return ended_campaign(file, *peek, stamp);
+  }
+  ServedCampaign campaign = directory.load(file);
+  if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
+    return copy_of(file, campaign.definition->name);
+  }
+  return prepare(std::move(campaign), GivenUpRuns::keep, start);
+}
+
+wire::Epoch random_epoch() {
+  wire::Epoch epoch;
+  while (epoch.value == 0) {
+    if (getrandom(&epoch.value, sizeof epoch.value, 0) < 0 && errno != EINTR) {
+      throw Error(fmt::format("getrandom: {}", std::strerror(errno)));
+    }
+  }
+  return epoch;
+}
+
+CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version) {
+  return {.epoch = epoch,
+          .host = wire::host_name(),
+          .process_id = static_cast<std::uint64_t>(getpid()),
+          .version = version};
+}
+
+}  // namespace
+
+void KnownCampaigns::add(const CampaignRecord& campaign) {
+  files.insert(campaign.file);
+  ids.insert(campaign.id);
+  names.insert(campaign.status.name);
+}
+
+void KnownCampaigns::remove(const CampaignRecord& campaign) {
+  files.erase(campaign.file);
+  ids.erase(campaign.id);
+  names.erase(campaign.status.name);
+}
+
+std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return std::nullopt;
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  return FileStamp{.inode = status.st_ino,
+                   .size = status.st_size,
+                   .written_ns = status.st_mtim.tv_sec * ns_per_s + status.st_mtim.tv_nsec};
+}
+
+FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const CoordinatorStart& start) {
+  wire::kill_point(wire::KillPoint::after_open);
+  Store& store = campaign.store;
+  FileLook look{.record = {.id = store.id(),
+                           .file = campaign.file,
+                           .status = {.name = campaign.definition->name, .owner = store.owner()}},
+                .created_utc = store.created_utc(),
+                .stored = stored_campaign_of(campaign, given_up),
+                .plan = store.stop_plan(),
+                .num_failures = store.num_without_estimate(),
+                .sessions = store.attached_sessions()};
+  require_shown(campaign.file, look.record.status.name, look.record.status.owner,
+                look.stored.control.priority);
+  store.begin_coordinator(start);
+  look.store = std::move(store);
+  return look;
+}
+
+std::vector<FileLook> look_at_all(const CampaignDirectory& directory, KnownCampaigns& known,
+                                  const CoordinatorStart& start) {
+  std::vector<std::filesystem::path> files = directory.list();
+  std::erase_if(files, [&](const auto& file) { return known.files.contains(file); });
+  const NumFiles num_files = order_files(files, known);
+  std::vector<FileLook> looks;
+  for (const std::filesystem::path& file : files) {
+    try {
+      looks.push_back(opened(directory, file, known, num_files, start));
+    } catch (const std::exception& error) {
+      looks.push_back(failed_look(file, error.what()));
+    }
+    if (looks.back().failure.empty()) known.add(looks.back().record);
+  }
+  // The order of submission, which `status` shows and in which campaigns of one priority are lent.
+  std::ranges::stable_sort(looks, {}, &FileLook::created_utc);
+  return looks;
+}
+
+Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
+                       const CampaignDirectory* directory, const std::string& version) {
+  Beginning beginning{
+      .start = coordinator_start(random_epoch(), version), .campaigns = {}, .attached = {}};
+  KnownCampaigns known;
+  for (ServedCampaign& campaign : campaigns) {
+    beginning.campaigns.push_back(prepare(std::move(campaign), given_up, beginning.start));
+    known.add(beginning.campaigns.back().record);
+  }
+  if (directory != nullptr) {
+    std::ranges::move(look_at_all(*directory, known, beginning.start),
+                      std::back_inserter(beginning.campaigns));
+  }
+  for (const FileLook& look : beginning.campaigns) {
+    beginning.attached.insert(look.sessions.begin(), look.sessions.end());
+  }
+  return beginning;
+}
+
+std::uint64_t definition_size(const Campaign& campaign) {
+  const Definition definition = campaign.definition(TableColumns::left_out);
+  std::uint64_t num_values = 0;
+  for (const DataTable& table : definition.tables) num_values += table.values.size();
+  for (const std::vector<double>& column : campaign.table_columns) num_values += column.size();
+  return definition.text.size() + sizeof(double) * num_values;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/service_snapshot.hpp"
+#include "coordinator/store/records.hpp"
+
+namespace proofmass::coordinator {
+
+// What a service must know of a campaign database before it serves it. Reading that takes as long
+// as the disk does, so it is done before the service begins or in a background thread.
+
+/// What a look at a campaign database found.
+struct FileLook {
+  CampaignRecord record = {};       ///< Has nothing but the file if that cannot be served.
+  std::string created_utc = {};     ///< As in `2024-02-29T12:00:10Z`.
+  std::string failure = {};         ///< Why it cannot be served for now; empty if it can.
+  bool is_copy = false;             ///< Why not: its campaign is served from another file.
+  std::optional<Store> store = {};  ///< To be served; none if the campaign has ended, as the rest.
+  StoredCampaign stored = {};       ///< For the dispatch.
+  StopPlan plan = {};
+  std::uint64_t num_failures = 0;        ///< Finished runs without an estimate.
+  std::vector<SessionId> sessions = {};  ///< Workers that may come back.
+};
+
+/// Nothing if there is no such file.
+[[nodiscard]] std::optional<FileStamp> stamp_of(const std::filesystem::path& file);
+
+/// What tells the campaigns that a service has already from others.
+struct KnownCampaigns {
+  std::set<std::filesystem::path> files;
+  std::set<CampaignId> ids;
+  std::set<std::string> names;
+
+  void add(const CampaignRecord& campaign);
+  void remove(const CampaignRecord& campaign);
+};
+
+/// Reads what the service must know, and writes down that a coordinator begins.
+/// @throws StoreError, Error.
+[[nodiscard]] FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up,
+                               const CoordinatorStart& start);
+
+/// Looks at the files of a directory that are not known and adds their campaigns to those that are.
+/// Tells of them in the order in which the campaigns were made. Opens a file only if something is
+/// left to do with it: a campaign that has ended costs no lock, no descriptor and no write.
+/// @throws Error if the directory cannot be read.
+[[nodiscard]] std::vector<FileLook> look_at_all(const CampaignDirectory& directory,
+                                                KnownCampaigns& known,
+                                                const CoordinatorStart& start);
+
+/// What a service begins with.
+struct Beginning {
+  CoordinatorStart start;
+  std::vector<FileLook> campaigns;  ///< Those that are handed over come first.
+  std::set<SessionId> attached;     ///< Workers that may come back.
+};
+
+/// Reads what must be known of the campaigns that are handed over and of those in the directory.
+/// @param directory  Null if there is none.
+/// @param version    Of the program, for people.
+/// @throws Error, StoreError if a campaign that is handed over cannot be served, or the directory
+///         cannot be read.
+[[nodiscard]] Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
+                                     const CampaignDirectory* directory,
+                                     const std::string& version);
+
+/// Bytes that the tables of a campaign take.
+[[nodiscard]] std::uint64_t definition_size(const Campaign& campaign);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,292 @@
+#include "coordinator/report/review_documents.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+
+#include "coordinator/charts/svg.hpp"
+#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/review_tables.hpp"
+#include "coordinator/table/document_table.hpp"
+#include "core/model.hpp"
+#include "proto/text/visible_text.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::markup_text;
+
+// A page may neither load nor run anything, whatever its texts hold.
+constexpr std::string_view policy =
+    "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+
+constexpr std::string_view page_style =
+    R"(*{box-sizing:border-box}
+body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
+body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
+header,main,footer{padding:0 1rem;max-width:90rem;margin:0 auto}
+h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
+h2{font-size:1.3rem;margin:2rem 0 .5rem;border-bottom:2px solid var(--chart-first)}
+h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
+a{color:inherit}
+nav ul{display:flex;flex-wrap:wrap;gap:.2rem 1rem;padding:0;margin:.5rem 0;list-style:none}
+p{max-width:48rem}
+td.words{overflow-wrap:anywhere;min-width:6rem}
+#matrix{font-size:.85rem}
+#matrix th,#matrix td{padding:.25rem .4rem}
+#matrix td:nth-child(2){min-width:16rem}
+#summary{max-width:60rem;padding-left:1.3rem}
+.skip{position:absolute;left:-99rem}
+.skip:focus{position:static}
+@page{size:A4 landscape;margin:12mm}
+@media print{
+body{font-size:10pt}
+nav,.skip{display:none}
+.scroll{overflow:visible}
+table,#matrix{font-size:7.5pt}
+th,td,#matrix th,#matrix td{padding:.1rem .25rem}
+#matrix td:nth-child(2){min-width:13rem}
+h2,h3{break-after:avoid}
+figure,tr{break-inside:avoid}
+.flow{display:block}
+.flow>*{display:inline-block;vertical-align:top;margin-right:.2rem}
+table{break-inside:avoid}
+figure{zoom:.72}
+}
+)";
+
+struct Section {
+  std::string id;
+  std::string title;
+  std::string content;  ///< Markup; a section without any is left out.
+};
+
+std::string figure_of(const Picture& picture) {
+  return "<figure>\n" + svg_of(picture, SvgUse::embedded) + "</figure>\n";
+}
+
+/// A chart that is wider than a phone scrolls.
+std::string wide_figure_of(const HeatMap& map) {
+  return fmt::format(
+      "<div class=\"scroll\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{}</div>\n",
+      markup_text(map.text.title), figure_of(map));
+}
+
+/// A table as a part of a flow; nothing without rows.
+std::string table_part(const Table& table) {
+  return table.rows.empty() ? "" : "<div>\n" + html_table(table) + "</div>\n";
+}
+
+/// Figures and tables beside each other, as many as there is room for.
+std::string flow(std::string_view markup) {
+  return fmt::format("<div class=\"flow\">\n{}</div>\n", markup);
+}
+
+std::string error_figures_markup(const Review& review) {
+  std::string html;
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    html += fmt::format("<h3>{}</h3>\n", markup_text(quantities[i].symbol)) +
+            flow(figure_of(magnitude_chart(review, i)) + figure_of(error_chart(review, i)) +
+                 figure_of(convergence_chart(review, i)));
+  }
+  return html;
+}
+
+std::string characteristics_markup(const Review& review) {
+  std::string html;
+  for (const Chart& chart : characteristic_charts(review)) html += figure_of(chart);
+  if (html.empty()) return "";
+  return html +
+         fmt::format(
+             "<p class=\"note\">How probable it is that a campaign of as many draws meets a "
+             "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
+             "good instruments from bad ones; more draws make it steeper.</p>\n",
+             name_of(review.interpretation));
+}
+
+std::string budget_markup(const Review& review) {
+  const std::optional<BarChart> chart = budget_chart(review);
+  if (!chart) return "";
+  return flow(table_part(review_budget_table(review)) + figure_of(*chart));
+}
+
+std::string causes_markup(const Review& review) {
+  if (!review.causes) return "";
+  std::string html;
+  if (const std::optional<HeatMap> map = cause_map(review)) {
+    html =
+        "<p>Rows are drawn quantities, true parameters and products of two of them; columns are "
+        "the errors with their signs. Cells below four standard errors are empty.</p>\n" +
+        wide_figure_of(*map);
+  }
+  return html + table_part(cause_table(review));
+}
+
+std::string spectra_markup(const Review& review) {
+  if (!review.spectra) return "";
+  const RunSpectra& spectra = *review.spectra;
+  std::string html;
+  for (const std::string& reason : spectra.reasons) {
+    html += fmt::format("<p>{}</p>\n", markup_text(reason));
+  }
+  if (spectra.sessions.empty()) return html;
+  html += fmt::format(
+      "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
+      "bit "
+      "for bit. Without the fitted lines, noise is left, and lines that the session does not fit. "
+      "{}</p>\n",
+      spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
+  std::string figures;
+  for (const Chart& chart : spectrum_charts(spectra)) figures += figure_of(chart);
+  return html + flow(figures + table_part(spectrum_table(spectra)));
+}
+
+std::string execution_markup(const Review& review) {
+  std::string html = flow(table_part(identity_table(review)) + table_part(execution_table(review)) +
+                          table_part(host_table(review))) +
+                     "<h3>How to reproduce it</h3>\n<ul>\n";
+  for (const auto& [command, effect] : reproducing_commands(review)) {
+    html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
+  }
+  return html + "</ul>\n";
+}
+
+std::vector<Section> sections_of(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
+  return {{"verification", "Verification matrix", html_table(matrix_table(review))},
+          {"results", "Accuracy",
+           flow(table_part(accuracy_table(review.objectives, statistics)) +
+                characteristics_markup(review)) +
+               table_part(interval_table(statistics, review.num_given_up)) +
+               table_part(error_table(statistics, review.num_given_up, review.interpretation))},
+          {"distributions", "Errors by parameter", error_figures_markup(review)},
+          {"budget-section", "Budget", budget_markup(review)},
+          {"causes-section", "Causes of the errors", causes_markup(review)},
+          {"spectra-section", "Spectra of the worst run", spectra_markup(review)},
+          {"how", "How it was run", execution_markup(review)}};
+}
+
+std::string summary_markup(const Review& review, std::span<const Section> sections) {
+  std::string html =
+      fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.identity.name));
+  for (const auto& [text, source] : review_summary(review)) {
+    const auto section = std::ranges::find(sections, source, &Section::title);
+    html += fmt::format("<li>{} (<a href=\"#{}\">{}</a>)</li>\n", markup_text(text), section->id,
+                        section->title);
+  }
+  return html + "</ol>\n";
+}
+
+}  // namespace
+
+std::string review_html(const Review& review) {
+  std::string navigation;
+  std::string content;
+  std::vector<Section> sections = sections_of(review);
+  std::erase_if(sections, [](const Section& section) { return section.content.empty(); });
+  for (const Section& section : sections) {
+    navigation += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.id, section.title);
+    content += fmt::format(
+        "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n<h2 "
+        "id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
+        section.id, section.title, section.content);
+  }
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>{} – review report</title>\n<style>\n{}{}</style>\n</head>\n<body>\n"
+      "<a class=\"skip\" href=\"#content\">Skip to the verification matrix</a>\n"
+      "<header>\n{}<nav aria-label=\"Sections\"><ul>\n{}</ul></nav>\n</header>\n"
+      "<main id=\"content\">\n{}</main>\n<footer><p>Made by Proofmass from {}.</p></footer>\n"
+      "</body>\n</html>\n",
+      policy, markup_text(review.identity.name), review_style(), page_style,
+      summary_markup(review, sections), navigation, content, markup_text(review.database));
+}
+
+std::string review_style() {
+  // Verdicts: the inks of the charts are for lines; text needs 4.5:1.
+  constexpr std::string_view light =
+      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;";
+  constexpr std::string_view dark =
+      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;";
+  return fmt::format(
+             ":root{{color-scheme:light dark;{}{}}}\n"
+             "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
+             "@media print{{:root{{{}{}}}}}\n",
+             light_colours(), light, dark_colours(), dark, light_colours(), light) +
+         R"(.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
+.scroll:focus-visible,a:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
+table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
+caption{text-align:left;font-weight:600;padding:.3rem 0;white-space:nowrap}
+th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
+th,td{border-bottom:1px solid var(--chart-grid)}
+thead th{vertical-align:bottom}
+thead th,thead td{background:var(--heading)}
+th[scope=colgroup]{text-align:center}
+th.words,td.words{text-align:left}
+td{white-space:nowrap}
+td.words{white-space:normal}
+tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
+.met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
+td strong{white-space:nowrap}
+.note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
+code{font-family:ui-monospace,monospace;font-size:.9em}
+figure{margin:.5rem 0;max-width:100%}
+figure svg{display:block;height:auto;max-width:100%}
+.scroll figure,.scroll svg{max-width:none}
+.flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
+.flow>div{max-width:100%}
+)";
+}
+
+namespace {
+
+/// In a code span nothing is escaped but what ends it and the cell.
+std::string code_span(std::string_view text) {
+  std::string span;
+  for (const char c : wire::visible_text(text)) {
+    if (c == '|') span += '\\';
+    span += c == '`' ? '\'' : c;
+  }
+  return "`" + span + "`";
+}
+
+std::string section(std::string_view title, std::initializer_list<Table> tables) {
+  std::string text;
+  for (const Table& table : tables) {
+    if (!table.rows.empty()) text += markdown_table(table);
+  }
+  return text.empty() ? "" : fmt::format("## {}\n\n{}", title, text);
+}
+
+}  // namespace
+
+std::string review_markdown(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
+  std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.identity.name));
+  for (const auto& [sentence, source] : review_summary(review)) {
+    text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
+  }
+  text += "\n";
+  text +=
+      section("Verification matrix", {matrix_table(review)}) +
+      section("Accuracy", {accuracy_table(review.objectives, statistics),
+                           interval_table(statistics, review.num_given_up),
+                           error_table(statistics, review.num_given_up, review.interpretation)}) +
+      section("Budget", {review_budget_table(review)}) +
+      section("Causes of the errors", {cause_table(review)}) +
+      section("How it was run",
+              {identity_table(review), execution_table(review), host_table(review)}) +
+      "## How to reproduce it\n\n";
+  for (const auto& [command, effect] : reproducing_commands(review)) {
+    text += fmt::format("- {} {}\n", code_span(command), markdown_text(effect));
+  }
+  return text;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/run_result.hpp"
+
+namespace proofmass::coordinator {
+
+/// What is known of a quantity in one run, or of the health of the run.
+enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, health };
+
+/// `truth`, `estimate`, `error`, `standard_error`, `health`.
+[[nodiscard]] std::string_view name_of(ValueKind kind);
+
+/// True if both are the same to the last bit; zeros have no sign, as in a campaign database.
+[[nodiscard]] inline bool have_same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a + 0.0) == std::bit_cast<std::uint64_t>(b + 0.0);
+}
+
+/// A column of doubles, one for each run, SI.
+struct ValueColumn {
+  ValueKind kind = ValueKind::truth;
+  std::size_t index = 0;  ///< Of the value in its list of a RunResult.
+  std::string own_name;   ///< With its unit: `offset_m`, `acceleration_m_s2`.
+  std::string name;       ///< As in the table `run_result`: `truth_offset_m`.
+  std::string_view unit;  ///< `m`, `rad`, `s²/m`, `m/s²` or `1`.
+
+  /// Nothing if the run's status leaves it without a meaning.
+  [[nodiscard]] std::optional<double> value_in(const RunResult& result) const;
+};
+
+/// Truths, estimates, errors, standard errors if there are any, and health: all columns of values,
+/// in the order of the table `run_result`.
+[[nodiscard]] const std::vector<ValueColumn>& value_columns();
+
+}  // namespace proofmass::coordinator

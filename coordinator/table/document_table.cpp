@@ -1,0 +1,170 @@
+#include "coordinator/table/document_table.hpp"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <cstddef>
+#include <string_view>
+
+#include "proto/text/visible_text.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::markup_text;
+
+std::string_view text_class(const Column& column) {
+  return column.is_text ? " class=\"words\"" : "";
+}
+
+std::string_view class_of(Tone tone) {
+  switch (tone) {
+    case Tone::good:
+      return "met";
+    case Tone::bad:
+      return "unmet";
+    case Tone::open:
+      return "open";
+    default:
+      return "";
+  }
+}
+
+std::string group_line(const Table& table) {
+  std::string line;
+  bool has_groups = false;
+  for (std::size_t i = 0; i < table.columns.size();) {
+    std::size_t end = i + 1;
+    const std::string& group = table.columns[i].group;
+    while (!group.empty() && end < table.columns.size() && table.columns[end].group == group &&
+           !table.columns[end].is_after_line) {
+      ++end;
+    }
+    has_groups |= !group.empty();
+    line += group.empty() ? "<td></td>"
+                          : fmt::format("<th scope=\"colgroup\" colspan=\"{}\">{}</th>", end - i,
+                                        markup_text(group));
+    i = end;
+  }
+  return has_groups ? "<tr>" + line + "</tr>\n" : "";
+}
+
+std::string title_line(const Table& table) {
+  std::string line;
+  for (const Column& column : table.columns) {
+    const std::string sort =
+        column.sort.empty() ? "" : fmt::format(" aria-sort=\"{}\"", column.sort);
+    line += fmt::format("<th scope=\"col\"{}{}>{}</th>", text_class(column), sort,
+                        column.markup.empty() ? markup_text(column.title) : column.markup);
+  }
+  return "<tr>" + line + "</tr>\n";
+}
+
+std::string content_of(const Cell& cell) {
+  if (!cell.markup.empty()) return cell.markup;
+  const std::string text = markup_text(cell.in_document());
+  const std::string_view tone = class_of(cell.tone);
+  return tone.empty() ? text : fmt::format("<strong class=\"{}\">{}</strong>", tone, text);
+}
+
+std::string row_line(const Table& table, const Row& row) {
+  std::string line = "<tr>";
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const std::string value =
+        row[i].value ? fmt::format(" data-value=\"{}\"", *row[i].value) : std::string();
+    line += fmt::format(fmt::runtime(i == 0 ? "<th scope=\"row\"{}{}>{}</th>" : "<td{}{}>{}</td>"),
+                        text_class(table.columns[i]), value, content_of(row[i]));
+  }
+  return line + "</tr>\n";
+}
+
+/// The region, the table and its name.
+std::string opening_of(const Table& table) {
+  if (table.id.empty()) {
+    return fmt::format(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">"
+        "<table class=\"list\">\n",
+        markup_text(table.caption));
+  }
+  return fmt::format(
+      "<div class=\"scroll\" role=\"region\" aria-labelledby=\"{0}-caption\" tabindex=\"0\">\n"
+      "<table id=\"{0}\">\n<caption id=\"{0}-caption\">{1}</caption>\n",
+      table.id, markup_text(table.caption));
+}
+
+std::string paragraph(std::string_view text) {
+  return text.empty() ? "" : fmt::format("<p class=\"note\">{}</p>\n", markup_text(text));
+}
+
+}  // namespace
+
+std::string html_table(const Table& table) {
+  std::string html = opening_of(table) + "<thead>\n" + group_line(table) + title_line(table) +
+                     "</thead>\n<tbody>\n";
+  for (const Row& row : table.rows) html += row_line(table, row);
+  html += "</tbody>\n</table>\n</div>\n";
+  for (const Remark& remark : table.remarks) html += paragraph(remark.text);
+  for (const std::string& note : table.notes) html += paragraph(note);
+  return html;
+}
+
+std::string table_or_nothing(const Table& table) {
+  return table.rows.empty() ? "" : html_table(table);
+}
+
+namespace {
+
+bool is_inside_word(std::string_view text, std::size_t position) {
+  const auto is_word = [&](std::size_t i) {
+    return i < text.size() && std::isalnum(static_cast<unsigned char>(text[i])) != 0;
+  };
+  return position > 0 && is_word(position - 1) && is_word(position + 1);
+}
+
+std::string title_of(const Column& column) {
+  return column.group.empty() ? column.title : column.group + ": " + column.title;
+}
+
+}  // namespace
+
+std::string markdown_text(std::string_view text) {
+  constexpr std::string_view marks = "\\`*[]<>|&~#!{}";
+  const std::string visible = wire::visible_text(text);
+  std::string escaped;
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    const bool is_mark = marks.find(visible[i]) != std::string_view::npos ||
+                         (visible[i] == '_' && !is_inside_word(visible, i));
+    if (is_mark) escaped += '\\';
+    escaped += visible[i];
+  }
+  return escaped;
+}
+
+std::string markdown_heading(std::span<const Column> columns) {
+  std::string titles = "|", rule = "|";
+  for (const Column& column : columns) {
+    titles += fmt::format(" {} |", markdown_text(title_of(column)));
+    rule += column.is_text ? " --- |" : " ---: |";
+  }
+  return titles + "\n" + rule + "\n";
+}
+
+std::string markdown_row(std::span<const Cell> cells) {
+  std::string line = "|";
+  for (const Cell& cell : cells) line += fmt::format(" {} |", markdown_text(cell.in_document()));
+  return line + "\n";
+}
+
+std::string markdown_table(const Table& table) {
+  std::string text =
+      fmt::format("**{}**\n\n", markdown_text(table.caption)) + markdown_heading(table.columns);
+  for (const Row& row : table.rows) text += markdown_row(row);
+  for (const Remark& remark : table.remarks)
+    text += fmt::format("\n{}\n", markdown_text(remark.text));
+  for (const std::string& note : table.notes) {
+    if (!note.empty()) text += fmt::format("\n{}\n", markdown_text(note));
+  }
+  return text + "\n";
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,304 @@
+#include "coordinator/report/review_documents.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/review_tables.hpp"
+#include "tests/coordinator/charts/markup_reading.hpp"
+#include "tests/coordinator/report/review_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// HTML without the elements that have no end, which XML does not know.
+std::string as_xml(std::string html) {
+  html = std::regex_replace(html, std::regex("<!DOCTYPE html>|<meta [^>]*>"), "");
+  return std::regex_replace(html, std::regex("<style>[^<]*</style>"), "");
+}
+
+class ReviewHtml : public test::ReviewTest {};
+
+TEST_F(ReviewHtml, IsWellFormed) {
+  const Store store = store_with(60);
+  EXPECT_EQ(test::malformed_part(as_xml(review_html(review_of(store, 60)))), "");
+}
+
+TEST_F(ReviewHtml, HasEachIdOnce) {
+  const Store store = store_with(60);
+  std::set<std::string> ids;
+  for (const std::string& tag :
+       test::tags_of(review_html(review_of(store, 60)), " id=\"[^\"]*\"")) {
+    EXPECT_TRUE(ids.insert(tag).second) << tag;
+  }
+  EXPECT_GT(ids.size(), 50U);
+}
+
+TEST_F(ReviewHtml, NeitherLoadsNorRunsAnything) {
+  const Store store = store_with(60);
+  const std::string html = review_html(review_of(store, 60));
+  EXPECT_THAT(html, HasSubstr("content=\"default-src 'none'; style-src 'unsafe-inline';"));
+  EXPECT_THAT(html,
+              AllOf(Not(HasSubstr("<script")), Not(HasSubstr(" src=")), Not(HasSubstr("http://")),
+                    Not(HasSubstr("https://")), Not(HasSubstr("@import"))));
+}
+
+TEST_F(ReviewHtml, ShowsTextOfStrangersAsText) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20,
+                            {{.id = test::hostile_text,
+                              .text = test::hostile_text,
+                              .requirement = "k2c < 10 for 95% with 90%"}});
+  review.database = review.identity.name = review.identity.build = test::hostile_text;
+  const std::string html = review_html(review);
+  EXPECT_EQ(test::malformed_part(as_xml(html)), "");
+  EXPECT_THAT(html, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("\x1b"))));
+  EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(1)&lt;/script&gt;"));
+  const std::string markdown = review_markdown(review);
+  EXPECT_THAT(markdown, AllOf(HasSubstr("\\<script\\>"), Not(HasSubstr("\x1b"))));
+  EXPECT_THAT(markdown, HasSubstr("\\| \\`code\\`"));
+}
+
+// Of 100 runs the error of run r is (r + 1) % of each objective: one is on it, which exceeds it.
+// The second largest, 99 %, bounds 95 % of all draws with 90 %, as P(Bin(100, 0.05) ≤ 1) = 0.037;
+// the third does not, as P(Bin(100, 0.05) ≤ 2) = 0.118. So one may exceed, and the margin is 1 %.
+TEST_F(ReviewHtml, BeginsWithTheVerificationMatrix) {
+  const Store store = store_with(100);
+  Review review = review_of(store, 100);
+  const RequirementAnswer& row = review.matrix.at(static_cast<std::size_t>(Parameter::a_c12));
+  EXPECT_NEAR(*row.relative_margin(), 0.01, 1e-12);
+  const std::string html = review_html(review);
+  const std::size_t matrix = html.find("id=\"matrix\"");
+  ASSERT_NE(matrix, std::string::npos);
+  EXPECT_LT(matrix, html.find("id=\"accuracy\""));
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\" class=\"words\">a_c12</th>"));
+  EXPECT_THAT(html, HasSubstr("<strong class=\"met\">met</strong>"));
+  EXPECT_THAT(html, HasSubstr(">|error| of a_c11·Δx, for 95 % with 90 %</td>"));
+  EXPECT_THAT(html, HasSubstr(">9×10⁻⁴ rad</td>"));
+  EXPECT_THAT(html, HasSubstr("statistical interpretation: mixed"));
+  review.interpretation = Interpretation::temporal;
+  EXPECT_THAT(review_html(review), HasSubstr("statistical interpretation: temporal"));
+  EXPECT_THAT(review_html(review), Not(HasSubstr("mixed")));
+}
+
+TEST_F(ReviewHtml, SaysThatACampaignIsNotFinished) {
+  Store store = store_with(20);
+  EXPECT_THAT(review_html(review_of(store, 20)), Not(HasSubstr("is not finished")));
+  store.extend(test::campaign_of(30), canonical_definition(test::campaign_of(30)));
+  EXPECT_THAT(review_html(review_of(store, 30)), HasSubstr("20 of 30 draws are done"));
+  EXPECT_THAT(review_html(review_of(store, 30)), HasSubstr("The campaign is not finished"));
+}
+
+TEST_F(ReviewHtml, HoldsACampaignWithoutResults) {
+  const MicroscopeCampaign campaign = test::campaign_of(5);
+  const Store store = Store::create(file(), campaign, canonical_definition(campaign));
+  const std::string html = review_html(review_of(store, 5));
+  EXPECT_EQ(test::malformed_part(as_xml(html)), "");
+  EXPECT_THAT(html, HasSubstr("no data"));
+}
+
+TEST_F(ReviewHtml, IsTheSameEachTime) {
+  const Store store = store_with(40);
+  EXPECT_EQ(review_html(review_of(store, 40)), review_html(review_of(store, 40)));
+}
+
+TEST_F(ReviewHtml, NamesItsCharts) {
+  const Store store = store_with(40);
+  std::vector<std::string> names;
+  for (const NamedPicture& named : review_pictures(review_of(store, 40))) {
+    names.push_back(named.name);
+  }
+  EXPECT_THAT(names, testing::IsSupersetOf({"errors", "convergence", "histogram:a_c12", "error:k2c",
+                                            "convergence:k2d", "characteristic", "budget"}));
+}
+
+// All draws meet a requirement that nobody exceeds, and with 100 draws, of which one may exceed,
+// (1 − p)^100 + 100 p (1 − p)^99 campaigns do if p of all draws exceed.
+TEST_F(ReviewHtml, DrawsTheOperatingCharacteristic) {
+  const Store store = store_with(100);
+  const std::vector<Chart> charts = characteristic_charts(review_of(store, 100));
+  ASSERT_EQ(charts.size(), 1U);
+  const auto& line = std::get<Line>(charts[0].layers.at(0));
+  EXPECT_EQ(line.points.front().y, 100.0);
+  for (const Point& point : line.points) {
+    const double p = point.x / 100.0;
+    const double expected = std::pow(1.0 - p, 100) + 100.0 * p * std::pow(1.0 - p, 99);
+    EXPECT_NEAR(point.y, 100.0 * expected, 1e-6) << p;
+  }
+}
+
+/// Spectra of a session with a line of amplitude 3e-9 m/s².
+RunSpectra some_spectra() {
+  SessionSpectrum spectrum{.session = "a_c13",
+                           .meaning = "difference <x>",
+                           .unit = "m/s²",
+                           .points = {},
+                           .lines = {{2e-3, 3e-9, 4e-7, true}, {5e-3, 1e-10, 1e-8, false}},
+                           .noise_ratio = NoiseRatio{1.04, 0.03},
+                           .noise_meaning = "It is white & quiet."};
+  for (double frequency_hz = 1e-4; frequency_hz < 1.0; frequency_hz *= 1.1) {
+    spectrum.points.push_back({frequency_hz, 2e-9, 2e-9, 2e-9});
+  }
+  return {.run = RunIndex{7}, .sessions = {spectrum}, .reasons = {test::hostile_text}};
+}
+
+TEST_F(ReviewHtml, ShowsTheSpectraOfTheWorstRun) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  EXPECT_THAT(review_html(review), Not(HasSubstr("Spectra of the worst run")));
+  review.spectra = some_spectra();
+  const std::string html = review_html(review);
+  EXPECT_EQ(test::malformed_part(as_xml(html)), "");
+  EXPECT_THAT(
+      html, AllOf(HasSubstr("<h2 id=\"spectra-section-title\">Spectra of the worst run"),
+                  HasSubstr("a_c13: difference &lt;x&gt;"), HasSubstr("m/s²/√Hz"),
+                  HasSubstr("an amplitude of 3×10⁻⁹ m/s²."),
+                  HasSubstr("<td data-value=\"3e-09\">3×10⁻⁹</td>"), HasSubstr(">1.04 ± 0.03</td>"),
+                  HasSubstr("It is white &amp; quiet."), Not(HasSubstr("<script>"))));
+  review.spectra->sessions.clear();
+  const std::string reasons = review_html(review);
+  EXPECT_THAT(reasons, AllOf(HasSubstr("&lt;script&gt;"), Not(HasSubstr("bit for bit"))));
+}
+
+// One line of measured densities, one of what is left, one of the model; lines of the estimate and
+// others apart.
+TEST_F(ReviewHtml, DrawsASpectrumInFiveLayers) {
+  const std::vector<Chart> charts = spectrum_charts(some_spectra());
+  ASSERT_EQ(charts.size(), 1U);
+  ASSERT_EQ(charts[0].layers.size(), 5U);
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    EXPECT_EQ(std::get<Line>(charts[0].layers[i]).points.size(), 97U);
+  }
+  const auto& used = std::get<Markers>(charts[0].layers[3]);
+  const auto& others = std::get<Markers>(charts[0].layers[4]);
+  ASSERT_EQ(used.points.size(), 1U);
+  ASSERT_EQ(others.points.size(), 1U);
+  EXPECT_EQ(used.points[0].y, 4e-7);
+  EXPECT_EQ(others.points[0].x, 5e-3);
+}
+
+TEST_F(ReviewHtml, KnowsTheWorstRun) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  ASSERT_TRUE(worst_run_of(review).has_value());
+  EXPECT_EQ(*worst_run_of(review), RunIndex{19});
+  review.matrix.pop_back();  // All objectives together.
+  EXPECT_FALSE(worst_run_of(review).has_value());
+}
+
+class ReviewSummary : public test::ReviewTest {
+ protected:
+  static std::vector<std::string> sentences_of(const Review& review) {
+    std::vector<std::string> texts;
+    for (const SummarySentence& sentence : review_summary(review)) texts.push_back(sentence.text);
+    EXPECT_EQ(texts.size(), 5U);
+    return texts;
+  }
+};
+
+// Of 100 runs the error of run r is (r + 1) % of each objective, see review_html_test.cpp.
+TEST_F(ReviewSummary, TellsWhatWasAskedAndWhatCameOut) {
+  const Store store = store_with(100);
+  const std::vector<std::string> sentences = sentences_of(review_of(store, 100));
+  EXPECT_EQ(sentences[0],
+            "It was asked whether 95 % of all draws meet the objective of each parameter, and all "
+            "objectives together, each with 90 % confidence, which is the default of the program "
+            "and no demand of a project.");
+  EXPECT_EQ(sentences[1], "All 100 draws are done.");
+  EXPECT_EQ(sentences[2], "Of 11 requirements, 11 are met.");
+  EXPECT_EQ(sentences[3],
+            "The worst error is that of a_c11·Δx in run 99, 100 nm or 100 % of its objective; what "
+            "drives it is not known, as fewer than 16 draws have an estimate.");
+  EXPECT_THAT(sentences[4], testing::MatchesRegex(
+                                "Calibration takes the budget of the test of the equivalence "
+                                "principle from .* m/s² to at most .* m/s² in "
+                                "half of the draws, .* m/s² in 95 % of them, and .* m/s² in the "
+                                "worst, run 99\\."));
+}
+
+// 10 of 100 draws exceed 90 % of the objective: not met for 95 %, and undecided for 90 % of them.
+TEST_F(ReviewSummary, NamesRequirementsThatAreNotMet) {
+  const Store store = store_with(100);
+  const std::vector<std::string> sentences = sentences_of(
+      review_of(store, 100,
+                {{.id = "A", .text = "", .requirement = "k2c < 901 for 99% with 90%"},
+                 {.id = "B", .text = "", .requirement = "k2c < 901 for 90% with 90%"}}));
+  EXPECT_EQ(sentences[0],
+            "It was asked whether 2 requirements hold: A, B, and all objectives together.");
+  EXPECT_EQ(sentences[2], "Of 3 requirements, 1 is met, 1 is not met (A), 1 is undecided (B).");
+}
+
+TEST_F(ReviewSummary, SaysWhatIsMissing) {
+  Store store = store_with(20);
+  store.extend(test::campaign_of(30), canonical_definition(test::campaign_of(30)));
+  Review review = review_of(store, 30);
+  EXPECT_EQ(sentences_of(review)[1], "The campaign is not finished: 20 of 30 draws are done.");
+  review.num_given_up = review.missing.num_given_up = 1;
+  EXPECT_EQ(sentences_of(review)[1],
+            "The campaign is not finished: 21 of 30 draws are done, 1 of them without an estimate "
+            "(1 given up), which counts as an exceedance.");
+}
+
+TEST_F(ReviewSummary, KnowsACampaignWithoutResults) {
+  const MicroscopeCampaign campaign = test::campaign_of(5);
+  const Store store = Store::create(file(), campaign, canonical_definition(campaign));
+  const std::vector<std::string> sentences = sentences_of(review_of(store, 5));
+  EXPECT_EQ(sentences[1], "The campaign is not finished: 0 of 5 draws are done.");
+  EXPECT_THAT(sentences[2], HasSubstr("11 are undecided (a_c11·Δx, "));
+  EXPECT_EQ(sentences[3], "No draw has an estimate, so that there is no worst error.");
+  EXPECT_THAT(sentences[4], HasSubstr("what is left after it cannot be told without an estimate"));
+}
+
+TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
+  const Store store = store_with(100);
+  Review review = review_of(store, 100);
+  review.causes = Causes{};
+  EXPECT_THAT(sentences_of(review)[3],
+              HasSubstr("; no drawn quantity or product of two explains it."));
+  review.causes->terms = {{.quantity = 0, .name = "true a × b", .slope = 1.0, .share = 0.982},
+                          {.quantity = 0, .name = "c", .slope = 1.0, .share = 0.01}};
+  EXPECT_THAT(sentences_of(review)[3],
+              HasSubstr("100 nm or 100 % of its objective; of the variance of this error over the "
+                        "draws, 98.2 % follows from true a × b."));
+}
+
+TEST_F(ReviewSummary, HoldsWithoutObjectivesAndBudget) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  review.matrix.clear();
+  review.budget.reset();
+  for (double& objective : review.objectives) objective = std::numeric_limits<double>::infinity();
+  const std::vector<std::string> sentences = sentences_of(review);
+  EXPECT_THAT(sentences[0], HasSubstr("nothing was asked"));
+  EXPECT_EQ(sentences[2], "There is no verdict.");
+  EXPECT_EQ(sentences[3], "No parameter has an objective to hold its worst error against.");
+  EXPECT_EQ(sentences[4], "The model has no budget that the errors would enter.");
+}
+
+/// Each sentence leads to a section that is there, whatever the review lacks.
+TEST_F(ReviewSummary, NamesItsSources) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  const auto expect_links = [&] {
+    const std::string html = review_html(review);
+    for (const SummarySentence& sentence : review_summary(review)) {
+      EXPECT_THAT(html, HasSubstr("-title\">" + sentence.section + "</h2>")) << sentence.text;
+    }
+  };
+  expect_links();
+  review.causes = Causes{};
+  review.budget.reset();
+  expect_links();
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
