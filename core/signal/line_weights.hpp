@@ -35,7 +35,7 @@ struct LineFit {
 class LineWeights {
  public:
   static constexpr std::size_t block_size = 2048;
-  static constexpr std::size_t num_lines_max = 16;
+  static constexpr std::size_t num_lines_max = 40;
 
   /// @throws InvalidArgument if fewer samples are kept than the fit has unknowns, or if two lines
   ///         cannot be told apart.

@@ -5,6 +5,7 @@
 #include <complex>
 #include <cstddef>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,9 +18,12 @@ namespace proofmass::test {
 /// Amplitudes of the session's lines in a record, first those that it fits, as [Hardy2013] section
 /// 5.2 reads: remove the mean, band-pass, drop the transient, least squares on cosine and sine of
 /// all lines.
+///
+/// @param other_filter  In place of the band-pass about the lines that the session fits.
 inline std::vector<std::complex<double>> fitted_lines(std::span<const double> record,
                                                       const Scenario& scenario,
-                                                      const Session& session) {
+                                                      const Session& session,
+                                                      std::optional<BandPass> other_filter = {}) {
   const double period_s = scenario.simulation.sample_period_s;
   std::vector<double> lines_hz;
   for (const auto* const lines : {&session.fit_lines, &session.known_lines}) {
@@ -31,7 +35,8 @@ inline std::vector<std::complex<double>> fitted_lines(std::span<const double> re
   for (std::size_t i = 0; i < session.fit_lines.size(); ++i) centre_hz += lines_hz[i];
   centre_hz /= static_cast<double>(session.fit_lines.size());
   const double ratio = scenario.estimation.band_ratio;
-  const BandPass filter = band_pass(centre_hz / ratio, centre_hz * ratio, period_s);
+  const BandPass filter =
+      other_filter.value_or(band_pass(centre_hz / ratio, centre_hz * ratio, period_s));
 
   double mean = 0.0;
   for (const double value : record) mean += value;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <type_traits>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/microscope/estimation/methods.hpp"
@@ -106,6 +107,29 @@ void check_band(const Scenario& scenario) {
   }
 }
 
+// The lines that a method derives from the excitations: the session's own are checked with it.
+void check_wanted_lines(const Scenario& scenario) {
+  const auto needs = estimation_method(scenario.estimation.method).needs;
+  const double nyquist_hz = 0.5 / scenario.simulation.sample_period_s;
+  for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
+    const Session& session = scenario.sessions[i];
+    const double resolution_hz = 0.99 / (session.num_orbits * scenario.orbit.period_s);
+    std::vector<double> lines_hz{0.0, nyquist_hz};
+    for (const WantedLine& wanted : needs(session).lines) {
+      const double line_hz = line_frequency_hz(session, wanted.line, scenario.orbit.period_s);
+      for (const double other_hz : lines_hz) {
+        if (line_hz < nyquist_hz && std::abs(line_hz - other_hz) >= resolution_hz) continue;
+        throw ConfigError(fmt::format("session[{}].excitations", i),
+                          fmt::format("a line at {:.6g} Hz", line_hz),
+                          fmt::format("the estimation must tell it from that at {:.6g} Hz, and "
+                                      "from the Nyquist frequency, {} Hz",
+                                      other_hz, nyquist_hz));
+      }
+      lines_hz.push_back(line_hz);
+    }
+  }
+}
+
 // A test that turns with the Earth's direction sees a constant, which a bias is, too.
 void check_test(const Scenario& scenario) {
   const double rate_rad_s = scenario.budget.test_spin_rate_rad_s;
@@ -131,6 +155,7 @@ void Scenario::validate() const {
   check_test(*this);
   check_transient(*this);
   check_band(*this);
+  check_wanted_lines(*this);
 }
 
 }  // namespace proofmass

@@ -123,7 +123,8 @@ void visit_limits(Config& scenario, Visitor& visit) {
 
 template <typename Config, typename Visitor>
 void visit_estimation(Config& estimation, Visitor& visit) {
-  visit(FieldInfo{"estimation.method", "\"hardy2013\": one parameter a session, iterated."},
+  visit(FieldInfo{"estimation.method",
+                  "\"hardy2013\": one parameter a session, iterated; \"joint\": all at once."},
         estimation.method);
   visit(FieldInfo{"estimation.correction",
                   "\"hardy2013\" (the paper's), \"first_order\" or \"second_order\"."},

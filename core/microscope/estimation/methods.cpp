@@ -6,13 +6,21 @@
 
 #include "core/error.hpp"
 #include "core/microscope/estimation/hardy2013/hardy2013.hpp"
+#include "core/microscope/estimation/joint/joint.hpp"
 
 namespace proofmass {
 namespace {
 
+/// Databases have no column for standard errors: one more would be a new version of their schema.
+constexpr EstimationMethodInfo without_standard_errors(EstimationMethodInfo method) {
+  method.has_standard_errors = false;
+  return method;
+}
+
 // Positions are sent and stored: add at the end.
 constexpr std::array methods{
     hardy2013_method,
+    without_standard_errors(joint_method),
 };
 
 constexpr std::array<std::string_view, methods.size()> method_names = [] {

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "core/microscope/estimation/estimation_config.hpp"
+#include "core/microscope/instrument/drawn_quantities.hpp"
+#include "core/microscope/instrument/noise_config.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
 
@@ -20,6 +23,13 @@ struct Diagnostic {
   double value = 0.0;
 };
 
+/// How well a session agrees with what was estimated from all of them.
+struct SessionFit {
+  double chi_squared = 0.0;
+  /// What chi_squared is expected to be: the session's data less what the fit adapted to them.
+  double degrees_of_freedom = 0.0;
+};
+
 /// What a method makes of a run.
 struct Estimation {
   ParameterArray values{};           ///< SI.
@@ -27,16 +37,37 @@ struct Estimation {
   std::uint32_t num_rounds = 0;
   bool converged = false;  ///< False if values still moved in the last allowed round.
   std::vector<Diagnostic> diagnostics{};
+  /// Correlations of the estimates; if the method has_standard_errors.
+  std::array<ParameterArray, num_parameters> correlations{};
+  std::vector<SessionFit> session_fits{};  ///< As many as sessions, or none.
 };
 
-/// Whether the phasors of Session::known_lines are recorded beside those of fit_lines.
-enum class RecordedLines : std::uint8_t { fitted, all };
+/// A line that a method wants recorded beside the session's fit lines.
+struct WantedLine {
+  LineMultiple line;
+  LineSignals signals;
+};
 
-/// What a method wants recorded of a session. Known lines are many and cost as much as those that
-/// are fitted; so they are recorded for the methods that use them.
+/// What a method wants recorded of a session. Lines cost time in every sample, so that they are
+/// recorded for the methods that use them.
 struct RecordNeeds {
-  RecordedLines lines = RecordedLines::fitted;
-  SignalSet signals = SignalSet::common;
+  SignalSet signals = SignalSet::common;  ///< At Session::fit_lines.
+  std::vector<WantedLine> lines{};        ///< Further lines.
+  /// Lines that are fitted together with the further ones, so that they do not leak into them. One
+  /// that the record cannot tell from a line before it is left out.
+  std::vector<LineMultiple> neighbours{};
+};
+
+/// What a method may know beside the records of a run: the scenario, apart from what is simulated
+/// only. References hold during the call.
+struct EstimationInput {
+  const std::vector<Session>& sessions;  ///< For which `check` passed.
+  const EstimationConfig& config;
+  const ParameterArray& objectives;  ///< SI.
+  const NoiseConfig& noise;
+  const DispersionSet& dispersions;  ///< The laws by which instruments are drawn.
+  double orbit_period_s = 0.0;
+  double sample_period_s = 0.0;
 };
 
 /// A way to get the parameters from the phasors of a run; `estimation.method` chooses one.
@@ -49,11 +80,8 @@ struct EstimationMethodInfo {
   void (*check)(const std::vector<Session>& sessions);
 
   /// A pure function of its arguments.
-  /// @param records     Of the sessions, in their order, with what `needs` asks for.
-  /// @param sessions    For which `check` passed.
-  /// @param objectives  Those of the scenario, SI.
-  Estimation (*estimate)(const RunPhasors& records, const std::vector<Session>& sessions,
-                         const EstimationConfig& config, const ParameterArray& objectives);
+  /// @param records  Of the sessions, in their order, with what `needs` asks for.
+  Estimation (*estimate)(const RunPhasors& records, const EstimationInput& input);
 
   bool has_standard_errors = false;
 };

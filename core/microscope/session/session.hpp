@@ -91,7 +91,11 @@ inline constexpr std::size_t num_common_signals = 8;  ///< Those of SignalSet::c
 }
 
 /// The signals that are recorded in a session.
-enum class SignalSet : std::uint8_t { common, all };
+enum class SignalSet : std::uint8_t {
+  common,  ///< The first num_common_signals.
+  all,
+  health,  ///< Γ_mes,dx and the product: what the health of the loops is judged by.
+};
 
 /// What Signal::product is: a nonlinear combination that cannot be made from phasors afterwards.
 enum class Product : std::uint8_t {
@@ -103,6 +107,21 @@ enum class Product : std::uint8_t {
   modulated_zz,      ///< ½([T̂ − În]_zz − [T̂ − În]_xx) Δ_TM sin(2π f_TM t), m/s².
 };
 
+/// The signals of a line that an estimation method asks for beside the session's own: those before
+/// Signal::product, and then some of its choice.
+enum class LineSignals : std::uint8_t {
+  gradients,  ///< The second and the third row of [T̂] − [În], s⁻².
+  squares,    ///< Γ_mes,1x² and Γ_mes,2x², m²/s⁴.
+  /// The elements of [T̂] − [În], row by row, times half the position of the moving masses, m/s².
+  moved,
+};
+
+inline constexpr std::size_t num_line_bases = 7;                     ///< Before Signal::product.
+inline constexpr std::size_t num_line_signals = num_line_bases + 9;  ///< At most.
+
+/// Amplitudes of a line in the order of LineSignals, cosine's and sine's as in SessionPhasors.
+using LinePhasors = std::array<std::complex<double>, num_line_signals>;
+
 inline constexpr std::size_t num_fit_lines_max = 2;       ///< Of a session.
 inline constexpr std::size_t num_session_lines_max = 16;  ///< The known lines with them.
 
@@ -110,11 +129,12 @@ inline constexpr std::size_t num_session_lines_max = 16;  ///< The known lines w
 /// least-squares fit of all lines behind the session's band-pass ([Hardy2013] section 5.2).
 struct SessionPhasors {
   std::size_t num_fit_lines = 0;
-  std::size_t num_lines = 0;  ///< All that are recorded; num_fit_lines or more.
-  /// Shape [signal][line], in the signal's unit; the real part is the cosine's amplitude, the
-  /// imaginary part the sine's. First come the lines of Session::fit_lines, then those of
-  /// Session::known_lines if they are recorded.
-  std::array<std::array<std::complex<double>, num_session_lines_max>, num_signals> amplitude{};
+  /// Of the lines of Session::fit_lines: shape [signal][line], in the signal's unit; the real part
+  /// is the cosine's amplitude, the imaginary part the sine's.
+  std::array<std::array<std::complex<double>, num_fit_lines_max>, num_signals> amplitude{};
+  std::vector<LinePhasors> lines{};  ///< Of RecordNeeds::lines.
+  /// Means over the record of the signals that every line has, if RecordNeeds::lines has any.
+  std::array<double, num_line_bases> means{};
 };
 
 // Targets.

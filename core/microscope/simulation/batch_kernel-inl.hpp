@@ -94,26 +94,25 @@ HWY_INLINE void scatter_health(const Group& group, OutcomesOfLanes outcomes) {
   }
 }
 
-/// @param sums_of  Where an outcome keeps these sums.
-template <typename SumsOf>
-HWY_INLINE void scatter_sums(const SignalSums<Batch>& sums, OutcomesOfLanes outcomes,
-                             const SumsOf& sums_of) {
+HWY_INLINE void scatter(const Group& group, std::size_t num_line_readers,
+                        OutcomesOfLanes outcomes) {
+  constexpr std::size_t num_outputs = 2 * num_fit_lines_max;
   for (std::size_t s = 0; s < num_signals; ++s) {
-    for (std::size_t i = 0; i < 2 * num_fit_lines_max; ++i) {
-      scatter_number(sums[s][i], outcomes,
-                     [&](SessionOutcome& outcome) -> double& { return sums_of(outcome)[s][i]; });
+    for (std::size_t i = 0; i < num_outputs; ++i) {
+      scatter_number(group.sums[s][i], outcomes,
+                     [&](SessionOutcome& outcome) -> double& { return outcome.sums[s][i]; });
     }
   }
-}
-
-HWY_INLINE void scatter(const Group& group, std::size_t num_known_readers,
-                        OutcomesOfLanes outcomes) {
-  scatter_sums(group.sums, outcomes,
-               [](SessionOutcome& outcome) -> SignalSums<double>& { return outcome.sums; });
-  for (std::size_t k = 0; k < num_known_readers; ++k) {
-    scatter_sums(
-        group.known_sums[k], outcomes,
-        [k](SessionOutcome& outcome) -> SignalSums<double>& { return outcome.known_sums[k]; });
+  for (std::size_t at = 0; at < num_line_readers * num_line_signals * num_outputs; ++at) {
+    const std::size_t i = at % num_outputs, s = at / num_outputs % num_line_signals;
+    const std::size_t r = at / num_outputs / num_line_signals;
+    scatter_number(group.further.lines[r][s][i], outcomes, [=](SessionOutcome& outcome) -> double& {
+      return outcome.further.lines[r][s][i];
+    });
+  }
+  for (std::size_t s = 0; s < num_line_bases; ++s) {
+    scatter_number(group.further.plain[s], outcomes,
+                   [s](SessionOutcome& outcome) -> double& { return outcome.further.plain[s]; });
   }
   scatter_health(group, outcomes);
 }
@@ -135,7 +134,7 @@ void PROOFMASS_NAME(record_batch_,
   const auto used = std::span(groups).first(num_used);
   record_session(signals, session.setup, used, session.weights_buffer, progress, NoObserver{});
   for (std::size_t g = 0; g < num_used; ++g) {
-    scatter(groups[g], session.setup.known_readers.size(), lanes_of(outcomes, g * num_lanes));
+    scatter(groups[g], session.setup.line_readers.size(), lanes_of(outcomes, g * num_lanes));
   }
 }
 

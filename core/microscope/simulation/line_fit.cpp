@@ -1,5 +1,6 @@
 #include "core/microscope/simulation/line_fit.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -41,6 +42,59 @@ std::vector<LineFit> known_line_fits(const LineFit& of_session) {
     fits.push_back(std::move(fit));
   }
   return fits;
+}
+
+namespace {
+
+/// Frequencies of all lines that are wanted, of the level, then of those neighbours that the record
+/// can tell from the lines before them.
+std::vector<double> frequencies_of(const RecordNeeds& needs, const Session& session,
+                                   double orbit_period_s) {
+  const double resolution_hz = 0.99 / (session.num_orbits * orbit_period_s);
+  std::vector<double> all_hz;
+  for (const WantedLine& wanted : needs.lines) {
+    all_hz.push_back(line_frequency_hz(session, wanted.line, orbit_period_s));
+  }
+  // A hundredth of a turn in the record: a level and a drift. The mean of a record with a strong
+  // line, which is removed before, is not the level beside that line.
+  all_hz.push_back(0.01 / (session.num_orbits * orbit_period_s));
+  for (const LineMultiple& neighbour : needs.neighbours) {
+    const double frequency_hz = line_frequency_hz(session, neighbour, orbit_period_s);
+    const auto is_close = [&](double other_hz) {
+      return std::abs(other_hz - frequency_hz) < resolution_hz;
+    };
+    if (frequency_hz < resolution_hz || std::ranges::any_of(all_hz, is_close)) continue;
+    if (all_hz.size() < LineWeights::num_lines_max) all_hz.push_back(frequency_hz);
+  }
+  return all_hz;
+}
+
+}  // namespace
+
+std::vector<LineGroup> line_groups(const Scenario& scenario, const Session& session,
+                                   const RecordNeeds& needs) {
+  std::vector<LineGroup> groups;
+  if (needs.lines.empty()) return groups;
+  const double period_s = scenario.simulation.sample_period_s;
+  const std::vector<double> all_hz = frequencies_of(needs, session, scenario.orbit.period_s);
+  const double corner_hz =
+      std::min(scenario.estimation.band_ratio * *std::ranges::max_element(all_hz), 0.25 / period_s);
+  for (std::size_t i = 0; i < needs.lines.size();) {
+    LineGroup group{line_fit(scenario, session), needs.lines[i].signals, {i}};
+    if (i + 1 < needs.lines.size() && needs.lines[i + 1].signals == group.signals) {
+      group.lines.push_back(i + 1);
+    }
+    group.fit.fit_hz.clear();
+    group.fit.known_hz.clear();
+    for (std::size_t k = 0; k < all_hz.size(); ++k) {
+      const bool is_of_group = k >= i && k < i + group.lines.size();
+      (is_of_group ? group.fit.fit_hz : group.fit.known_hz).push_back(all_hz[k]);
+    }
+    group.fit.filter = {no_filter.high_pass, butterworth_low_pass(corner_hz, period_s)};
+    i += group.lines.size();
+    groups.push_back(std::move(group));
+  }
+  return groups;
 }
 
 }  // namespace proofmass

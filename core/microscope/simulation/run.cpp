@@ -23,15 +23,32 @@ namespace {
 
 /// Signals that are not recorded stay 0: where lanes are in different sessions they are summed,
 /// too.
-void append_lines(const SignalSums<double>& sums, SignalSet recorded, std::size_t num_lines,
-                  SessionPhasors& phasors) {
+void keep_fit_lines(const SignalSums<double>& sums, SignalSet recorded, SessionPhasors& phasors) {
   const std::size_t num_recorded = recorded == SignalSet::all ? num_signals : num_common_signals;
   for (std::size_t s = 0; s < num_recorded; ++s) {
-    for (std::size_t i = 0; i < num_lines; ++i) {
-      phasors.amplitude[s][phasors.num_lines + i] = {sums[s][2 * i], sums[s][2 * i + 1]};
+    const bool is_of_health = s == index(Signal::differential_x) || s == index(Signal::product);
+    if (recorded == SignalSet::health && !is_of_health) continue;
+    for (std::size_t i = 0; i < phasors.num_fit_lines; ++i) {
+      phasors.amplitude[s][i] = {sums[s][2 * i], sums[s][2 * i + 1]};
     }
   }
-  phasors.num_lines += num_lines;
+}
+
+/// Keeps what was recorded beside the session's own lines.
+void keep_further(const FurtherSums<double>& sums, const std::vector<LineGroup>& groups,
+                  std::size_t num_samples, SessionPhasors& phasors) {
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const std::vector<std::size_t>& lines = groups[g].lines;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      if (phasors.lines.size() <= lines[i]) phasors.lines.resize(lines[i] + 1);
+      for (std::size_t s = 0; s < num_line_signals; ++s) {
+        phasors.lines[lines[i]][s] = {sums.lines[g][s][2 * i], sums.lines[g][s][2 * i + 1]};
+      }
+    }
+  }
+  for (std::size_t s = 0; s < num_line_bases; ++s) {
+    phasors.means[s] = sums.plain[s] / static_cast<double>(num_samples);
+  }
 }
 
 template <typename Noise>
@@ -102,15 +119,15 @@ struct RunPlan::Impl {
         bounds(c.scenario),
         recording(recording_of(c.scenario, noise)) {
     weights.reserve(campaign.scenario.sessions.size());
-    known_weights.resize(campaign.scenario.sessions.size());
     residual_weights.resize(campaign.scenario.sessions.size());
     for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
       const Session& session = campaign.scenario.sessions[i];
-      const LineFit fit = line_fit(campaign.scenario, session);
-      weights.emplace_back(fit);
-      if (method.needs(session).lines == RecordedLines::all) {
-        for (const LineFit& known : known_line_fits(fit)) known_weights[i].emplace_back(known);
-      }
+      weights.emplace_back(line_fit(campaign.scenario, session));
+      const RecordNeeds& asked = needs.emplace_back(method.needs(session));
+      groups.push_back(line_groups(campaign.scenario, session, asked));
+      PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
+      auto& of_groups = group_weights.emplace_back();
+      for (const LineGroup& group : groups.back()) of_groups.emplace_back(group.fit);
       if (!session.excitations.empty() || is_monitored_before(i)) continue;
       residual_weights[i].emplace(residual_fit(campaign.scenario, session));
     }
@@ -135,12 +152,14 @@ struct RunPlan::Impl {
   struct Readers {
     explicit Readers(const Impl& impl, std::size_t i)
         : lines(impl.weights[i]),
-          known(impl.known_weights[i].begin(), impl.known_weights[i].end()),
-          buffer(weights_buffer_size(lines.weights().num_fit_lines(), known.size())) {
+          buffer(weights_buffer_size(lines.weights().num_fit_lines(), impl.groups[i].size())) {
+      for (std::size_t g = 0; g < impl.groups[i].size(); ++g) {
+        further.push_back({WeightReader(impl.group_weights[i][g]), impl.groups[i][g].signals});
+      }
       if (impl.is_quiet(i)) residual.emplace(*impl.residual_weights[i]);
     }
     WeightReader lines;
-    std::vector<WeightReader> known;  ///< Of the known lines, if the method wants them.
+    std::vector<LineReader> further;  ///< Of the lines that the method asks for.
     std::vector<double> buffer;
     std::optional<WeightReader> residual;  ///< Of a session that is monitored.
   };
@@ -153,8 +172,8 @@ struct RunPlan::Impl {
         .drag_free = drag_free,
         .attitude = attitude,
         .product = target_info(session.target).product,
-        .signals = method.needs(session).signals,
-        .known_readers = readers.known,
+        .signals = needs[i].signals,
+        .line_readers = readers.further,
         .residual_reader = readers.residual ? &*readers.residual : nullptr};
   }
 
@@ -191,17 +210,16 @@ struct RunPlan::Impl {
     Readers readers(*this, i);
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
-    keep(i, {alone.sums, to_health(alone), alone.known_sums}, record);
+    keep(i, {alone.sums, to_health(alone), alone.further}, record);
   }
 
   /// Keeps what a session left of a run.
   void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
     SessionPhasors& phasors = record.phasors[i];
-    const SignalSet recorded = method.needs(campaign.scenario.sessions[i]).signals;
-    append_lines(outcome.sums, recorded, weights[i].num_fit_lines(), phasors);
-    phasors.num_fit_lines = phasors.num_lines;
-    for (std::size_t k = 0; k < known_weights[i].size(); ++k) {
-      append_lines(outcome.known_sums[k], recorded, known_weights[i][k].num_fit_lines(), phasors);
+    phasors.num_fit_lines = weights[i].num_fit_lines();
+    keep_fit_lines(outcome.sums, needs[i].signals, phasors);
+    if (!groups[i].empty()) {
+      keep_further(outcome.further, groups[i], weights[i].num_samples(), phasors);
     }
     record.health[i] = outcome.health;
     record.health[i].is_quiet = is_quiet(i);
@@ -277,12 +295,12 @@ struct RunPlan::Impl {
   }
 
   /// Whether sessions may be computed side by side: the loops settle for a whole number of noise
-  /// blocks, and no known lines are recorded.
+  /// blocks, and no further lines are recorded.
   [[nodiscard]] bool may_be_mixed() const {
     const Scenario& scenario = campaign.scenario;
     const SessionSignals signals(scenario, scenario.sessions[0], orbit, environment);
     return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 &&
-           std::ranges::all_of(known_weights, [](const auto& known) { return known.empty(); });
+           std::ranges::all_of(groups, [](const auto& further) { return further.empty(); });
   }
 
   MicroscopeCampaign campaign;
@@ -294,8 +312,10 @@ struct RunPlan::Impl {
   AttitudeGains attitude;
   ShiftBounds bounds;
   Recording recording;
-  std::vector<LineWeights> weights;                     ///< Of each session.
-  std::vector<std::vector<LineWeights>> known_weights;  ///< Empty unless the method wants them.
+  std::vector<LineWeights> weights;                          ///< Of each session.
+  std::vector<RecordNeeds> needs;                            ///< Of each session.
+  std::vector<std::vector<LineGroup>> groups;                ///< Of each session's further lines.
+  std::vector<std::vector<LineWeights>> group_weights;       ///< Of those groups.
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
 };
 
@@ -400,8 +420,14 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
 
 Estimation RunPlan::estimation(const RunRecord& record) const {
   const Scenario& scenario = impl_->campaign.scenario;
-  return impl_->method.estimate(record.phasors, scenario.sessions, scenario.estimation,
-                                scenario.objectives);
+  return impl_->method.estimate(record.phasors,
+                                {.sessions = scenario.sessions,
+                                 .config = scenario.estimation,
+                                 .objectives = scenario.objectives,
+                                 .noise = scenario.noise,
+                                 .dispersions = impl_->campaign.dispersions,
+                                 .orbit_period_s = scenario.orbit.period_s,
+                                 .sample_period_s = scenario.simulation.sample_period_s});
 }
 
 RunResult RunPlan::estimate(const RunRecord& record) const {

@@ -145,7 +145,7 @@ LineFit residual_fit(const Scenario& scenario, const Session& session) {
     for (const LineMultiple& line : *lines) {
       const double other_hz = line_frequency_hz(session, line, period_s);
       if (std::abs(other_hz - frequency_hz) < 0.99 * resolution_hz) continue;
-      if (fit.known_hz.size() + 1 < LineWeights::num_lines_max) fit.known_hz.push_back(other_hz);
+      if (fit.known_hz.size() + 1 < num_session_lines_max) fit.known_hz.push_back(other_hz);
     }
   }
   fit.filter = band_pass(frequency_hz / ratio, frequency_hz * ratio, fit.sample_period_s);

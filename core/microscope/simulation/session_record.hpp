@@ -79,6 +79,12 @@ PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>&
           product,        g[1].x,   g[1].y,   g[1].z,   g[2].x, g[2].y, g[2].z};
 }
 
+/// Weights of one or two lines that the method asks for.
+struct LineReader {
+  WeightReader weights;
+  LineSignals signals;
+};
+
 /// What the runs of a batch share in one session.
 struct SessionSetup {
   TestMasses masses = TestMasses::moving;  ///< `at_rest` if no excitation moves one.
@@ -87,8 +93,8 @@ struct SessionSetup {
   AttitudeGains attitude;
   Product product = Product::none;
   SignalSet signals = SignalSet::all;
-  /// Weights of the known lines, one or two a reader; none if these are not recorded.
-  std::span<WeightReader> known_readers;
+  /// Of the lines that the method asks for beside the session's own; none for most methods.
+  std::span<LineReader> line_readers;
   /// Weights of the line at f_EP; null in a session that is not monitored.
   WeightReader* residual_reader = nullptr;
 };
@@ -97,7 +103,7 @@ struct SessionSetup {
 struct BlockWeights {
   const double* lines = nullptr;     ///< Of the lines to be fitted; null while the loops settle.
   const double* residual = nullptr;  ///< Of the line at f_EP; null where it is not monitored.
-  const double* known = nullptr;     ///< Of all known readers; null where these are none.
+  const double* further = nullptr;   ///< Of all line readers; null where these are none.
 };
 
 /// Adds one sample's signals to the sums of one output of the line weights.
@@ -118,7 +124,11 @@ PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const
   constexpr std::size_t product_index = index(Signal::product);
   for (std::size_t i = 0; i < num_outputs; ++i) {
     const T weight = T(weights[i]);
-    add_weighted<0, product_index>(values, weight, i, sums);
+    if (signals == SignalSet::health) {
+      add_weighted<0, 1>(values, weight, i, sums);
+    } else {
+      add_weighted<0, product_index>(values, weight, i, sums);
+    }
     if (product != Product::none) {
       add_weighted<product_index, num_common_signals>(values, weight, i, sums);
     }
@@ -128,31 +138,77 @@ PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const
   }
 }
 
-/// Known lines take a reader for every two.
-inline constexpr std::size_t num_known_readers_max = num_session_lines_max / 2;
+/// Readers of further lines at most; each has one or two.
+inline constexpr std::size_t num_line_readers_max = 10;
 
-/// Weights of a block of one reader of known lines.
-inline constexpr std::size_t known_block_size = LineWeights::block_size * 2 * num_fit_lines_max;
+/// Weights of a block of one reader of further lines.
+inline constexpr std::size_t line_block_size = LineWeights::block_size * 2 * num_fit_lines_max;
 
-/// Weights of a block for the session's lines, for that at f_EP and for the known ones.
+/// Weights of a block for the session's lines, for that at f_EP and for the further ones.
 [[nodiscard]] constexpr std::size_t weights_buffer_size(std::size_t num_fit_lines,
-                                                        std::size_t num_known_readers) {
-  return LineWeights::block_size * 2 * (num_fit_lines + 1) + known_block_size * num_known_readers;
+                                                        std::size_t num_line_readers) {
+  return LineWeights::block_size * 2 * (num_fit_lines + 1) + line_block_size * num_line_readers;
 }
 
+/// Sums of what is recorded for methods that ask for further lines.
 template <typename T>
-using KnownSums = std::array<SignalSums<T>, num_known_readers_max>;
+struct FurtherSums {
+  /// Of each reader: [signal of LineSignals][output].
+  std::array<std::array<std::array<T, 2 * num_fit_lines_max>, num_line_signals>,
+             num_line_readers_max>
+      lines{};
+  std::array<T, num_line_bases> plain{};  ///< Unweighted.
+};
 
-/// Adds one sample's signals to the sums of the known lines.
-/// @param weights  Of the block's first sample; `k` samples later is the one to be added.
+/// What is added for one line reader, in the order of LineSignals.
+/// @param values  The ground's signals.
+/// @param motion  Half the position of the moving masses, m.
 template <typename T>
-__attribute__((noinline)) void add_known_lines(const std::array<T, num_signals> values,
-                                               const SessionSetup& setup, const double* weights,
-                                               std::size_t k, KnownSums<T>& sums) {
-  for (std::size_t i = 0; i < setup.known_readers.size(); ++i) {
-    const std::size_t num_outputs = 2 * setup.known_readers[i].weights().num_fit_lines();
-    add_sample(values, weights + i * known_block_size + k * num_outputs, num_outputs, setup.product,
-               setup.signals, sums[i]);
+PROOFMASS_INLINE std::size_t line_signals(LineSignals signals,
+                                          const std::array<T, num_signals>& values,
+                                          const Observation<T>& observation, const T& motion,
+                                          std::array<T, num_line_signals>& line) {
+  for (std::size_t s = 0; s < num_line_bases; ++s) line[s] = values[s];
+  if (signals == LineSignals::squares) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const T& x = observation.measured_K[k].x;
+      line[num_line_bases + k] = x * x;
+    }
+    return num_line_bases + 2;
+  }
+  const std::size_t first_row = index(Signal::gradient_xx), rest = index(Signal::gradient_yx);
+  if (signals == LineSignals::gradients) {
+    for (std::size_t i = 0; i < 6; ++i) line[num_line_bases + i] = values[rest + i];
+    return num_line_bases + 6;
+  }
+  for (std::size_t i = 0; i < 9; ++i) {
+    line[num_line_bases + i] = motion * values[i < 3 ? first_row + i : rest + i - 3];
+  }
+  return num_line_signals;
+}
+
+/// Adds one sample to the sums of the further lines.
+/// @param weights  Of the block's first sample; `k` samples later is the one to be added.
+template <typename T, typename Shared>
+PROOFMASS_INLINE void add_further(const std::array<T, num_signals>& values,
+                                  const Observation<T>& observation,
+                                  const SharedSampleOf<Shared>& shared, const SessionSetup& setup,
+                                  const double* weights, std::size_t k, FurtherSums<T>& sums) {
+  for (std::size_t s = 0; s < num_line_bases; ++s) sums.plain[s] = sums.plain[s] + values[s];
+  const T motion = T(0.5) * T(shared.mass_motion.position_m);
+  for (std::size_t i = 0; i < setup.line_readers.size(); ++i) {
+    const auto& [reader, signals] = setup.line_readers[i];
+    const std::size_t num_outputs = 2 * reader.weights().num_fit_lines();
+    std::array<T, num_line_signals> line;
+    const std::size_t num_used = line_signals(signals, values, observation, motion, line);
+    const double* const at = weights + i * line_block_size + k * num_outputs;
+    for (std::size_t output = 0; output < num_outputs; ++output) {
+      const T weight = T(at[output]);
+      for (std::size_t s = 0; s < num_used; ++s) {
+        T& sum = sums.lines[i][s][output];
+        sum = sum + weight * line[s];
+      }
+    }
   }
 }
 
@@ -164,18 +220,21 @@ struct LaneGroup {
   Loop<T> loop{};
   SignalSums<T> sums{};
   LoopMonitor<T> monitor{};
-  KnownSums<T> known_sums{};
+  FurtherSums<T> further{};
 };
 
 /// What a session leaves of a run.
 struct SessionOutcome {
   SignalSums<double> sums{};
   SessionHealth health;
-  KnownSums<double> known_sums{};
+  FurtherSums<double> further{};
 };
 
 /// Whether LoopMonitor is filled.
 enum class Monitoring : std::uint8_t { off, on };
+
+/// Whether lines are recorded beside the session's own.
+enum class RecordedLines : std::uint8_t { own, further };
 
 /// What a compiled sample loop computes. Parts that are left out are not even branches in it.
 struct SampleKind {
@@ -183,6 +242,7 @@ struct SampleKind {
   SignalSet signals = SignalSet::all;
   bool has_product = true;  ///< Of any kind but Product::none.
   Monitoring monitoring = Monitoring::off;
+  RecordedLines lines = RecordedLines::own;
 };
 
 /// Advances all groups by some samples.
@@ -198,7 +258,7 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   const SignalSet recorded = kind.signals == SignalSet::all ? setup.signals : SignalSet::common;
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
-    for (auto& [constants, noise, loop, sums, monitor, known_sums] : groups) {
+    for (auto& [constants, noise, loop, sums, monitor, further] : groups) {
       if constexpr (Observer::is_active) observer.begin_sample(loop);
       const auto observation =
           loop.template advance<kind.masses>(constants, setup.drag_free, setup.attitude, shared,
@@ -209,8 +269,10 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
       if (weights.lines == nullptr) continue;
       const auto values = ground_signals(observation, shared, product);
       add_sample(values, weights.lines + k * num_outputs, num_outputs, product, recorded, sums);
-      if (weights.known != nullptr) [[unlikely]]
-        add_known_lines(values, setup, weights.known, k, known_sums);
+      if constexpr (kind.lines == RecordedLines::further) {
+        add_further(values, observation, shared, setup, weights.further, k, further);
+        if (weights.residual == nullptr) continue;
+      }
       if constexpr (kind.monitoring == Monitoring::on) {
         monitor.add(constants.sensors, observation, weights.residual + 2 * k);
       }
@@ -223,12 +285,19 @@ using AdvanceGroups = void (*)(Signals&, const SessionSetup&, std::span<Group>, 
                                const BlockWeights&, Observer&);
 
 /// The compiled loop for a session. Each session of the paper's campaign has one that computes what
-/// it needs and no more, except for the one that is monitored; the last one covers all others. A
-/// loop for each combination would take the compiler minutes.
+/// it needs and no more, except for the one that is monitored; the last one covers all others.
+/// Where further lines are recorded, two loops serve all sessions. A loop for each combination
+/// would take the compiler minutes.
 template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
   using enum SignalSet;
+  if (!setup.line_readers.empty()) {
+    constexpr SampleKind kind{.monitoring = Monitoring::on, .lines = RecordedLines::further};
+    constexpr SampleKind kind_at_rest{at_rest, all, true, kind.monitoring, kind.lines};
+    return setup.masses == moving ? advance_groups<kind, Signals, Group, Observer>
+                                  : advance_groups<kind_at_rest, Signals, Group, Observer>;
+  }
   if (setup.residual_reader != nullptr) {
     return advance_groups<SampleKind{.monitoring = Monitoring::on}, Signals, Group, Observer>;
   }
@@ -251,7 +320,7 @@ AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& se
 }
 
 /// Writes the weights of a block: first those of the lines to be fitted, then those at f_EP if the
-/// session is monitored, then those of the known lines if they are recorded.
+/// session is monitored, then those of the further lines.
 /// @param buffer  Room for weights_buffer_size() weights.
 [[nodiscard]] inline BlockWeights fill_block(const SessionSetup& setup, std::size_t block,
                                              std::span<double> buffer) {
@@ -263,11 +332,11 @@ AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& se
     weights.residual = buffer.data();
   }
   buffer = buffer.subspan(2 * LineWeights::block_size);
-  if (setup.known_readers.empty()) return weights;
-  weights.known = buffer.data();
-  for (WeightReader& reader : setup.known_readers) {
-    reader.fill_block(block, buffer);
-    buffer = buffer.subspan(known_block_size);
+  if (setup.line_readers.empty()) return weights;
+  weights.further = buffer.data();
+  for (LineReader& reader : setup.line_readers) {
+    reader.weights.fill_block(block, buffer);
+    buffer = buffer.subspan(line_block_size);
   }
   return weights;
 }

@@ -214,8 +214,10 @@ double largest_move(const Estimates& before, const Estimates& after,
 
 }  // namespace
 
-Estimation estimate_hardy2013(const RunPhasors& records, const std::vector<Session>& sessions,
-                              const EstimationConfig& config, const ParameterArray& objectives) {
+Estimation estimate_hardy2013(const RunPhasors& records, const EstimationInput& input) {
+  const std::vector<Session>& sessions = input.sessions;
+  const EstimationConfig& config = input.config;
+  const ParameterArray& objectives = input.objectives;
   PROOFMASS_EXPECT(records.size() == sessions.size());
   Estimates known;
   Estimation result;
@@ -233,7 +235,7 @@ Estimation estimate_hardy2013(const RunPhasors& records, const std::vector<Sessi
 }
 
 RecordNeeds hardy2013_needs(const Session& session) {
-  return {.lines = RecordedLines::fitted, .signals = target_info(session.target).signals};
+  return {.signals = target_info(session.target).signals};
 }
 
 void check_hardy2013(const std::vector<Session>& sessions) {

@@ -23,9 +23,7 @@ namespace proofmass {
 /// It has no standard errors. Its diagnostic `last_move` is the largest move of an estimate in the
 /// last round, in objectives.
 [[nodiscard]] Estimation estimate_hardy2013(const RunPhasors& records,
-                                            const std::vector<Session>& sessions,
-                                            const EstimationConfig& config,
-                                            const ParameterArray& objectives);
+                                            const EstimationInput& input);
 
 /// The lines to be fitted, with the signals that the session's target needs.
 [[nodiscard]] RecordNeeds hardy2013_needs(const Session& session);

@@ -153,6 +153,22 @@ TEST(Scenario, WantsBandsBelowTheNyquistFrequency) {
             "below the Nyquist frequency, 2 Hz)");
 }
 
+// 2 f_orb is 3.361344...e-4 Hz, and ten orbits tell lines apart that are 1.7e-5 Hz from each other.
+TEST(Scenario, WantsLinesOfAMethodThatTheRecordCanTellApart) {
+  const auto pushed_at = [](double frequency_hz) {
+    return refusal_after([=](Scenario& s) {
+      s.estimation.method = EstimationMethod{2};
+      s.sessions[6].excitations[0].frequency_hz = frequency_hz;
+      s.sessions[6].known_lines.clear();
+    });
+  };
+  EXPECT_EQ(pushed_at(3.6e-4), "");
+  EXPECT_EQ(
+      pushed_at(3.5e-4),
+      "session[6].excitations = a line at 0.00035 Hz (the estimation must tell it from that at "
+      "0.000336134 Hz, and from the Nyquist frequency, 2 Hz)");
+}
+
 TEST(NoisePresets, AreThoseOfTheDesignAndOfTheFlight) {
   const NoiseConfig design = noise_preset(NoisePreset::design_2013);
   EXPECT_EQ(design.linear_x.white_asd, 1.4e-12);

@@ -34,7 +34,7 @@ double at(const ParameterArray& values, Parameter parameter) { return values[ind
 /// Arbitrary phasors of natural size for every signal except the differential measurement.
 SessionPhasors random_phasors(std::uint32_t session, std::size_t num_lines) {
   SessionPhasors phasors;
-  phasors.num_fit_lines = phasors.num_lines = num_lines;
+  phasors.num_fit_lines = num_lines;
   for (std::size_t s = 1; s < num_signals; ++s) {
     for (std::size_t line = 0; line < num_lines; ++line) {
       const auto number = [&](std::uint32_t part) {
@@ -114,7 +114,7 @@ struct ModelRecord {
       const bool sidebands = target == SessionTarget::a_c12 || target == SessionTarget::a_c13;
       SessionPhasors phasors = random_phasors(static_cast<std::uint32_t>(i), sidebands ? 2 : 1);
       dominate(target, phasors);
-      for (std::size_t line = 0; line < phasors.num_lines; ++line) {
+      for (std::size_t line = 0; line < phasors.num_fit_lines; ++line) {
         Complex& differential = phasors.amplitude[index(Signal::differential_x)][line];
         const Complex regressor = phasors.amplitude[index(Signal::product)][line];
         differential = linear_model(phasors, line, truth);
@@ -151,10 +151,18 @@ EstimationConfig precise(Correction correction) {
   return config;
 }
 
+Estimation calibrate(const RunPhasors& record, const EstimationConfig& config,
+                     const Scenario& scenario) {
+  return estimate_hardy2013(record, {.sessions = scenario.sessions,
+                                     .config = config,
+                                     .objectives = scenario.objectives,
+                                     .noise = scenario.noise,
+                                     .dispersions = nominal_dispersions()});
+}
+
 /// The paper's sessions are in the order of their targets, as ModelRecord makes its records.
 Estimation calibrate(const RunPhasors& record, const EstimationConfig& config) {
-  const Scenario scenario;
-  return estimate_hardy2013(record, scenario.sessions, config, scenario.objectives);
+  return calibrate(record, config, Scenario());
 }
 
 const ParameterArray& objectives() {
@@ -260,7 +268,7 @@ RunPhasors lone_terms(const ParameterArray& truth) {
   RunPhasors record = model.make();
   for (std::size_t i = 0; i < num_sessions; ++i) {
     const Signal own = own_signals[i];
-    for (std::size_t line = 0; line < record[i].num_lines; ++line) {
+    for (std::size_t line = 0; line < record[i].num_fit_lines; ++line) {
       const Complex regressor = record[i].amplitude[index(own)][line];
       for (auto& signal : record[i].amplitude) signal[line] = 0.0;
       record[i].amplitude[index(own)][line] = regressor;
@@ -356,8 +364,7 @@ TEST(EstimateHardy2013, WeightsTheSessionsOfATargetByTheirLengths) {
   Complex& regressor = record.back().amplitude[index(Signal::common_y)][0];
   regressor *= 0.5;
   record.back().amplitude[index(Signal::differential_x)][0] = (slope + 1e-5) * regressor;
-  const Estimation result =
-      estimate_hardy2013(record, scenario.sessions, scenario.estimation, scenario.objectives);
+  const Estimation result = calibrate(record, scenario.estimation, scenario);
   EXPECT_TRUE(result.converged);
   const double share = 3.0 * 0.25 / (1.0 + 3.0 * 0.25);
   EXPECT_NEAR(at(result.values, Parameter::a_d12), slope + share * 1e-5, 1e-12);

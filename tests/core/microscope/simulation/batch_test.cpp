@@ -245,7 +245,7 @@ TEST(Batch, RecordsWhatARunAloneRecords) {
       for (std::size_t s = 0; s < alone.phasors.size(); ++s) {
         const SessionPhasors& found = records.back().phasors[s];
         const SessionPhasors& expected = alone.phasors[s];
-        EXPECT_EQ(found.num_lines, expected.num_lines);
+        EXPECT_EQ(found.num_fit_lines, expected.num_fit_lines);
         EXPECT_EQ(found.amplitude, expected.amplitude)
             << fmt::format("{}, {} runs, session {}", name_of(set), count, s);
       }

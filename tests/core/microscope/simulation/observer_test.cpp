@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <complex>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "core/microscope/simulation/run.hpp"
@@ -28,12 +31,21 @@ MicroscopeCampaign short_campaign() {
   return campaign;
 }
 
-RecordNeeds all_lines_and_signals(const Session& /*session*/) {
-  return {.lines = RecordedLines::all, .signals = SignalSet::all};
+/// Beside the session's own lines, all signals of the known ones, each among all others.
+RecordNeeds all_lines_and_signals(const Session& session) {
+  RecordNeeds needs{.signals = SignalSet::all};
+  for (const LineSignals signals :
+       {LineSignals::gradients, LineSignals::squares, LineSignals::moved}) {
+    if (signals == LineSignals::moved && mass_excitation(session) == nullptr) continue;
+    needs.lines.push_back({session.known_lines[needs.lines.size()], signals});
+  }
+  needs.neighbours = session.fit_lines;
+  needs.neighbours.insert(needs.neighbours.end(), session.known_lines.begin(),
+                          session.known_lines.end());
+  return needs;
 }
 void accept_sessions(const std::vector<Session>& /*sessions*/) {}
-Estimation no_estimation(const RunPhasors& /*records*/, const std::vector<Session>& /*sessions*/,
-                         const EstimationConfig& /*config*/, const ParameterArray& /*objectives*/) {
+Estimation no_estimation(const RunPhasors& /*records*/, const EstimationInput& /*input*/) {
   return {};
 }
 
@@ -49,13 +61,6 @@ std::vector<double> column(const Series& series, Signal signal) {
   std::vector<double> values;
   for (const auto& sample : series) values.push_back(sample[index(signal)]);
   return values;
-}
-
-/// Largest distance from the mean: what rounding is relative to.
-double size_of(const Series& series, Signal signal) {
-  const auto [least, most] = std::ranges::minmax_element(
-      series, {}, [signal](const auto& sample) { return sample[index(signal)]; });
-  return (*most)[index(signal)] - (*least)[index(signal)];
 }
 
 struct Observed {
@@ -82,9 +87,9 @@ Observed observe(const RunPlan& plan, RunRecord& record) {
   return observed;
 }
 
-void expect_same_bits(const SessionPhasors& a, const SessionPhasors& b, std::size_t num_lines) {
+void expect_same_bits(const SessionPhasors& a, const SessionPhasors& b) {
   for (std::size_t s = 0; s < num_signals; ++s) {
-    for (std::size_t i = 0; i < num_lines; ++i) {
+    for (std::size_t i = 0; i < num_fit_lines_max; ++i) {
       ASSERT_EQ(std::bit_cast<std::uint64_t>(a.amplitude[s][i].real()),
                 std::bit_cast<std::uint64_t>(b.amplitude[s][i].real()))
           << "signal " << s << ", line " << i;
@@ -108,6 +113,38 @@ TEST(SampleObserver, GetsEverySampleOfEverySessionInOrder) {
   EXPECT_DOUBLE_EQ(observed.latest_s, 47599 * 0.25);
 }
 
+/// The series of a line's signal in a record, by its place in LinePhasors.
+std::vector<double> line_column(const Series& series, LineSignals signals, std::size_t s,
+                                const Excitation* moving, double sample_period_s) {
+  if (s < num_line_bases) return column(series, static_cast<Signal>(s));
+  std::vector<double> values;
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    const auto at = [&](Signal signal) { return series[k][index(signal)]; };
+    if (signals == LineSignals::squares) {
+      const double d = at(Signal::differential_x), c = at(Signal::common_x);
+      values.push_back(s == num_line_bases ? (c + d) * (c + d) : (c - d) * (c - d));
+      continue;
+    }
+    constexpr std::array elements{Signal::gradient_xx, Signal::gradient_xy, Signal::gradient_xz,
+                                  Signal::gradient_yx, Signal::gradient_yy, Signal::gradient_yz,
+                                  Signal::gradient_zx, Signal::gradient_zy, Signal::gradient_zz};
+    const bool is_moved = signals == LineSignals::moved;
+    double value = at(elements[s - num_line_bases + (is_moved ? 0 : 3)]);
+    if (is_moved) {
+      const double time_s = static_cast<double>(k) * sample_period_s;
+      value *= 0.5 * moving->amplitude *
+               std::sin(2.0 * std::numbers::pi * moving->frequency_hz * time_s);
+    }
+    values.push_back(value);
+  }
+  return values;
+}
+
+double size_of(const std::vector<double>& values) {
+  const auto [least, most] = std::ranges::minmax_element(values);
+  return *most - *least;
+}
+
 // The weights' sums and the step-by-step fit round differently: by some 1e-16 of the signal in each
 // of 5e4 samples, times the few hundred by which nearby lines in two orbits amplify it.
 TEST(SampleObserver, RecordsTheSeriesWhosePhasorsTheRunHas) {
@@ -120,17 +157,52 @@ TEST(SampleObserver, RecordsTheSeriesWhosePhasorsTheRunHas) {
     const std::size_t i = index(target);
     const Session& session = scenario.sessions[i];
     const SessionPhasors& phasors = record.phasors[i];
+    const Series& series = observed.records[i];
     ASSERT_EQ(phasors.num_fit_lines, session.fit_lines.size());
-    ASSERT_EQ(phasors.num_lines, session.fit_lines.size() + session.known_lines.size());
     for (const Signal signal : {Signal::differential_x, Signal::gradient_xy, Signal::product,
                                 Signal::gradient_yy, Signal::gradient_zz}) {
-      const std::vector<Complex> lines =
-          test::fitted_lines(column(observed.records[i], signal), scenario, session);
-      const double tolerance = 1e-9 * size_of(observed.records[i], signal);
-      for (std::size_t line = 0; line < lines.size(); ++line) {
-        EXPECT_LE(std::abs(phasors.amplitude[index(signal)][line] - lines[line]), tolerance)
+      const std::vector<double> values = column(series, signal);
+      const std::vector<Complex> lines = test::fitted_lines(values, scenario, session);
+      for (std::size_t line = 0; line < session.fit_lines.size(); ++line) {
+        EXPECT_LE(std::abs(phasors.amplitude[index(signal)][line] - lines[line]),
+                  1e-9 * size_of(values))
             << name_of(target) << ", signal " << index(signal) << ", line " << line;
       }
+    }
+    // The further lines and the level have a fit of their own, behind a low-pass three times above
+    // the highest of them.
+    const std::vector<WantedLine> wanted = all_lines_and_signals(session).lines;
+    ASSERT_EQ(phasors.lines.size(), wanted.size());
+    Session alone = session;
+    alone.known_lines.insert(alone.known_lines.end(), session.fit_lines.begin(),
+                             session.fit_lines.end());
+    alone.known_lines.push_back({.orbital = 0.01 / session.num_orbits});
+    double highest_hz = 0.0;
+    for (const LineMultiple& line : alone.known_lines) {
+      highest_hz = std::max(highest_hz, line_frequency_hz(session, line, scenario.orbit.period_s));
+    }
+    const double period_s = scenario.simulation.sample_period_s;
+    const BandPass filter{no_filter.high_pass, butterworth_low_pass(3.0 * highest_hz, period_s)};
+    for (std::size_t w = 0; w < wanted.size(); ++w) {
+      alone.fit_lines = {wanted[w].line};
+      Session others = alone;
+      std::erase(others.known_lines, wanted[w].line);
+      const std::size_t num_used = num_line_bases + (wanted[w].signals == LineSignals::squares ? 2
+                                                     : wanted[w].signals == LineSignals::moved ? 9
+                                                                                               : 6);
+      for (std::size_t s = 0; s < num_used; s += 3) {
+        const std::vector<double> values =
+            line_column(series, wanted[w].signals, s, mass_excitation(session), period_s);
+        const Complex line = test::fitted_lines(values, scenario, others, filter)[0];
+        EXPECT_LE(std::abs(phasors.lines[w][s] - line), 1e-9 * size_of(values))
+            << name_of(target) << ", signal " << s << " of line " << w;
+      }
+    }
+    for (std::size_t s = 0; s < num_line_bases; ++s) {
+      const std::vector<double> values = column(series, static_cast<Signal>(s));
+      double sum = 0.0;
+      for (const double value : values) sum += value;
+      EXPECT_EQ(phasors.means[s], sum / static_cast<double>(values.size()));
     }
   }
 }
@@ -141,7 +213,7 @@ TEST(SampleObserver, ChangesNoBitOfTheRun) {
   (void)observe(plan, observed);
   const RunRecord alone = plan.record(RunIndex{2}, {});
   for (std::size_t i = 0; i < alone.phasors.size(); ++i) {
-    expect_same_bits(observed.phasors[i], alone.phasors[i], num_session_lines_max);
+    expect_same_bits(observed.phasors[i], alone.phasors[i]);
   }
   const RunResult with = plan.estimate(observed), without = plan.estimate(alone);
   EXPECT_EQ(with.status, RunStatus::completed);
@@ -159,15 +231,15 @@ TEST(RecordNeeds, AddLinesAndChangeNoBitOfTheOthers) {
   const RunRecord all = RunPlan(campaign, recording_method).record(RunIndex{2}, {});
   for (std::size_t i = 0; i < few.phasors.size(); ++i) {
     const Session& session = campaign.scenario.sessions[i];
-    EXPECT_EQ(few.phasors[i].num_lines, session.fit_lines.size());
-    EXPECT_EQ(all.phasors[i].num_lines, session.fit_lines.size() + session.known_lines.size());
+    EXPECT_TRUE(few.phasors[i].lines.empty());
+    EXPECT_GE(all.phasors[i].lines.size(), 2U);
     SessionPhasors common = all.phasors[i];
     if (target_info(session.target).signals == SignalSet::common) {
       EXPECT_NE(common.amplitude[index(Signal::gradient_zz)][0], Complex(0.0, 0.0));
       std::fill(common.amplitude.begin() + num_common_signals, common.amplitude.end(),
                 decltype(common.amplitude)::value_type{});
     }
-    expect_same_bits(common, few.phasors[i], session.fit_lines.size());
+    expect_same_bits(common, few.phasors[i]);
   }
 }
 
@@ -179,8 +251,9 @@ TEST(RecordNeeds, AreMetByBatchesWithTheBitsOfTheRunAlone) {
     const std::vector<RunRequest> requests{{RunIndex{1}, {}}, {RunIndex{2}, {}}};
     const std::vector<RunRecord> batch = plan.record_batch(requests, set);
     for (std::size_t i = 0; i < alone.phasors.size(); ++i) {
-      EXPECT_EQ(batch[1].phasors[i].num_lines, alone.phasors[i].num_lines);
-      expect_same_bits(batch[1].phasors[i], alone.phasors[i], num_session_lines_max);
+      expect_same_bits(batch[1].phasors[i], alone.phasors[i]);
+      EXPECT_EQ(batch[1].phasors[i].lines, alone.phasors[i].lines);
+      EXPECT_EQ(batch[1].phasors[i].means, alone.phasors[i].means);
     }
   }
 }

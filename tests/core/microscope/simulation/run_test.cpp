@@ -72,9 +72,8 @@ RecordNeeds needs_of_test(const Session& /*session*/) { return {}; }
 void refuse_nothing(const std::vector<Session>& /*sessions*/) {}
 
 /// What a method was given, as its estimates; its rounds and convergence are its own.
-Estimation first_phasors(const RunPhasors& records, const std::vector<Session>& /*sessions*/,
-                         const EstimationConfig& config, const ParameterArray& /*objectives*/) {
-  Estimation estimation{.num_rounds = 3, .converged = config.convergence < 0.5};
+Estimation first_phasors(const RunPhasors& records, const EstimationInput& input) {
+  Estimation estimation{.num_rounds = 3, .converged = input.config.convergence < 0.5};
   for (std::size_t i = 0; i < num_parameters; ++i) {
     estimation.values[i] = records[i].amplitude[index(Signal::differential_x)][0].real();
   }
@@ -110,11 +109,10 @@ TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
   EXPECT_EQ(RunPlan(campaign, method).simulate(RunIndex{0}, {}).status, RunStatus::not_converged);
 }
 
-Estimation errors_of_three(const RunPhasors& /*records*/, const std::vector<Session>& /*sessions*/,
-                           const EstimationConfig& config, const ParameterArray& /*objectives*/) {
+Estimation errors_of_three(const RunPhasors& /*records*/, const EstimationInput& input) {
   Estimation estimation{.num_rounds = 1, .converged = true};
   estimation.standard_errors.fill(3.0);
-  if (config.convergence > 0.5) estimation.standard_errors.back() = HUGE_VAL;
+  if (input.config.convergence > 0.5) estimation.standard_errors.back() = HUGE_VAL;
   return estimation;
 }
 

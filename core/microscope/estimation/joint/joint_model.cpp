@@ -1,0 +1,188 @@
+#include "core/microscope/estimation/joint/joint_model.hpp"
+
+#include <span>
+
+namespace proofmass {
+namespace {
+
+template <typename Function>
+Dual chained(double value, const Function& slope_of) {
+  Dual result(value);
+  for (std::size_t i = 0; i < num_unknowns; ++i) result.slope[i] = slope_of(i);
+  return result;
+}
+
+Dual operator+(const Dual& a, const Dual& b) {
+  return chained(a.value + b.value, [&](std::size_t i) { return a.slope[i] + b.slope[i]; });
+}
+Dual operator-(const Dual& a, const Dual& b) {
+  return chained(a.value - b.value, [&](std::size_t i) { return a.slope[i] - b.slope[i]; });
+}
+Dual operator*(const Dual& a, const Dual& b) {
+  return chained(a.value * b.value,
+                 [&](std::size_t i) { return a.slope[i] * b.value + a.value * b.slope[i]; });
+}
+Dual operator/(const Dual& a, const Dual& b) {
+  const double quotient = a.value / b.value;
+  return chained(quotient,
+                 [&](std::size_t i) { return (a.slope[i] - quotient * b.slope[i]) / b.value; });
+}
+
+using Vector = std::array<Dual, 3>;
+using Matrix = std::array<Dual, 9>;  ///< Row by row.
+
+/// The unknowns, each with the derivative 1 by itself.
+class Unknowns {
+ public:
+  explicit Unknowns(const UnknownArray& values) : values_(values) {}
+
+  Dual operator[](Parameter parameter) const { return at(index(parameter)); }
+  Dual operator[](Unknown unknown) const { return at(index(unknown)); }
+
+  [[nodiscard]] Vector offcentring() const {
+    return {at(index(Parameter::a_c11_delta_x)), at(index(Parameter::a_c11_delta_y)),
+            at(index(Parameter::a_c11_delta_z))};
+  }
+
+ private:
+  [[nodiscard]] Dual at(std::size_t i) const {
+    Dual dual(values_[i]);
+    dual.slope[i] = 1.0;
+    return dual;
+  }
+  const UnknownArray& values_;
+};
+
+/// w_ij = gain_i v_j, and what the tilt β makes of it: with S the symmetric part of G and B v = β∧v
+/// the signal is Σ w_ij (G + B S + (B S)ᵀ)_ij = Σ (w_ij + [Bᵀ(w + wᵀ)]_ij, made symmetric) G_ij.
+Matrix tilted_product(const Vector& gain, const Vector& v, const Unknowns& x) {
+  Matrix w;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) w[3 * i + j] = gain[i] * v[j];
+  }
+  const Dual zero(0.0);
+  const Dual tx = x[Unknown::tilt_x], ty = x[Unknown::tilt_y], tz = x[Unknown::tilt_z];
+  const Matrix turn{zero, zero - tz, ty, tz, zero, zero - tx, zero - ty, tx, zero};
+  Matrix turned;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t m = 0; m < 3; ++m) {
+        turned[3 * i + j] = turned[3 * i + j] + turn[3 * m + i] * (w[3 * m + j] + w[3 * j + m]);
+      }
+    }
+  }
+  Matrix sum;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      sum[3 * i + j] = w[3 * i + j] + Dual(0.5) * (turned[3 * i + j] + turned[3 * j + i]);
+    }
+  }
+  return sum;
+}
+
+/// Constant part c₀ of the common acceleration that the drag-free loop leaves.
+Dual common_constant(DragFreeSource source, const Dual& a, const Dual& b, const Unknowns& x) {
+  const Dual cross =
+      x[Parameter::a_c12] * x[Unknown::parasitic_y] + x[Parameter::a_c13] * x[Unknown::parasitic_z];
+  switch (source) {
+    case DragFreeSource::sensor_1:
+      return Dual(0.0) - b - cross;
+    case DragFreeSource::sensor_2:
+      return b - cross;
+    case DragFreeSource::common:
+      break;
+  }
+  return Dual(0.0) - a * b - cross;
+}
+
+/// Direction e of the relative motion in S: a row of [θ_c].
+Vector motion_direction(const Session& session, const Unknowns& x) {
+  const Excitation* const excitation = mass_excitation(session);
+  if (excitation == nullptr || excitation->axis == Axis::x) return {1.0, 0.0, 0.0};
+  if (excitation->axis == Axis::y) {
+    return {x[Unknown::coupling_z] - x[Parameter::a_c12], 1.0, x[Unknown::alignment_x]};
+  }
+  return {x[Unknown::coupling_y] - x[Parameter::a_c13], Dual(0.0) - x[Unknown::alignment_x], 1.0};
+}
+
+Dual constant_of(const std::array<double, num_line_bases>& means, const Unknowns& x) {
+  const Vector offcentring = x.offcentring();
+  Dual b = x[Unknown::differential_bias];
+  for (std::size_t j = 0; j < 3; ++j) {
+    b = b + Dual(0.5 * means[index(Signal::gradient_xx) + j]) * offcentring[j];
+  }
+  return b;
+}
+
+}  // namespace
+
+Dual differential_constant(const std::array<double, num_line_bases>& means,
+                           const UnknownArray& unknowns) {
+  return constant_of(means, Unknowns(unknowns));
+}
+
+LineCoefficients line_coefficients(const Session& session,
+                                   const std::array<double, num_line_bases>& means,
+                                   const UnknownArray& unknowns) {
+  const Unknowns x(unknowns);
+  const Dual one(1.0), two(2.0), half(0.5);
+  const Dual k2c = x[Parameter::k2c], k2d = x[Parameter::k2d];
+  const Dual k2_1 = k2c + k2d, k2_2 = k2c - k2d;
+  const Dual b = constant_of(means, x);
+  const Dual a = x[Parameter::a_d11_prime] - two * k2c * x[Unknown::differential_bias];
+  const Dual c = common_constant(session.drag_free, a, b, x);
+
+  const Dual kappa = two * (k2d * b + k2c * c);   // Of the common channel's scale.
+  const Dual lambda = two * (k2c * b + k2d * c);  // Of the differential one.
+  const Dual a_x = (a + lambda) / (one + kappa);
+  const auto cross = [&](Parameter a_d, Parameter a_c, Unknown scale) {
+    return x[a_d] - lambda * x[a_c] - x[a_d] * x[scale];
+  };
+  LineCoefficients of;
+  of.common = {a_x, cross(Parameter::a_d12, Parameter::a_c12, Unknown::scale_y),
+               cross(Parameter::a_d13, Parameter::a_c13, Unknown::scale_z)};
+
+  const Dual scale_1 = one + a + two * k2_1 * (c + b);
+  const Dual scale_2 = one - a + two * k2_2 * (c - b);
+  of.squares = {half * (one - a_x) * k2_1 / (scale_1 * scale_1),
+                Dual(-0.5) * (one + a_x) * k2_2 / (scale_2 * scale_2)};
+
+  const Dual a_c11 = one + x[Unknown::motion_gain];
+  const Dual a_c12 = x[Parameter::a_c12], a_c13 = x[Parameter::a_c13];
+  Vector half_offcentring = x.offcentring();
+  for (Dual& component : half_offcentring) component = half * component;
+  of.gradients = tilted_product({one + kappa, a_c12 / a_c11, a_c13 / a_c11}, half_offcentring, x);
+  of.moved = tilted_product({a_c11 + kappa, a_c12, a_c13}, motion_direction(session, x), x);
+  return of;
+}
+
+Prediction predict(const LineCoefficients& coefficients, LineSignals signals,
+                   const LinePhasors& line) {
+  Prediction sum;
+  const auto add = [&](std::span<const Dual> factors, std::size_t first) {
+    for (std::size_t j = 0; j < factors.size(); ++j) {
+      sum.value += factors[j].value * line[first + j];
+      for (std::size_t i = 0; i < num_unknowns; ++i) {
+        sum.slope[i] += factors[j].slope[i] * line[first + j];
+      }
+    }
+  };
+  add(coefficients.common, index(Signal::common_x));
+  // The first row stands among the signals that every line has, the others behind them.
+  const std::span<const Dual> gradients = coefficients.gradients;
+  add(signals == LineSignals::gradients ? gradients : gradients.first(3),
+      index(Signal::gradient_xx));
+  if (signals == LineSignals::squares) add(coefficients.squares, num_line_bases);
+  if (signals == LineSignals::moved) add(coefficients.moved, num_line_bases);
+  return sum;
+}
+
+LinePhasors centred(const LinePhasors& line, const std::array<double, num_line_bases>& means) {
+  const std::size_t d = index(Signal::differential_x), c = index(Signal::common_x);
+  LinePhasors result = line;
+  result[num_line_bases] -= 2.0 * (means[c] + means[d]) * (line[c] + line[d]);
+  result[num_line_bases + 1] -= 2.0 * (means[c] - means[d]) * (line[c] - line[d]);
+  return result;
+}
+
+}  // namespace proofmass
