@@ -39,6 +39,10 @@ PATTERNS = {
 }
 
 
+# Before a shell that has mounts of its own, which go with it.
+WITH_MOUNTS = ["unshare", "--mount", "--propagation", "private"]
+
+
 # Waits until a command succeeds.
 AWAIT = """await() {
   await_until=$(($(date +%s) + 100))
@@ -116,9 +120,9 @@ class Session:
         }
         self._environment = environment
 
-    def run(self, steps, time_max_s):
+    def run(self, steps, time_max_s, prefix=()):
         """What each step printed, as (lines of output, lines of error, exit code); fewer if the
-        shell ended before."""
+        shell ended before. The prefix stands before the command of the shell."""
         mark = f"proofmass-text-{os.getpid()}-end"
         script = AWAIT + "".join(
             f"{step.command}\nprintf '\\n{mark} %d\\n' $?; printf '\\n{mark}\\n' >&2\n"
@@ -128,7 +132,7 @@ class Session:
         paths[0].write_text(script, encoding="utf-8")
         with open(paths[1], "wb") as output, open(paths[2], "wb") as error:
             shell = subprocess.Popen(
-                ["sh", paths[0]], cwd=self.directory, env=self._environment, stdout=output,
+                [*prefix, "sh", paths[0]], cwd=self.directory, env=self._environment, stdout=output,
                 stderr=error, stdin=subprocess.DEVNULL, start_new_session=True)
             try:
                 shell.wait(time_max_s)
@@ -247,17 +251,24 @@ def updated(lines, replacements):
     return lines
 
 
+def is_there(need):
+    """Whether the machine has a program, a file with an absolute path, or lets have mounts."""
+    if need == "mounts":
+        return subprocess.run([*WITH_MOUNTS, "true"], stderr=subprocess.DEVNULL).returncode == 0
+    return shutil.which(need) is not None or need.startswith("/") and os.path.exists(need)
+
+
 def run_file(path, programs, is_update, time_max_s=400):
     """Whether all is as expected; null if the file needs what this machine lacks."""
     lines = path.read_text(encoding="utf-8").splitlines()
     steps, needed = read_steps(lines)
-    lacking = [program for program in needed if shutil.which(program) is None]
+    lacking = [need for need in needed if not is_there(need)]
     if lacking:
         print(f"{path}: SKIPPED: needs {' '.join(lacking)}")
         return None
     session = Session(programs)
     try:
-        results = session.run(steps, time_max_s)
+        results = session.run(steps, time_max_s, WITH_MOUNTS if "mounts" in needed else ())
         different = []
         for step, (output, error, code) in zip(steps, results):
             printed = printed_lines(output, error, code)

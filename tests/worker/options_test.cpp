@@ -98,16 +98,6 @@ TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
   EXPECT_TRUE(options.is_plain_waived);
 }
 
-TEST(WorkerOptions, AreNotMistypedInAFile) {
-  const test::ScratchDirectory directory;
-  const std::string file = (directory / "worker.toml").string();
-  std::ofstream(file) << "connect = \"ipc:///tmp/a\"\nthread = 2\n";
-  EXPECT_EQ(error_of({"--config", file}),
-            "config = " + file + ":2 (thread is no option; nearest is threads)");
-}
-
-TEST(WorkerOptions, MustNameACoordinator) { EXPECT_EQ(error_of({}), "--connect is required"); }
-
 TEST(WorkerOptions, MustBeOfTheKnownKinds) {
   const auto error_with = [&](const std::string& name, const std::string& value) {
     return error_of({"--connect", "ipc:///tmp/a", name, value});

@@ -53,15 +53,6 @@ Outcome run(std::vector<std::string> arguments) {
   return outcome;
 }
 
-TEST(WorkerProgram, NeedsAnAddress) { EXPECT_EQ(run({}).exit_code, 2); }
-
-TEST(WorkerProgram, ConnectsToOtherMachinesOnlyWithKeys) {
-  const Outcome outcome = run({"--connect", "tcp://10.0.0.1:5555"});
-  EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_TRUE(outcome.text.starts_with("test-worker: error: connect = tcp://10.0.0.1:5555 ("))
-      << outcome.text;
-}
-
 TEST(WorkerProgram, NeedsItsKeys) {
   const Outcome outcome = run({"--connect", "tcp://10.0.0.1:5555", "--keys", "/nowhere"});
   EXPECT_EQ(outcome.exit_code, 1);

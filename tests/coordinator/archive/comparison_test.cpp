@@ -319,31 +319,6 @@ TEST_F(ComparedFile, IsReadWithAllThatCountsAndHeldAgainstItsDigest) {
               HasSubstr("the digest of its 5 results is "));
 }
 
-TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
-  const Side first = side(40);
-  Side second = side(40);
-  worsen(second, Parameter::a_c12, 1e-3);
-  second.campaign.scenario.noise.scale = 2.0;
-  const std::string text = text_of(compare_campaigns(first, second));
-  EXPECT_THAT(text, HasSubstr("A         a.db    40\n"
-                              "B         b.db    40  run by run, 40 runs of the same draws\n"));
-  EXPECT_THAT(
-      text,
-      HasSubstr("\nnoise.scale                1      A\n                           2      B\n"));
-  std::istringstream lines(text);
-  std::size_t num_marks = 0;
-  std::string before;  // The row of A, which has the name of the parameter.
-  for (std::string line; std::getline(lines, line); before = line) {
-    EXPECT_LE(display_width(line), 80U) << line;
-    if (line.find(" *") != std::string::npos && line.find("*:") == std::string::npos) {
-      EXPECT_THAT(before, testing::StartsWith("a_c12 "));
-      EXPECT_THAT(line, testing::StartsWith(std::string(19, ' ') + "B "));
-      ++num_marks;
-    }
-  }
-  EXPECT_EQ(num_marks, 1U);
-}
-
 TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
   std::vector<ComparedMember> members = both(compare_campaigns(side(8), side(6)));
   members[1].missing = {.num_not_finite = 2, .num_given_up = 1};
@@ -353,14 +328,6 @@ TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
   const auto json = nlohmann::json::parse(comparison_json(members));
   EXPECT_EQ(json["num_first_without_estimate"], 0);
   EXPECT_EQ(json["num_second_without_estimate"], 3);
-}
-
-TEST(ComparisonText, SaysWhyRunsAreNotPaired) {
-  Side second = side(3);
-  second.campaign.seed = 2;
-  EXPECT_THAT(text_of(compare_campaigns(side(4), second)),
-              HasSubstr("  as a whole, as the seeds differ\n"));
-  EXPECT_THAT(text_of(compare_campaigns(side(4), side(4))), HasSubstr("The definitions agree.\n"));
 }
 
 TEST(ComparisonJson, HoldsAllNumbers) {

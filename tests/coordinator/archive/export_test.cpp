@@ -134,12 +134,6 @@ TEST_F(Export, OfHdf5HoldsManyRuns) {
             0);
 }
 
-TEST_F(Export, OfHdf5SaysWhyItCannotBeWritten) {
-  const std::string path = (directory() / "no" / "a.h5").string();
-  const std::string error = test::error_of([&] { export_hdf5(store_, path, test::never_stopped); });
-  EXPECT_EQ(error, "output = " + path + " (cannot be written: No such file or directory)");
-}
-
 TEST_F(Export, OfHdf5DoesNotAppearOnAFullDisk) {
   std::string error;
   {
@@ -251,23 +245,6 @@ TEST_F(ExportDraws, AreThoseOfAnIndependentDrawWithUnits) {
   EXPECT_EQ(read["units"]["draw/scale_factor_error.sensor_1_x"], "1");
 }
 
-TEST_F(ExportDraws, AreThoseOfTheTableOfQuery) {
-  test::RecordingWriter writer;
-  ASSERT_EQ(run_query(file(), "SELECT run_index, quantity, value FROM draw", {}, writer),
-            QueryEnd::complete);
-  Bits asked;
-  for (const auto& row : writer.rows) {
-    const auto* value = std::get_if<double>(&row[2]);
-    asked[{static_cast<std::uint64_t>(std::get<std::int64_t>(row[0])),
-           std::get<std::string>(row[1])}] =
-        value == nullptr ? std::nullopt : std::optional(test::bits_of(*value));
-  }
-  ASSERT_EQ(asked.size(), num_runs * num_drawn);
-  std::erase_if(asked,
-                [](const auto& entry) { return entry.first.first == 3 || entry.first.first == 7; });
-  EXPECT_EQ(expected_, asked);
-}
-
 // A campaign that grows while it is exported, run by run, is drawn as it was when the export began.
 TEST_F(ExportDraws, AreOfTheStateThatTheRunsAreOf) {
   Store growing = Store::open(file());
@@ -284,14 +261,6 @@ TEST_F(ExportDraws, AreOfTheStateThatTheRunsAreOf) {
   runs_.push_back(num_runs);
   EXPECT_EQ(bits_in(exported(Store::open_read_only(file()))),
             drawn_again(varied_campaign(num_runs + 1), runs_));
-}
-
-TEST_F(ExportDraws, SayThatADefinitionIsNoCampaign) {
-  Store store = Store::create(directory() / "bad.db", test::campaign_of(2), "name = 1");
-  EXPECT_THAT(test::error_of([&] {
-                export_hdf5(store, output(), test::never_stopped, DrawColumns::included);
-              }),
-              HasSubstr("stored definition:1: name = 1 (unknown key"));
 }
 
 }  // namespace

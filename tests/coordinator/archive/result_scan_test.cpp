@@ -180,14 +180,6 @@ TEST_F(DerivedChecks, AreOfOneStateOfTheFile) {
             "none are stored: a coordinator has the file, or was killed");
 }
 
-TEST_F(DerivedChecks, ComputeNoStatisticsOfAnEstimateThatNoSimulationYields) {
-  EXPECT_THAT(failing_after("UPDATE run_result SET estimate_k2d_s2_m = 1e200 WHERE run_index = 3"),
-              Contains("results"));
-  EXPECT_THAT(check("results").details,
-              ElementsAre("run 3: estimate_k2d_s2_m = 1e+200 (must be in [-1e+90, 1e+90])"));
-  EXPECT_EQ(check("stop_checks").verdict, CheckOutcome::not_checked);
-}
-
 TEST_F(DerivedChecks, HoldIfASecondResultIsTheSame) {
   {
     Store store = test::store_of(file(), campaign_, results_);

@@ -97,22 +97,6 @@ TEST_F(SeveralComparison, CorrectsForAllCampaignsTogether) {
   }
 }
 
-TEST_F(SeveralComparison, NamesTheKeysThatDifferAndTheCampaignsWithEachValue) {
-  write("a.db", 1.0);
-  write("b.db", 2.0);
-  write("c.db", 1.0, 7);
-  const std::vector<ComparedMember> members = compared();
-  const std::string text = comparison_text(members, lettered(3));
-  EXPECT_THAT(
-      text,
-      HasSubstr("\nnoise.scale                1      A C\n                           2      B\n"));
-  EXPECT_THAT(
-      text,
-      HasSubstr("\nseed                       1      A B\n                           7      C\n"));
-  EXPECT_THAT(text, HasSubstr("    40  run by run, 40 runs of the same draws\n"));
-  EXPECT_THAT(text, HasSubstr("    40  as a whole, as the seeds differ\n"));
-}
-
 TEST_F(SeveralComparison, MarksWhatIsSignificantlyDifferentFromTheFirst) {
   write("a.db", 1.0);
   write("b.db", 1.0);

@@ -123,20 +123,6 @@ TEST(CommentedCampaign, LeavesThePresetInCharge) {
   EXPECT_EQ(campaign.scenario.noise.linear_x.white_asd, 4.49e-12);
 }
 
-TEST(Hardy2013File, IsWhatTheGeneratorWrites) {
-  std::ifstream stream(PROOFMASS_HARDY2013_FILE);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  EXPECT_EQ(text, commented_campaign(hardy2013_campaign()));
-}
-
-TEST(Hardy2013File, IsThePapersCampaign) {
-  const MicroscopeCampaign campaign = read_microscope(PROOFMASS_HARDY2013_FILE);
-  EXPECT_EQ(campaign.name, "hardy2013");
-  EXPECT_EQ(campaign.num_runs, 100u);
-  EXPECT_EQ(campaign.scenario.estimation.correction, Correction::hardy2013);
-  EXPECT_EQ(campaign.scenario.estimation.transient_s, 1000.0);
-}
-
 TEST(ParseStoredCampaign, RefusesWhatIsNoValidCampaign) {
   const auto refusal = [](std::string_view definition, std::vector<std::vector<double>> columns) {
     try {

@@ -33,32 +33,12 @@ std::string refusal_of(const std::function<void()>& action) {
   return "";
 }
 
-TEST(ParseEnvironment, ReadsEveryColumnOfEveryRow) {
-  const EnvironmentTable table =
-      parse_environment(headings + "0,1,2,3,4,5,6\r\n 100 , 1e-300,0.1,-3,4,5,6\n", "e.csv", 100.0);
-  ASSERT_EQ(table.size(), 2u);
-  EXPECT_EQ(table[0], (EnvironmentRow{0.0, {1, 2, 3}, {4, 5, 6}}));
-  EXPECT_EQ(table[1], (EnvironmentRow{100.0, {1e-300, 0.1, -3}, {4, 5, 6}}));
-}
-
-TEST(ParseColumn, FindsItByItsHeading) {
-  EXPECT_THAT(parse_column("run, x ,y\n0,1.5,a\n1,-2e-3,b\n", "t.csv", "x"),
-              ElementsAre(1.5, -2e-3));
-  EXPECT_THAT(parse_column("x\n1\n2", "t.csv", "x"), ElementsAre(1.0, 2.0));
-}
-
 TEST(ReadTextFile, TakesAFileOfExactlyTheLargestSizeAndNoLarger) {
   const test::ScratchFolder folder;
   const auto file = folder.write("f", "12345");
   EXPECT_EQ(read_text_file(file, 5, Pipes::refused), "12345");
   EXPECT_EQ(refusal_of([&] { (void)read_text_file(file, 4, Pipes::refused); }),
             "is larger than 4 bytes");
-}
-
-// Reading it waits for a message of the kernel; its size is 0.
-TEST(ReadTextFile, ReadsNothingThatTheKernelMakesUp) {
-  EXPECT_EQ(read_text_file("/proc/kmsg", 5, Pipes::accepted), "");
-  EXPECT_EQ(read_text_file("/proc/uptime", 5, Pipes::refused), "");
 }
 
 TEST(ReadTextFile, TakesAPipeOnlyWhereAUserMayNameOne) {

@@ -87,12 +87,6 @@ TEST(Svg, CarriesItsColoursAsAFile) {
   EXPECT_THAT(plain, Not(HasSubstr("var(")));
 }
 
-TEST(Svg, IsTheSameEachTime) {
-  for (const Picture& picture : pictures_with("text")) {
-    EXPECT_EQ(svg_of(picture, SvgUse::embedded), svg_of(picture, SvgUse::embedded));
-  }
-}
-
 // On axes whose ends are given, a bar's edges and height are linear functions of its values: the
 // bar of 5 of 10 is half as high as that of 10, and all stand side by side on one line.
 TEST(Bars, StandWhereTheirValuesAre) {
@@ -249,8 +243,6 @@ double contrast(std::string_view a, std::string_view b) {
 const ThemeColour& colour(std::string_view property) {
   return *std::ranges::find(theme_colours(), property, &ThemeColour::property);
 }
-
-TEST(Contrast, IsThatOfBlackOnWhite) { EXPECT_NEAR(contrast("#000000", "#ffffff"), 21.0, 1e-9); }
 
 TEST(Theme, InksDifferFromTheirGround) {
   const ThemeColour& ground = colour("--chart-ground");

@@ -71,33 +71,6 @@ class CampaignFolderTest : public testing::Test {
   std::vector<std::string> warnings;
 };
 
-TEST_F(CampaignFolderTest, KeepsEachCampaignInAFileOfItsName) {
-  CampaignFolder folder(directory / "served");
-  EXPECT_EQ(folder.open(campaign_of("b"), {}, {}).file, directory / "served/b.db");
-  (void)folder.open(campaign_of("a"), {}, {});
-  EXPECT_THAT(loaded(folder), UnorderedElementsAre("a", "b"));
-  EXPECT_THAT(warnings, IsEmpty());
-}
-
-TEST_F(CampaignFolderTest, LeavesAloneWhatItCannotServe) {
-  CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"), {}, {});
-  std::ofstream(directory / "served/b.db") << "something else";
-  std::ofstream(directory / "served/notes.txt") << "something else";
-  EXPECT_THAT(loaded(folder), ElementsAre("a"));
-  EXPECT_THAT(warnings, ElementsAre(HasSubstr("b.db")));
-  EXPECT_TRUE(std::filesystem::exists(directory / "served/b.db"));
-}
-
-TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
-  CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"), {}, {});
-  std::filesystem::copy_file(directory / "served/a.db", directory / "served/b.db");
-  EXPECT_THAT(loaded(folder), ElementsAre("a"));
-  EXPECT_THAT(warnings, ElementsAre((directory / "served/b.db").string() +
-                                    ": campaign a is in another file as well"));
-}
-
 // Among them a backup whose name comes first, made before the results came. These are in the log
 // only, as a coordinator that was killed leaves them.
 TEST_F(CampaignFolderTest, ServesTheCopyWithTheMostResults) {
@@ -127,15 +100,6 @@ TEST_F(CampaignFolderTest, ServesOfEqualCopiesTheOneWithTheNameOfTheCampaign) {
   EXPECT_THAT(warnings, ElementsAre(HasSubstr("a-backup.db: campaign a is in another file")));
 }
 
-TEST_F(CampaignFolderTest, OpensACampaignAgainAndExtendsIt) {
-  CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a", 10), {}, {});
-  ServedCampaign campaign = folder.open(campaign_of("a", 11), {}, {});
-  EXPECT_EQ(campaign.store.num_runs(), 11U);
-  EXPECT_EQ(folder.extend(campaign.store, campaign_of("a", 12))->num_runs, 12U);
-  EXPECT_EQ(campaign.store.num_runs(), 12U);
-}
-
 TEST_F(CampaignFolderTest, OpensTheFileAgainThatACampaignHad) {
   CampaignFolder folder(directory / "served");
   (void)folder.open(campaign_of("a", 10), {}, {});
@@ -147,22 +111,6 @@ TEST_F(CampaignFolderTest, OpensTheFileAgainThatACampaignHad) {
   std::filesystem::remove(file);
   EXPECT_THROW((void)folder.open_again(file, campaign_of("a", 11), {}, {}), StoreError);
   EXPECT_FALSE(std::filesystem::exists(file));
-}
-
-TEST_F(CampaignFolderTest, WritesTheOwnerIntoANewFileAndAsksItOfOneThatIsThere) {
-  CampaignFolder folder(directory / "served");
-  const Asker anna{.name = "anna", .rights = Rights::usual()};
-  const Asker ben{.name = "ben", .rights = Rights::usual()};
-  EXPECT_EQ(folder.open(campaign_of("a"), {}, anna).store.owner(), "anna");
-  try {
-    (void)folder.open(campaign_of("a", 11), {}, ben);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "campaign = a (belongs to anna; the key ben must have the right `control`)");
-  }
-  const Asker boss{.name = "boss", .rights = Rights::all()};
-  EXPECT_EQ(folder.open(campaign_of("a", 11), {}, boss).store.owner(), "anna");
 }
 
 TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {

@@ -99,16 +99,6 @@ class ClientOfAPlayedCoordinator : public testing::Test {
   PrivateEndpoint endpoint_;
 };
 
-TEST_F(ClientOfAPlayedCoordinator, GetsTheReplyToItsRequest) {
-  PlayedCoordinator coordinator(endpoint_.address());
-  ClientConnection client(config());
-  for (const std::string text : {"first", "second"}) {
-    auto reply = ask(client);
-    coordinator.answer(coordinator.receive().request_id(), text);
-    EXPECT_EQ(reply.get(), text);
-  }
-}
-
 TEST_F(ClientOfAPlayedCoordinator, PassesOverTheReplyToAnEarlierRequest) {
   PlayedCoordinator coordinator(endpoint_.address());
   ClientConnection client(config());
@@ -205,11 +195,6 @@ TEST_F(ClientOfAPlayedCoordinator, DoesNotWaitForAPeerThatBreaksOffFromTheFirst)
   EXPECT_EQ(reply.get(), broken_off());
 }
 
-TEST_F(ClientOfAPlayedCoordinator, GivesUpInTime) {
-  ClientConnection client(config(0.02));
-  EXPECT_EQ(ask(client).get(), failed("nobody there; waited 0.02 s"));
-}
-
 TEST_F(ClientOfAPlayedCoordinator, GivesUpOnACoordinatorThatIsSilent) {
   PlayedCoordinator coordinator(endpoint_.address());
   ClientConnection patient(config());
@@ -219,23 +204,6 @@ TEST_F(ClientOfAPlayedCoordinator, GivesUpOnACoordinatorThatIsSilent) {
   // Connecting takes less than this, so the silence is what ends it.
   ClientConnection client(config(0.5));
   EXPECT_EQ(ask(client).get(), failed("no answer within 0.5 s"));
-}
-
-TEST(ClientEndpoint, BeyondThisMachineNeedsKeys) {
-  const auto refusal = [](const std::string& endpoint) -> std::string {
-    try {
-      const ClientConnection client({.endpoint = endpoint,
-                                     .keys = {},
-                                     .is_plain_waived = false,
-                                     .reply_wait = std::chrono::seconds(1)});
-    } catch (const InvalidArgument& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
-  EXPECT_THAT(refusal("tcp://10.0.0.1:5556"), StartsWith("connect = tcp://10.0.0.1:5556 ("));
-  EXPECT_THAT(refusal("udp://x"), StartsWith("connect = udp://x ("));
-  EXPECT_EQ(refusal("tcp://127.0.0.1:5556"), "accepted");
 }
 
 }  // namespace

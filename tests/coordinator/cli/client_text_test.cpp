@@ -137,27 +137,6 @@ second-order: 10 results compared with a second computation: 3 differ (none may)
 )");
 }
 
-TEST(StatusTable, SaysThatThereIsNoCampaign) {
-  EXPECT_EQ(status_text(status_with({}), {.line_width_max = 79}),
-            "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min\n"
-            "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
-}
-
-TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
-  wire::CampaignStatus status = campaign("a", 100);
-  status.phase = wire::CampaignPhase::finished;
-  status.remaining_s = 0.0;
-  EXPECT_NE(status_text(status_with({status}), {.line_width_max = 79})
-                .find("100  100       -           -\n"),
-            std::string::npos);
-}
-
-TEST(StatusTable, KeepsALongNameApartFromTheNextColumn) {
-  const std::string text =
-      status_text(status_with({campaign(std::string(128, 'x'), 1)}), {.line_width_max = 79});
-  EXPECT_NE(text.find("\nxxxxxxxxxxxxxxx… active "), std::string::npos) << text;
-}
-
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
   const std::string name(30, 'x');
   const wire::StatusReply status = status_with({campaign(name, 1), campaign("b", 1)});
@@ -228,10 +207,6 @@ TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
 )");
 }
 
-TEST(WorkersTable, SaysThatThereIsNoWorker) {
-  EXPECT_EQ(terminal_text(workers_table({})), "no workers\n");
-}
-
 TEST(WorkersTable, HasAtMost79Columns) {
   constexpr auto most = std::numeric_limits<std::uint64_t>::max();
   wire::WorkerStatus wide = worker(most, std::string(128, 'x'));
@@ -263,14 +238,6 @@ TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
   EXPECT_TRUE(campaign_line(status).starts_with("a finished: 40 of 100 runs"));
   status.num_given_up = 51;
   EXPECT_TRUE(campaign_line(status).starts_with("a failed: 40 of 100 runs"));
-}
-
-TEST(CampaignLine, OfOneThatIsOverHasNoRate) {
-  wire::CampaignStatus status = campaign("a", 100);
-  status.phase = wire::CampaignPhase::finished;
-  status.rate_hz = 0.5;
-  status.remaining_s = 0.0;
-  EXPECT_EQ(campaign_line(status), "a finished: 100 of 100 runs, 100 %");
 }
 
 }  // namespace
@@ -408,14 +375,6 @@ TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
                          {"is_quarantined", true}}}}};
   EXPECT_EQ(Json::parse(workers_json(reply)), expected);
   EXPECT_TRUE(Json::parse(workers_json({}))["workers"].is_array());
-}
-
-TEST(DoneText, SaysWhatWasDoneToWhat) {
-  const proto::DoneReply done = wire::done_reply("campaign a: paused").done();
-  const ActionTaken action{.name = "pause", .kind = "campaign", .target = "a"};
-  EXPECT_EQ(Json::parse(done_text(done, action, OutputFormat::json)),
-            Json({{"action", "pause"}, {"campaign", "a"}, {"text", "campaign a: paused"}}));
-  EXPECT_EQ(done_text(done, action, OutputFormat::text), "campaign a: paused\n");
 }
 
 }  // namespace

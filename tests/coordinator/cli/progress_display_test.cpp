@@ -36,11 +36,6 @@ TEST(ProgressBar, ShowsRunsPercentRateAndTimeLeft) {
             "100/100 runs [##############################] 100 %  25 runs/s");
 }
 
-TEST(ProgressBar, ShowsNoRateBeforeThereIsOne) {
-  EXPECT_EQ(progress_bar(progress(0, 100, 0.0), 49),
-            "0/100 runs [..............................]   0 %");
-}
-
 TEST(ProgressBar, SaysThatTheFirstRunsAreComputed) {
   wire::CampaignStatus status = progress(0, 100, 0.0);
   status.num_lent = 32;
@@ -129,21 +124,6 @@ TEST(ProgressDisplay, DoesNotTearTheBarWithANote) {
       });
   const std::string bar = "\r" + progress_bar(progress(2, 2, 0.0), 79) + "\033[K";
   EXPECT_EQ(text, bar + "\r\033[Ka note\n" + bar + "\n");
-}
-
-TEST(ProgressDisplay, ShowsOnlyNotesIfQuiet) {
-  const std::string text =
-      output_of<ProgressDisplay>(DisplayMode::quiet, [](ProgressDisplay& display) {
-        display.update(progress(1, 2, 0.0));
-        display.note("a note");
-      });
-  EXPECT_EQ(text, "a note\n");
-}
-
-TEST(ProgressDisplay, IsOfLinesIfTheStreamIsNoTerminal) {
-  std::FILE* const file = std::tmpfile();
-  EXPECT_EQ(display_mode_for(file), DisplayMode::lines);
-  std::fclose(file);
 }
 
 }  // namespace

@@ -116,13 +116,6 @@ TEST_F(Answering, RefusesOptionsThatReadOrWriteOtherFiles) {
   EXPECT_THAT(error_of(proto::QUESTION_DATABASE, "--json"), StartsWith("option = --json (must be"));
 }
 
-TEST_F(Answering, NeedsACampaignThatIsServed) {
-  start_with("echo never");
-  proto::RequestEnvelope elsewhere = question();
-  elsewhere.mutable_answer()->set_campaign("b");
-  EXPECT_EQ(client->error(elsewhere), "campaign = b (is not served)");
-}
-
 // The coordinator still has the campaign's own file open, which has lost its name.
 TEST_F(Answering, IsNotThatOfACampaignWhoseFileTookTheName) {
   start_with("echo never");
@@ -209,11 +202,6 @@ TEST_F(Answering, GivesOneAnswerToAllWhoAskTheSameAtTheSameTime) {
   }
 }
 
-TEST_F(Answering, KnowsNoAnswerThatItDidNotGive) {
-  start_with("echo never");
-  EXPECT_EQ(client->error(test::answer_part(1)), "this answer is not kept any more; ask again");
-}
-
 TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
   start_with("echo 'database = x (is damaged)' >&2; exit 1");
   const std::filesystem::path copy = directory / "copy.db";
@@ -221,15 +209,6 @@ TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
       test::answer_of({"fetch", "a", copy, "--connect", service->clients_endpoint()});
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
   EXPECT_THAT(answer.error, StartsWith("database = x (is damaged)"));
-  EXPECT_FALSE(std::filesystem::exists(directory / "copy.db.part"));
-}
-
-TEST(Fetch, LeavesNoFileIfNobodyIsThere) {
-  const test::TemporaryDirectory directory;
-  const std::string endpoint = "ipc://" + (directory / "nobody").string();
-  const test::Answer answer = test::answer_of(
-      {"fetch", "a", directory / "copy.db", "--connect", endpoint, "--timeout", "0.02"});
-  EXPECT_EQ(answer.error, "connect = " + endpoint + " (nobody there; waited 0.02 s)");
   EXPECT_FALSE(std::filesystem::exists(directory / "copy.db.part"));
 }
 
@@ -267,11 +246,6 @@ TEST_F(Answering, IsFetchedByOneProcessAtATime) {
             "file = " + part + " (is being written by another `fetch`; try again later)");
   EXPECT_EQ(std::filesystem::file_size(part), 0U);
   EXPECT_FALSE(std::filesystem::exists(copy));
-}
-
-TEST_F(Answering, SaysWhyThereIsNoCopy) {
-  start_with("echo 'database = x (is damaged)' >&2; exit 1");
-  EXPECT_EQ(client->error(question(proto::QUESTION_DATABASE)), "database = x (is damaged)\n");
 }
 
 TEST_F(Answering, GivesAnAnswerToTheKeyThatAskedOnly) {

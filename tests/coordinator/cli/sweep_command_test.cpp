@@ -19,19 +19,6 @@ TEST(SweepPlan, CutsValuesAtCommasOutsideOfBracketsAndQuotes) {
   EXPECT_EQ(parse_varied("a=\"b,\\\",c\",'d,e'").values, (Values{"\"b,\\\",c\"", "'d,e'"}));
 }
 
-TEST(SweepPlan, CombinesAllValuesWithTheLastKeyFastest) {
-  const std::vector<VariedKey> keys{{"a", {"1", "2"}}, {"b", {"x", "y"}}};
-  Values texts;
-  for (const SweptValues& values : combinations(keys)) texts.push_back(text_of(values));
-  EXPECT_EQ(texts, (Values{"a=1,b=x", "a=1,b=y", "a=2,b=x", "a=2,b=y"}));
-}
-
-TEST(SweepPlan, NamesFilesByTheirValues) {
-  EXPECT_EQ(sweep_file_name("mine", {{"noise.scale", "0.5"}, {"a.b", "1e-3"}}),
-            "mine-noise.scale=0.5,a.b=1e-3.db");
-  EXPECT_EQ(sweep_file_name("mine", {{"a", "\"x\""}}), "mine-a=x.db");
-}
-
 // No value leaves the directory, and none takes the file of another.
 TEST(SweepPlan, NamesNoFileOutsideOrTwice) {
   std::set<std::string> names;

@@ -178,21 +178,6 @@ TEST(Watch, EndsWhenAllCampaignsAreFinished) {
   EXPECT_EQ(watched.num_pauses, 2U);
 }
 
-TEST(Watch, EndsWhenTheNamedCampaignIsFinished) {
-  const Watched watched = watch({status_reply({{"a", CampaignPhase::cancelled},
-                                               {"b", CampaignPhase::finished},
-                                               {"c", CampaignPhase::active}})},
-                                "b");
-  EXPECT_EQ(watched.exit_code, exit_done);
-  EXPECT_EQ(watched.num_questions, 1U);
-}
-
-TEST(Watch, FailsIfACampaignIsCancelled) {
-  EXPECT_EQ(watch({status_reply({{"a", CampaignPhase::finished}, {"b", CampaignPhase::cancelled}})})
-                .exit_code,
-            exit_cannot_be_done);
-}
-
 TEST(Watch, EndsAtOnceWithoutCampaigns) {
   const Watched watched = watch({status_reply({})});
   EXPECT_EQ(watched.exit_code, exit_done);
@@ -208,20 +193,9 @@ std::string error_of(const proto::ReplyEnvelope& reply, const std::string& campa
   return "none";
 }
 
-TEST(Watch, SaysWhichCampaignsThereAre) {
-  EXPECT_EQ(
-      error_of(status_reply({{"a", CampaignPhase::active}, {"b", CampaignPhase::active}}), "hardy"),
-      "campaign = hardy (there is a, b)");
-  EXPECT_EQ(error_of(status_reply({}), "hardy"), "campaign = hardy (there is none)");
-}
-
 TEST(Reply, OfAnotherKindIsAnError) {
   EXPECT_EQ(error_of(wire::done_reply("x"), "a"),
             "reply = of another kind (must be that of the request)");
-}
-
-TEST(Reply, ThatRefusesIsAnErrorInTheCoordinatorsWords) {
-  EXPECT_EQ(error_of(wire::error_reply("a = b (c)"), "a"), "a = b (c)");
 }
 
 }  // namespace

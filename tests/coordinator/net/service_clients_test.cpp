@@ -39,42 +39,6 @@ class ServiceClients : public test::ServiceTest {
   std::optional<PlayingClient> client;
 };
 
-TEST_F(ServiceClients, SubmitACampaignThatIsThenComputed) {
-  start_with({});
-  EXPECT_EQ(submit("new", 5, {.priority = 3, .audit_fraction = 0.5}),
-            "campaign new: active, 5 runs, 0 of them done");
-  const wire::StatusReply status = client->status();
-  ASSERT_EQ(status.campaigns.size(), 1U);
-  EXPECT_EQ(status.version, "0.0");
-  EXPECT_EQ(status.model_version, model_version);
-  EXPECT_EQ(status.campaigns[0].name, "new");
-  EXPECT_EQ(status.campaigns[0].priority, 3);
-  EXPECT_EQ(status.campaigns[0].num_runs, 5U);
-
-  PlayingWorker worker(endpoint.address());
-  const proto::RunLease lease = worker.borrow();
-  const wire::CampaignStatus lent = client->status().campaigns[0];
-  EXPECT_EQ(lent.num_lent, lease.num_runs());
-  worker.deliver(lease);
-  (void)worker.receive<proto::ResultAck>();
-  const wire::CampaignStatus after = client->status().campaigns[0];
-  EXPECT_EQ(after.num_done, lease.num_runs());
-  end(StopRequest::now);
-  EXPECT_EQ(num_stored("new"), lease.num_runs());
-  EXPECT_EQ(Store::open_read_only(directory / "new.db").control().audit_fraction, 0.5);
-}
-
-TEST_F(ServiceClients, ExtendACampaignThatIsServed) {
-  start_with({test::campaign_of("a", 1)});
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
-  EXPECT_EQ(submit("a", 3), "campaign a: active, 3 runs, 1 of them done");
-  worker.want(1);
-  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 1U);
-}
-
 TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
   start_with({test::campaign_of("a", 3)});
   (void)submit("a", 300,
@@ -105,18 +69,6 @@ TEST_F(ServiceClients, ExtendACampaignThatKeepsItsPriority) {
   EXPECT_EQ(store.control().audit_fraction, 0.5);
 }
 
-TEST_F(ServiceClients, SetThePriorityOfACampaign) {
-  start_with({test::campaign_of("a", 3), test::campaign_of("b", 3)});
-  EXPECT_EQ(control(ControlAction::set_priority, "b", 1),
-            "campaign b: active, 3 runs, 0 of them done");
-  EXPECT_EQ(client->status().campaigns[1].priority, 1);
-  const proto::RunLease lease = PlayingWorker(endpoint.address()).borrow();
-  end(StopRequest::now);
-  const Store served = Store::open_read_only(directory / "b.db");
-  EXPECT_EQ(wire::CampaignId{lease.campaign()}, served.id());
-  EXPECT_EQ(served.control().priority, 1);
-}
-
 TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
   {
     ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
@@ -143,12 +95,6 @@ TEST_F(ServiceClients, ResumeACancelledCampaignBeforeAnythingElse) {
   }
 }
 
-TEST_F(ServiceClients, AreToldWhyACampaignCannotBeExtended) {
-  start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(client->error(test::submission(definition_of(test::campaign_of("a", 2)))),
-            "runs = fewer (must be more)");
-}
-
 TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
   config.files = nullptr;
   start_with({});
@@ -157,17 +103,6 @@ TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
       "campaign a cannot be submitted: this coordinator serves only the campaigns that it began "
       "with; "
       "start one with --directory");
-}
-
-TEST_F(ServiceClients, PauseAndResumeACampaign) {
-  start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(control(ControlAction::pause), "campaign a: paused, 3 runs, 0 of them done");
-  PlayingWorker worker(endpoint.address());
-  (void)worker.register_here();
-  EXPECT_TRUE(worker.is_lent_nothing());
-  EXPECT_EQ(control(ControlAction::resume), "campaign a: active, 3 runs, 0 of them done");
-  worker.want(1);
-  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 0U);
 }
 
 TEST_F(ServiceClients, SeeThatACampaignWithAStopRuleIsPaused) {
@@ -220,41 +155,6 @@ TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
   end(StopRequest::now);
   start_with({test::campaign_of("a", 3)});
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::paused);
-}
-
-TEST_F(ServiceClients, CancelACampaignWhichWorkersThenForget) {
-  start_with({test::campaign_of("a", 3)});
-  PlayingWorker worker(endpoint.address());
-  const proto::RunLease lease = worker.borrow();
-  EXPECT_EQ(control(ControlAction::cancel), "campaign a: cancelled, 3 runs, 0 of them done");
-  EXPECT_EQ(worker.receive<proto::Forget>().campaign(), lease.campaign());
-  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::cancelled);
-}
-
-TEST_F(ServiceClients, AreToldWhatCannotBeControlled) {
-  start_with({test::campaign_of("a", 1)});
-  EXPECT_EQ(client->error(test::control(ControlAction::pause, "b")),
-            "campaign = b (is not served)");
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  EXPECT_EQ(client->error(test::control(ControlAction::pause, "a")), "campaign = a (is finished)");
-}
-
-TEST_F(ServiceClients, SeeTheWorkers) {
-  start_with({test::campaign_of("a", 30)});
-  PlayingWorker worker(endpoint.address());
-  const proto::RunLease lease = worker.borrow();
-  proto::RequestEnvelope request;
-  request.mutable_workers();
-  const wire::WorkersReply reply = wire::read(client->ask(request).workers());
-  ASSERT_EQ(reply.workers.size(), 1U);
-  EXPECT_EQ(reply.workers[0].name, "w1001");
-  EXPECT_EQ(reply.workers[0].host, "here");
-  EXPECT_EQ(reply.workers[0].process_id, 1001U);
-  EXPECT_EQ(reply.workers[0].num_slots, 1U);
-  EXPECT_EQ(reply.workers[0].num_lent, lease.num_runs());
-  EXPECT_FALSE(reply.workers[0].is_quarantined);
 }
 
 /// A submission of so many runs with a table, as bytes.
@@ -387,27 +287,6 @@ TEST_F(ServiceClients, SeeAllCampaignsInPages) {
   ASSERT_EQ(page.campaigns.size(), 2U);
   EXPECT_EQ(page.campaigns[0].name, "c1");
   EXPECT_TRUE(client->status(~std::uint64_t{0}).campaigns.empty());
-}
-
-TEST_F(ServiceClients, AreToldThatAHostIsInNoQuarantine) {
-  start_with({});
-  EXPECT_EQ(client->error(test::release("n7")), "host = n7 (is not in quarantine)");
-}
-
-TEST_F(ServiceClients, SeeWhatFactoriesReport) {
-  start_with({});
-  EXPECT_EQ(client->done(test::request_of(wire::FactoryReport{.name = "fleet",
-                                                              .batch_system = "pbs",
-                                                              .phase = wire::FactoryPhase::paused,
-                                                              .reason = "qsub: queue full",
-                                                              .interval_s = 3600})),
-            "factory fleet: noted");
-  const wire::StatusReply status = client->status();
-  ASSERT_EQ(status.factories.size(), 1U);
-  EXPECT_EQ(status.factories[0].report.name, "fleet");
-  EXPECT_EQ(status.factories[0].report.phase, wire::FactoryPhase::paused);
-  EXPECT_EQ(status.factories[0].report.reason, "qsub: queue full");
-  EXPECT_EQ(status.factories[0].owner, "");
 }
 
 TEST_F(ServiceClients, GetAnErrorForWhatIsNoRequest) {

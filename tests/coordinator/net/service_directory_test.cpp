@@ -81,29 +81,6 @@ class ServiceWithADirectory : public test::ServiceTest {
   std::optional<test::PlayingClient> client;
 };
 
-TEST_F(ServiceWithADirectory, ServesAFileOnceItCanBeOpened) {
-  make_file("a");
-  folder.set_before_load([](const fs::path&) { throw Error("file = a.db (is locked)"); });
-  start_service();
-  wait_for_event("campaign_not_served");
-  const wire::StatusReply status = client->status();
-  EXPECT_THAT(status.campaigns, IsEmpty());
-  ASSERT_EQ(status.unserved_files.size(), 1U);
-  EXPECT_EQ(status.num_unserved_files, 1U);
-  EXPECT_EQ(status.unserved_files[0].file, (directory / "a.db").string());
-  EXPECT_EQ(status.unserved_files[0].reason, "file = a.db (is locked)");
-  while (folder.num_loads() < 4) std::this_thread::yield();
-  folder.set_before_load([](const fs::path&) {});
-  EXPECT_EQ(wait_for_event("campaign_file_served"),
-            "campaign_file_served file=" + (directory / "a.db").string());
-  EXPECT_THAT(served(), ElementsAre("a"));
-  EXPECT_THAT(client->status().unserved_files, IsEmpty());
-  EXPECT_EQ(num_events("campaign_not_served"), 1);
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-}
-
 // A coordinator that is killed while it folds the log in, on a full disk perhaps, leaves a file
 // that names more pages than it has. The log has the others.
 TEST_F(ServiceWithADirectory, ServesAFileWhoseLogWasFoldedInHalfway) {
@@ -138,31 +115,6 @@ TEST_F(ServiceWithADirectory, ServesTheOthersWhateverAFileThrows) {
   start_service();
   EXPECT_THAT(served(), ElementsAre("c"));
   EXPECT_EQ(client->status().num_unserved_files, 2U);
-}
-
-TEST_F(ServiceWithADirectory, DoesNotOpenWhatHasEnded) {
-  make_finished_file("a");
-  make_file("b");
-  const std::string before = bytes_of(directory / "a.db");
-  start_service();
-  EXPECT_THAT(served(), testing::UnorderedElementsAre("a", "b"));
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  EXPECT_EQ(folder.num_loads(), 1);
-  for (const wire::CampaignStatus& campaign : client->status().campaigns) {
-    if (campaign.name != "a") continue;
-    EXPECT_EQ(campaign.phase, wire::CampaignPhase::finished);
-    EXPECT_EQ(campaign.priority, 3);
-    EXPECT_EQ(campaign.num_runs, 2U);
-    EXPECT_EQ(campaign.num_done, 0U);
-    EXPECT_EQ(campaign.num_given_up, 2U);
-  }
-  EXPECT_TRUE(bytes_of(directory / "a.db") == before);
-  EXPECT_NO_THROW((void)Store::open(directory / "a.db"));  // Nobody has its lock. This writes.
-  const std::string opened = bytes_of(directory / "a.db");
-  end(StopRequest::now);
-  EXPECT_TRUE(bytes_of(directory / "a.db") == opened);
 }
 
 TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
@@ -385,42 +337,6 @@ TEST_F(ServiceWithADirectory, ShowsTheOthersBesideACampaignWhoseNamesBreakTheRul
   for (const wire::UnservedFile& file : status.unserved_files) {
     EXPECT_THAT(file.reason, testing::HasSubstr("its name, owner or priority breaks the rules"));
   }
-}
-
-TEST_F(ServiceWithADirectory, ServesAFileThatIsPutThere) {
-  start_service();
-  EXPECT_THAT(served(), IsEmpty());
-  make_file("elsewhere");
-  while (served().empty()) std::this_thread::yield();
-  EXPECT_THAT(served(), ElementsAre("elsewhere"));
-}
-
-TEST_F(ServiceWithADirectory, IsNotDoneWhileAFileWaits) {
-  make_file("a");
-  make_finished_file("b");
-  folder.set_before_load([](const fs::path&) { throw Error("file = a.db (is locked)"); });
-  config.end = ServiceEnd::when_done;
-  start_service();
-  wait_for_event("campaign_not_served");
-  while (folder.num_loads() < 3) std::this_thread::yield();
-  in_service([this] { EXPECT_FALSE(service->is_done()); });
-  folder.set_before_load([](const fs::path&) {});
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  wait_for_end();
-}
-
-// By its name alone it is another file; it would be opened twice.
-TEST_F(ServiceWithADirectory, DoesNotServeACopy) {
-  make_file("a");
-  fs::copy_file(directory / "a.db", directory / "b.db");
-  start_service();
-  EXPECT_EQ(folder.num_loads(), 1);
-  const wire::StatusReply status = client->status();
-  ASSERT_EQ(status.unserved_files.size(), 1U);
-  EXPECT_THAT(status.unserved_files[0].reason,
-              testing::EndsWith("campaign a is in another file as well"));
 }
 
 }  // namespace

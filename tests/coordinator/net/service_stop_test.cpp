@@ -29,17 +29,6 @@ class ServiceStop : public test::ServiceTest {
   }
 };
 
-TEST_F(ServiceStop, GoesOnAsLongAsTheStopRuleAsks) {
-  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
-  files.next_runs = [](std::uint64_t num_runs) {
-    return num_runs < 12 ? std::optional(num_runs + 4) : std::nullopt;
-  };
-  work_to_the_end(4);
-  EXPECT_EQ(num_stored("a"), 12U);
-  EXPECT_EQ(file_of_a().num_runs(), 12U);
-  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::finished);
-}
-
 // Or a program that waits for the end would leave before it.
 TEST_F(ServiceStop, IsNotFinishedWhileTheRuleIsChecked) {
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
@@ -119,23 +108,6 @@ TEST_F(ServiceStop, AsksAgainForRunsThatTheFileDidNotTake) {
   EXPECT_EQ(num_events("campaign_not_extended"), 1);
   EXPECT_EQ(num_events("campaign_summarised runs=1"), 1);
   EXPECT_EQ(num_stored("a"), 2U);
-}
-
-TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
-  plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 1};
-  start({test::campaign_of("a", 5)});
-  test::PlayingWorker one(endpoint.address(), 1001);
-  test::PlayingWorker two(endpoint.address(), 1002);
-  one.deliver(one.borrow(1), RunStatus::no_draw);
-  (void)one.receive<proto::ResultAck>();
-  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::active);
-  two.deliver(two.borrow(1), RunStatus::not_finite);
-  EXPECT_EQ(wait_for_event("too_many_failures"),
-            "too_many_failures without_estimate=2 failures_max=1 campaign=a");
-  end(StopRequest::now);
-  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::cancelled);
-  EXPECT_EQ(num_stored("a"), 2U);
-  EXPECT_EQ(num_events("too_many_failures"), 1);  // Not again with every review.
 }
 
 TEST_F(ServiceStop, CountsRunsThatAreGivenUpAsFailures) {

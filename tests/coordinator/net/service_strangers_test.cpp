@@ -13,17 +13,22 @@ namespace proofmass::coordinator {
 namespace {
 
 using test::PlayingWorker;
+using ::testing::_;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 using ::testing::StartsWith;
 
 class ServiceStrangers : public test::ServiceTest {
  protected:
   /// The others are served as if nothing had happened.
   void expect_service() {
-    PlayingWorker good(endpoint.address(), 2001);
+    PlayingWorker good(endpoint.address(), ++last_good_session_);
     EXPECT_EQ(good.borrow().num_runs(), 1U);
   }
+
+ private:
+  std::uint64_t last_good_session_ = 2000;
 };
 
 TEST_F(ServiceStrangers, AreClosedOutIfTheySendGarbage) {
@@ -44,30 +49,43 @@ TEST_F(ServiceStrangers, AreClosedOutIfTheySendGarbage) {
   in_service([&] { EXPECT_FALSE(service->worker_of(1001)); });
 }
 
-TEST_F(ServiceStrangers, AreClosedOutIfTheySendSeveralFrames) {
-  start({test::campaign_of("a", 1)});
-  PlayingWorker bad(endpoint.address());
-  bad.send_frames({"a", "b"});
-  EXPECT_EQ(bad.receive<proto::Reject>().text(), "message = 2 frames (must be one)");
-  expect_service();
-}
-
-TEST_F(ServiceStrangers, AreClosedOutIfTheySayWhatACoordinatorSays) {
-  start({test::campaign_of("a", 1)});
-  PlayingWorker bad(endpoint.address());
-  bad.send(proto::Stop());
-  EXPECT_EQ(bad.receive<proto::Reject>().text(),
-            "message = one of a coordinator (must be one of a worker)");
-  expect_service();
-}
-
-TEST_F(ServiceStrangers, AreClosedOutIfAMessageIsCutShort) {
-  start({test::campaign_of("a", 1)});
-  PlayingWorker bad(endpoint.address());
-  const std::string bytes = wire::encode(bad.next_envelope(test::make_bye(LossReason::drained)));
-  bad.send_frames({bytes.substr(0, bytes.size() - 1)});
-  EXPECT_EQ(bad.receive<proto::Reject>().reason(), proto::REJECT_REASON_MALFORMED);
-  expect_service();
+TEST_F(ServiceStrangers, AreToldWhatIsWrongAndClosedOut) {
+  using Frames = std::vector<std::string>;
+  start({test::campaign_of("a", 10)});
+  const auto reject_of = [&](std::uint64_t session, const auto& frames_of) {
+    PlayingWorker bad(endpoint.address(), session);
+    bad.send_frames(frames_of(bad));
+    const auto reject = bad.receive<proto::Reject>();
+    expect_service();
+    return std::pair(reject.reason(), reject.text());
+  };
+  const auto bye = [](PlayingWorker& worker) {
+    return wire::encode(worker.next_envelope(test::make_bye(LossReason::drained)));
+  };
+  EXPECT_THAT(reject_of(1001,
+                        [](PlayingWorker&) {
+                          return Frames{"a", "b"};
+                        }),
+              Pair(proto::REJECT_REASON_MALFORMED, "message = 2 frames (must be one)"));
+  const auto of_a_coordinator = [](PlayingWorker& bad) {
+    return Frames{wire::encode(bad.next_envelope(proto::Stop()))};
+  };
+  EXPECT_THAT(reject_of(1002, of_a_coordinator),
+              Pair(proto::REJECT_REASON_MALFORMED,
+                   "message = one of a coordinator (must be one of a worker)"));
+  const auto cut_short = [&](PlayingWorker& bad) {
+    const std::string bytes = bye(bad);
+    return Frames{bytes.substr(0, bytes.size() - 1)};
+  };
+  EXPECT_THAT(reject_of(1003, cut_short), Pair(proto::REJECT_REASON_MALFORMED, _));
+  const auto of_another_version = [&](PlayingWorker& bad) {
+    std::string bytes = bye(bad);
+    bytes[1] = 99;  // The version is the first field of the envelope.
+    return Frames{bytes};
+  };
+  EXPECT_THAT(
+      reject_of(1004, of_another_version),
+      Pair(proto::REJECT_REASON_INCOMPATIBLE, StartsWith("protocol_version = 99 (must be ")));
 }
 
 TEST_F(ServiceStrangers, CannotSendMoreThanAMessageMayHave) {
@@ -91,18 +109,6 @@ TEST_F(ServiceStrangers, AreClosedOutIfTheyUseTwoSessionsOnOneConnection) {
   bad.send_frames({wire::encode(bye)});
   EXPECT_EQ(bad.receive<proto::Reject>().text(),
             "session = 4711 (must be one connection's and one key's)");
-}
-
-TEST_F(ServiceStrangers, OfAnotherVersionAreToldSo) {
-  start({test::campaign_of("a", 1)});
-  PlayingWorker old(endpoint.address());
-  std::string bytes = wire::encode(old.next_envelope(test::make_bye(LossReason::drained)));
-  bytes[1] = 99;  // The version is the first field of the envelope.
-  old.send_frames({bytes});
-  const auto reject = old.receive<proto::Reject>();
-  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_INCOMPATIBLE);
-  EXPECT_THAT(reject.text(), StartsWith("protocol_version = 99 (must be "));
-  expect_service();
 }
 
 /// A coordinator with keys, on loopback.
@@ -130,28 +136,6 @@ class ServiceKeys : public test::ServiceTest {
   std::filesystem::path keys;
   std::optional<wire::KeyPair> coordinator_keys;
 };
-
-TEST_F(ServiceKeys, ThatAreRevokedEndTheirSessions) {
-  const wire::KeyPair revoked = wire::make_key_pair();
-  const wire::KeyPair kept = wire::make_key_pair();
-  authorize(wire::authorized_workers_name, {revoked, kept});
-  authorize(wire::authorized_clients_name, {});
-  start({test::campaign_of("a", 10)});
-  PlayingWorker first(service->workers_endpoint(), 1001, security_of(revoked));
-  (void)first.borrow();
-  PlayingWorker second(service->workers_endpoint(), 1002, security_of(kept));
-  const proto::RunLease lease = second.borrow();
-
-  authorize(wire::authorized_workers_name, {kept});
-  const auto reject = first.receive<proto::Reject>();
-  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_REVOKED);
-  EXPECT_EQ(reject.text(), "key = " + revoked.public_key.text() + " (is not authorized any more)");
-  EXPECT_THAT(wait_for_event("peer_closed_out"),
-              HasSubstr("address=127.0.0.1 key=" + revoked.public_key.text()));
-  in_service([&] { EXPECT_FALSE(service->worker_of(1001)); });
-  second.deliver(lease);
-  EXPECT_EQ(wire::runs_of(second.receive<proto::ResultAck>()).size(), lease.num_runs());
-}
 
 TEST_F(ServiceKeys, CannotTakeASessionThatAnotherKeyHas) {
   const wire::KeyPair owner = wire::make_key_pair();

@@ -18,35 +18,6 @@ using ::testing::StartsWith;
 
 class ServiceWorkers : public test::ServiceTest {};
 
-TEST_F(ServiceWorkers, ComputeEveryRunOfACampaignAndAreStopped) {
-  config.end = ServiceEnd::when_done;
-  start({test::campaign_of("a", 1000)});
-  PlayingWorker(endpoint.address()).work();
-  wait_for_end();
-  EXPECT_EQ(num_stored("a"), 1000U);
-}
-
-TEST_F(ServiceWorkers, AreServedAtAPortOnLoopback) {
-  config.workers_endpoint = "tcp://127.0.0.1:*";
-  start({test::campaign_of("a", 2)});
-  EXPECT_THAT(service->workers_endpoint(), StartsWith("tcp://127.0.0.1:"));
-  EXPECT_EQ(PlayingWorker(service->workers_endpoint()).borrow().first_run(), 0U);
-}
-
-TEST_F(ServiceWorkers, AreLentOnlyWhatIsMissing) {
-  start({test::campaign_of("a", 3)});
-  {
-    PlayingWorker worker(endpoint.address());
-    const proto::RunLease lease = worker.borrow();
-    EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
-    worker.deliver(lease);
-    EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
-  }
-  end(StopRequest::now);
-  start({test::campaign_of("a", 3)});
-  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().first_run(), 1U);
-}
-
 TEST_F(ServiceWorkers, WaitForNoCommitWithOthersOnceAllResultsAreThere) {
   config.writer.commit_after = std::chrono::hours(1);
   config.writer.record_after = std::chrono::hours(1);
@@ -81,13 +52,6 @@ TEST_F(ServiceWorkers, AreToldToRegisterIfTheyMeanAnotherCoordinator) {
   EXPECT_EQ(wire::runs_of(worker.receive<proto::RunLease>()).count, 1U);
 }
 
-TEST_F(ServiceWorkers, AreToldToRegisterIfTheyDidNot) {
-  start({test::campaign_of("a", 3)});
-  PlayingWorker worker(endpoint.address());
-  worker.want(1);
-  EXPECT_EQ(worker.receive<proto::Reject>().reason(), proto::REJECT_REASON_NOT_REGISTERED);
-}
-
 TEST_F(ServiceWorkers, KeepTheirRunsOnANewConnection) {
   start({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
@@ -97,17 +61,6 @@ TEST_F(ServiceWorkers, KeepTheirRunsOnANewConnection) {
   worker.deliver(lease);
   EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
   in_service([&] { EXPECT_EQ(service->campaigns().front().num_duplicates, 0U); });
-}
-
-TEST_F(ServiceWorkers, AreEachLentRunsOfTheirOwn) {
-  start({test::campaign_of("a", 10)});
-  PlayingWorker first(endpoint.address(), 1001);
-  PlayingWorker second(endpoint.address(), 1002);
-  const proto::RunLease lease = first.borrow();
-  EXPECT_EQ(lease.first_run(), 0U);
-  EXPECT_EQ(second.borrow().first_run(), wire::runs_of(lease).end());
-  EXPECT_EQ(first.register_here().worker_id(), 1U);
-  EXPECT_EQ(second.register_here().worker_id(), 2U);
 }
 
 TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
@@ -125,23 +78,6 @@ TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
   EXPECT_EQ(lease.attempt(), 2U);
 }
 
-TEST_F(ServiceWorkers, AreWaitedForByTheCoordinatorAfterOneThatWasKilled) {
-  start({test::campaign_of("a", 1)});
-  PlayingWorker faithful(endpoint.address(), 1001);
-  const proto::RunLease lease = faithful.borrow();
-  kill();
-
-  config.dispatch.reattach_wait = std::chrono::hours(1);
-  start({test::campaign_of("a", 1)});
-  PlayingWorker other(endpoint.address(), 1002);
-  (void)other.register_here();
-  EXPECT_TRUE(other.is_lent_nothing());
-  (void)faithful.register_here();
-  faithful.want(1, {PlayingWorker::held(lease)});
-  faithful.deliver(lease);
-  EXPECT_THAT(wire::runs_of(faithful.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
-}
-
 TEST_F(ServiceWorkers, AreNotWaitedForAfterACoordinatorThatEndedInOrder) {
   start({test::campaign_of("a", 1)});
   (void)PlayingWorker(endpoint.address(), 1001).borrow();
@@ -149,40 +85,6 @@ TEST_F(ServiceWorkers, AreNotWaitedForAfterACoordinatorThatEndedInOrder) {
   config.dispatch.reattach_wait = std::chrono::hours(1);
   start({test::campaign_of("a", 1)});
   EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().num_runs(), 1U);
-}
-
-// The next coordinator waits for those that held runs; they were not told to end.
-TEST_F(ServiceWorkers, AreLeftToTheNextCoordinator) {
-  start({test::campaign_of("a", 2)});
-  PlayingWorker holder(endpoint.address(), 1001);
-  const proto::RunLease lease = holder.borrow(1);
-  end(StopRequest::leave);
-  config.dispatch.reattach_wait = std::chrono::hours(1);
-  start({test::campaign_of("a", 2)});
-  PlayingWorker other(endpoint.address(), 1002);
-  (void)other.register_here();
-  EXPECT_TRUE(other.is_lent_nothing());
-  holder.say_hello();
-  for (proto::Envelope message = holder.next_message(); !message.has_welcome();
-       message = holder.next_message()) {
-    EXPECT_FALSE(message.has_stop());
-  }
-  holder.want(1, {PlayingWorker::held(lease)});
-  holder.deliver(lease);
-  EXPECT_EQ(wire::runs_of(holder.receive<proto::ResultAck>()).size(), lease.num_runs());
-}
-
-TEST_F(ServiceWorkers, DeliverWhatTheyHoldWhenDrained) {
-  start({test::campaign_of("a", 5)});
-  PlayingWorker worker(endpoint.address());
-  const proto::RunLease lease = worker.borrow();
-  stop = StopRequest::drain;
-  (void)worker.receive<proto::Drain>();
-  worker.deliver(lease);
-  EXPECT_EQ(wire::runs_of(worker.receive<proto::ResultAck>()).size(), lease.num_runs());
-  worker.send(test::make_bye(LossReason::drained));
-  wait_for_end();
-  EXPECT_EQ(num_stored("a"), lease.num_runs());
 }
 
 TEST_F(ServiceWorkers, HaveSoMuchTimeAndNoMoreWhenDrained) {
@@ -193,20 +95,6 @@ TEST_F(ServiceWorkers, HaveSoMuchTimeAndNoMoreWhenDrained) {
   stop = StopRequest::drain;
   (void)worker.receive<proto::Stop>();
   wait_for_end();
-}
-
-TEST_F(ServiceWorkers, AreLentRunsThatWereGivenUpIfThatIsAskedFor) {
-  {
-    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
-    const Entry given_up = GivenUpRun{.run = {0}};
-    (void)campaign.store.write({&given_up, 1});
-  }
-  config.given_up = GivenUpRuns::retry;
-  start({test::campaign_of("a", 1)});
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  in_service([&] { EXPECT_TRUE(service->is_done()); });
 }
 
 TEST_F(ServiceWorkers, AreNotLentRunsThatWereGivenUp) {

@@ -268,14 +268,6 @@ class DatabaseDetails : public test::StoreTest {
   std::shared_ptr<const CampaignEvents> events_;
 };
 
-TEST_F(DatabaseDetails, HaveTheAccuracySoFar) {
-  const Store store = made(3);
-  const auto results = results_after(3, nullptr);
-  EXPECT_EQ(results->failure, "");
-  EXPECT_EQ(results->num_runs, 3U);
-  EXPECT_THAT(results->html, testing::HasSubstr("Accuracy so far"));
-}
-
 TEST_F(DatabaseDetails, GoOnAfterWhatWasRead) {
   Store store = made(3);
   const auto results = results_after(3, nullptr);
@@ -331,14 +323,6 @@ TEST_F(DatabaseDetails, AreThoseOfBeforeIfTheFileCannotBeRead) {
   EXPECT_EQ(again->html, results->html);
   EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second"));
   EXPECT_THAT(events_->failure, testing::HasSubstr("(does not exist)"));
-}
-
-TEST(DatabaseSources, SayWhyAFileCannotBeRead) {
-  const DetailSources sources = database_sources();
-  const CampaignRecord nowhere = record("/nowhere/a.db");
-  const std::string failure = "campaign database = a.db (does not exist)";
-  EXPECT_EQ(sources.read_events(nowhere, nullptr)->failure, failure);
-  EXPECT_EQ(sources.read_results(nowhere, nullptr)->failure, failure);
 }
 
 /// A campaign of 2,000 runs whose results come as a test wants them. Errors grow with the run.

@@ -67,12 +67,6 @@ TEST_F(PageOfServiceTest, ForbidsTheBrowserWhatItDoesNotNeed) {
   }
 }
 
-TEST(PageBeyondLoopback, NeedsAToken) {
-  const PageConfig config{.address = {.host = "0.0.0.0", .port = 0, .is_loopback = false}};
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { Page page(config, no_log); }),
-            "page = 0.0.0.0:0 (must be a loopback address, or with --page-token-file)");
-}
-
 TEST(PageBeyondLoopback, WarnsThatNothingIsEncryptedWithoutTellingTheToken) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "token";

@@ -168,12 +168,6 @@ TEST(ChosenWorkers, CanBeThoseWithANameOrHost) {
   EXPECT_EQ(choose_workers(workers, {.filter = "nobody"}).list.count, 0U);
 }
 
-TEST(WorkersPage, SaysHowManyAreShown) {
-  ServiceSnapshot snapshot;
-  snapshot.workers = test::many_workers(10'000);
-  EXPECT_THAT(workers_page(snapshot, {}, {}).live, HasSubstr("showing 1–50 of 10,000 workers"));
-}
-
 TEST(CampaignPage, ShowsTheNewestEventsPageByPage) {
   auto events = std::make_shared<CampaignEvents>();
   for (std::uint64_t id = 1; id <= 300; ++id) {

@@ -133,19 +133,6 @@ TEST(Aggregates, KeepTheirDigitsBesideALargeOffset) {
   EXPECT_NEAR(*value_of("regr_intercept", line), 2.0, 1e-12);
 }
 
-TEST(Aggregates, PercentileInterpolatesBetweenNeighbours) {
-  const auto at = [](double p) { return *value_of("percentile", with(eight, {p})); };
-  EXPECT_EQ(at(0.0), 2.0);
-  EXPECT_EQ(at(50.0), 4.5);
-  EXPECT_DOUBLE_EQ(at(95.0), 7.0 + 0.65 * 2.0);  // Place 6.65 of 0 to 7.
-  EXPECT_EQ(at(100.0), 9.0);
-}
-
-TEST(Aggregates, CorrIsCorrelationByItsOtherName) {
-  const std::vector<Row> rows{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
-  EXPECT_EQ(value_of("corr", rows), value_of("correlation", rows));
-}
-
 // A power of two changes no digit, whatever squares and fourth powers would be.
 TEST(Aggregates, KeepTheirDigitsAtTheEndsOfTheRangeOfADouble) {
   const std::vector<Row> plain{{1.0, 1.0}, {2.0, 3.0}, {3.5, 2.0}, {4.0, 4.0}, {7.0, 4.5}};
@@ -176,19 +163,6 @@ TEST(Aggregates, RefuseAResultThatIsNoDouble) {
             "x is too large (the result is no finite double)");
   EXPECT_EQ(error_of("regr_slope", {{-1e308, 0.0}, {1e308, 1e-300}}),
             "y is too large (the result is no finite double)");
-}
-
-// The mean of equal values may be off by a rounding, which is no variation.
-TEST(Aggregates, SeeThatEqualValuesDoNotVary) {
-  std::vector<Row> x, pairs;
-  for (int i = 0; i < 1000; ++i) {
-    x.push_back({0.1});
-    pairs.push_back({0.1, double(i)});
-  }
-  EXPECT_EQ(value_of("stdev", x), 0.0);
-  EXPECT_FALSE(value_of("skewness", x));
-  EXPECT_FALSE(value_of("correlation", pairs));
-  EXPECT_EQ(value_of("regr_slope", pairs), 0.0);
 }
 
 // Each value after some rows left is that of a group of the rows that stayed, to the last bit.

@@ -74,19 +74,6 @@ TEST_F(DrawTable, HasTheBitsOfTheSimulationsDraws) {
   EXPECT_GT(num_rejected, 10u);
 }
 
-// A scale factor that is far off is never accepted, however the rest is drawn.
-TEST_F(DrawTable, HasNoValueForTheOneRunWhoseDrawsWereAllRejected) {
-  MicroscopeCampaign campaign = campaign_of(3);
-  campaign.dispersions[0] = {.law = Law::table, .file = "scale.csv", .column = "x"};
-  campaign.table_columns = {{0.0, 0.9, 0.0}};
-  make_file(campaign);
-  EXPECT_THAT(
-      rows_of("SELECT run_index, count(value) FROM draw GROUP BY run_index ORDER BY run_index"),
-      ElementsAre(ElementsAre(OwnCell(std::int64_t{0}), OwnCell(std::int64_t{60})),
-                  ElementsAre(OwnCell(std::int64_t{1}), OwnCell(std::int64_t{0})),
-                  ElementsAre(OwnCell(std::int64_t{2}), OwnCell(std::int64_t{60}))));
-}
-
 }  // namespace
 }  // namespace proofmass::test
 
@@ -158,27 +145,6 @@ TEST(DrawScan, HoldsAllRunsThatSatisfyADoubleAndAtMostOneMore) {
       EXPECT_LE(num_more, 1) << static_cast<int>(comparison) << " " << bound;
     }
   }
-}
-
-TEST(DrawScan, HoldsWhatSatisfiesAllConditions) {
-  DrawScan scan{.first_run = 0, .end_run = num_runs, .quantity = {}};
-  scan.narrow(RunComparison::above, std::int64_t{2});
-  scan.narrow(RunComparison::at_most, std::int64_t{4});
-  EXPECT_EQ(scan.first_run, 3u);
-  EXPECT_EQ(scan.end_run, 5u);
-  scan.narrow(RunComparison::at_least, std::int64_t{1});
-  scan.narrow(RunComparison::below, std::int64_t{6});
-  EXPECT_EQ(scan.first_run, 3u);
-  EXPECT_EQ(scan.end_run, 5u);
-  scan.narrow(RunComparison::below, std::int64_t{1});
-  EXPECT_EQ(scan.first_run, scan.end_run);
-}
-
-TEST(DrawScan, StaysEmpty) {
-  DrawScan scan{.first_run = 0, .end_run = num_runs, .quantity = {}};
-  scan.leave_none();
-  scan.narrow(RunComparison::at_least, std::int64_t{3});
-  EXPECT_EQ(scan.first_run, scan.end_run);
 }
 
 }  // namespace

@@ -36,16 +36,6 @@ std::string written(RowFormat format, const std::vector<std::string>& columns,
   return out;
 }
 
-TEST(CellText, IsTheShortestThatReadsBack) {
-  EXPECT_EQ(shortest_text(0.1), "0.1");
-  EXPECT_EQ(shortest_text(1.0), "1");
-  EXPECT_EQ(shortest_text(-0.0), "-0");
-  EXPECT_EQ(shortest_text(1.0 / 3.0), "0.3333333333333333");
-  EXPECT_EQ(shortest_text(5e-324), "5e-324");
-  EXPECT_EQ(shortest_text(1.7976931348623157e308), "1.7976931348623157e+308");
-  EXPECT_EQ(shortest_text(infinity), "inf");
-}
-
 TEST(CellText, ReadsBackToTheSameBits) {
   std::uint64_t state = 1;
   for (int i = 0; i < 100'000; ++i) {
@@ -69,23 +59,8 @@ TEST(CsvRows, FollowRfc4180) {
       "-9223372036854775808,\"two\nlines\",\r\n");
 }
 
-TEST(CsvRows, TellNullFromEmptyText) {
-  EXPECT_EQ(written(RowFormat::csv, {"a", "b"}, {{null, text("")}}), "a,b\r\n,\"\"\r\n");
-}
-
 TEST(CsvRows, AreNeverEmptyLines) {
   EXPECT_EQ(written(RowFormat::csv, {"a"}, {{null}, {0.5}}), "a\r\n\"\"\r\n0.5\r\n");
-}
-
-TEST(CsvRows, HoldBytesAsSqlWritesThem) {
-  EXPECT_EQ(written(RowFormat::csv, {"a"}, {{Blob{std::string_view("\0\xff\x0a", 3)}}}),
-            "a\r\nx'00ff0a'\r\n");
-}
-
-TEST(JsonRows, AreAListOfObjects) {
-  EXPECT_EQ(written(RowFormat::json, {"a", "b"}, {{integer(1), text("s²/m")}, {0.1, null}}),
-            "[\n {\"a\": 1, \"b\": \"s²/m\"},\n {\"a\": 0.1, \"b\": null}\n]\n");
-  EXPECT_EQ(written(RowFormat::json, {"a"}, {}), "[]\n");
 }
 
 TEST(JsonRows, CanBeReadWhateverTheyHold) {
@@ -100,29 +75,6 @@ TEST(JsonRows, CanBeReadWhateverTheyHold) {
   EXPECT_EQ(read.at(3).at(key), std::int64_t{1} << 62);
 }
 
-// nlohmann's reader, like Python's, takes a number without point or exponent for an integer.
-TEST(JsonRows, KeepTheTypeAndSignOfARealNumber) {
-  const auto read = nlohmann::json::parse(written(RowFormat::json, {"a"}, {{-0.0}, {3.0}, {1e22}}));
-  for (const auto& row : read) EXPECT_TRUE(row.at("a").is_number_float()) << row;
-  EXPECT_TRUE(std::signbit(read.at(0).at("a").get<double>()));
-  EXPECT_EQ(read.at(1).at("a"), 3.0);
-}
-
-TEST(JsonRows, HaveInfinityAsANumberBeyondAll) {
-  EXPECT_EQ(written(RowFormat::json, {"a"}, {{infinity}, {-infinity}}),
-            "[\n {\"a\": 1e999},\n {\"a\": -1e999}\n]\n");
-}
-
-TEST(JsonRows, RefuseTwoColumnsOfOneName) {
-  try {
-    (void)written(RowFormat::json, {"a", "b", "a"}, {});
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_STREQ(error.what(),
-                 "format = json (two columns are called a; name one of them with AS)");
-  }
-}
-
 TEST(TableRows, StandUnderTheirNamesWithNumbersToTheRight) {
   EXPECT_EQ(written(RowFormat::table, {"parameter", "unit", "worst"},
                     {{text("k2d"), text("s²/m"), 124.5},
@@ -135,33 +87,6 @@ TEST(TableRows, StandUnderTheirNamesWithNumbersToTheRight) {
             "a_c12      rad       7\n");
 }
 
-TEST(TableRows, AreNamedAlsoIfThereAreNone) {
-  EXPECT_EQ(written(RowFormat::table, {"a", "bc"}, {}), "a  bc\n─  ──\n");
-}
-
-TEST(TableRows, TakeOneLineEachAndSteerNoTerminal) {
-  EXPECT_EQ(written(RowFormat::table, {"a"}, {{text("one\ntwo\x1b[2J")}}),
-            "a\n─────────────────\none\\ntwo\\u001b[2J\n");
-}
-
-TEST(TableRows, SayThatThereAreMore) {
-  EXPECT_EQ(written(RowFormat::table, {"a"}, {{integer(1)}, {integer(2)}, {integer(3)}},
-                    {.num_rows_max = 2, .num_columns = {}}),
-            "a\n─\n1\n2\nthe first 2 rows (more with --rows-max)\n");
-  EXPECT_EQ(written(RowFormat::table, {"a"}, {{integer(1)}, {integer(2)}},
-                    {.num_rows_max = 2, .num_columns = {}}),
-            "a\n─\n1\n2\n");
-}
-
-TEST(TableRows, WantNoneBeyondTheFirstThatIsNotShown) {
-  const auto writer =
-      make_row_writer(RowFormat::table, {.num_rows_max = 2, .num_columns = {}}, [](auto) {});
-  writer->begin(std::vector<std::string>{"a"});
-  EXPECT_TRUE(writer->row(CellRow{null}));
-  EXPECT_TRUE(writer->row(CellRow{null}));
-  EXPECT_FALSE(writer->row(CellRow{null}));
-}
-
 TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
   const std::vector<CellRow> rows{{text("a long text that goes on and on"), integer(123456789)}};
   EXPECT_EQ(
@@ -169,11 +94,6 @@ TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
       "text                value\n"
       "──────────────  ─────────\n"
       "a long text t…  123456789\n");
-}
-
-TEST(TableRows, HaveSixSignificantDigits) {
-  EXPECT_EQ(written(RowFormat::table, {"a"}, {{0.1234567890123456}, {1.0 / 3e12}, {2.5}}),
-            "          a\n───────────\n   0.123457\n3.33333e-13\n        2.5\n");
 }
 
 // A table of these two columns takes at least 8 + 2 + 9 of the 16 columns of the terminal. In a
@@ -194,13 +114,6 @@ TEST(TableRows, CutVeryLongText) {
   const std::string table = written(RowFormat::table, {"a"}, {{text(std::string(1'000'000, 'x'))}});
   EXPECT_NE(table.find("\n" + std::string(99, 'x') + "…\n"), std::string::npos);
   EXPECT_LT(table.size(), 600u);
-}
-
-TEST(MarkdownRows, MakeATable) {
-  EXPECT_EQ(written(RowFormat::markdown, {"parameter", "worst"},
-                    {{text("a_c12"), 0.5}, {null, integer(-3)}}),
-            "| parameter | worst |\n| --- | ---: |\n| a_c12 | 0.5 |\n|  | -3 |\n");
-  EXPECT_EQ(written(RowFormat::markdown, {"a", "b"}, {}), "| a | b |\n| --- | --- |\n");
 }
 
 TEST(MarkdownRows, HoldTextThatMarkdownWouldRead) {

@@ -129,12 +129,6 @@ TEST_F(CampaignHistoryTest, HasTheNewestAttemptsAndCountsTheOthers) {
   EXPECT_EQ(attempts.lost[0].runs.first.value, 54U);
 }
 
-TEST_F(CampaignHistoryTest, RefusesWhatIsNoCampaign) {
-  test::write_file(directory() / "other.db", "hello");
-  EXPECT_THROW(CampaignHistory(directory() / "other.db"), StoreError);
-  EXPECT_THROW(CampaignHistory(directory() / "none.db"), StoreError);
-}
-
 /// A campaign whose workers, results and losses are known.
 class StoreExecution : public test::StoreTest {
  protected:

@@ -43,12 +43,6 @@ class StoreIntegrity : public test::StoreTest {
   }
 };
 
-TEST_F(StoreIntegrity, IsThatOfAFileJustMade) {
-  EXPECT_EQ(finding(), "");
-  const Store served = Store::open(file());
-  EXPECT_EQ(finding(), "");
-}
-
 TEST_F(StoreIntegrity, IsMissedByAnIndexThatLacksARow) {
   const auto redefine = [&](const std::string& old, const std::string& by) {
     change("UPDATE sqlite_schema SET sql = replace(sql, '" + old + "', '" + by +
@@ -155,25 +149,6 @@ TEST_F(StoreBackup, IsTheSameCampaignInOneFile) {
   EXPECT_EQ(Database(copy(), Access::read_only).text("PRAGMA journal_mode"), "delete");
 }
 
-TEST_F(StoreBackup, TakesWhatIsStoredSoFar) {
-  Store store = Store::create(directory() / "live.db", campaign_of(100), "");
-  store.commit(deliveries_of(0, 50));
-  Store::open_read_only(directory() / "live.db").back_up(copy());
-  store.commit(deliveries_of(50, 100));
-  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 50u);
-  EXPECT_EQ(results_in(store).size(), 100u);
-}
-
-TEST_F(StoreBackup, RefusesAFileThatIsThere) {
-  test::write_file(copy(), "precious");
-  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(copy()); }),
-            "campaign database = " + copy().string() + " (exists already)");
-  EXPECT_EQ(std::filesystem::file_size(copy()), 8u);
-  EXPECT_THAT(store_error_of([&] { Store::open(file()).back_up(file()); }), HasSubstr("(held by "));
-  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(file()); }),
-            message("exists already"));
-}
-
 TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
   const Store store = Store::open_read_only(file());
   {
@@ -185,12 +160,6 @@ TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   store.back_up(copy());
   EXPECT_THAT(file_names(), ElementsAre("campaign.db", "copy.db"));
-}
-
-TEST_F(StoreBackup, NeedsADirectory) {
-  const std::filesystem::path missing = directory() / "missing" / "copy.db";
-  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(missing); }),
-            "lock = " + missing.string() + ".lock (No such file or directory)");
 }
 
 }  // namespace

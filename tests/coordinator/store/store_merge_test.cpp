@@ -162,35 +162,5 @@ TEST_F(StoreMerge, KeepsComparisonsAndTheLargestErrors) {
   EXPECT_EQ(text("SELECT group_concat(DISTINCT run_index) FROM worst_run"), "0,1,2");
 }
 
-TEST_F(StoreMerge, LeavesNothingWhenItIsInterrupted) {
-  const auto a = part("a.db", entries_of({test::worker_1()}, {0, 1}, delivery_of));
-  const auto interrupt = [](const MergedPart&) { throw std::runtime_error("stop"); };
-  const std::vector<std::filesystem::path> parts{a};
-  EXPECT_THROW((void)Store::merge(whole(), campaign_of(num_runs), "", parts, interrupt),
-               std::runtime_error);
-  EXPECT_EQ(file_names(), (std::set<std::string>{"a.db"}));
-}
-
-TEST_F(StoreMerge, LeavesAFileThatIsThereAlone) {
-  const auto a = part("a.db", entries_of({test::worker_1()}, {0, 1}, delivery_of));
-  const std::string before = test::content_of(a);
-  EXPECT_THAT(store_error_of([&] {
-                (void)Store::merge(a, campaign_of(num_runs), "", std::vector{a},
-                                   [](const MergedPart&) {});
-              }),
-              HasSubstr("a.db (exists already)"));
-  EXPECT_EQ(test::content_of(a), before);
-}
-
-// The other parts may have been computed after the campaign was extended.
-TEST_F(StoreMerge, RefusesARunThatTheCampaignDoesNotHave) {
-  const auto a = part("a.db", entries_of({test::worker_1()}, {9}, delivery_of));
-  const std::vector<std::filesystem::path> parts{a};
-  EXPECT_THAT(store_error_of([&] {
-                (void)Store::merge(whole(), campaign_of(9), "", parts, [](const MergedPart&) {});
-              }),
-              HasSubstr("run_result.run_index = 9 (must be below num_runs = 9)"));
-}
-
 }  // namespace
 }  // namespace proofmass::coordinator

@@ -95,25 +95,12 @@ class StorePlace : public test::WriterTest {
   }
 };
 
-TEST_F(StorePlace, AFileThatIsRemovedIsCopied) {
-  expect_copy_after([&] { std::filesystem::remove(file()); }, "was removed or renamed");
-}
-
 TEST_F(StorePlace, AFileThatIsRemovedWithAllBesideItIsCopied) {
   expect_copy_after(
       [&] {
         for (const std::string& name : file_names()) std::filesystem::remove(directory() / name);
       },
       "was removed or renamed");
-}
-
-TEST_F(StorePlace, AFileThatIsReplacedByAnOlderCopyIsCopied) {
-  expect_copy_after(
-      [&] {
-        Store::open_read_only(file()).back_up(backup());
-        std::filesystem::rename(backup(), file());
-      },
-      "was replaced by another file");
 }
 
 // Whatever has the name is not touched until the operator moves it away.
@@ -253,17 +240,6 @@ TEST_F(StorePlace, NoNewFileIsMadeBesideACopyOfTheOneThatIsGone) {
   EXPECT_EQ(test::store_error_of([&] { (void)create(100); }),
             "campaign database = " + file().string() + " (is gone, but its copy " + name +
                 " is there: give it the name, or move " + name + " away and begin anew)");
-}
-
-TEST_F(StorePlace, AnIdleFileIsLookedAt) {
-  WriterConfig config = test::patient_config();
-  config.look_after = std::chrono::milliseconds(1);
-  StoreWriter& writer = start(config);
-  writer.open(id, create(100));
-  deliver(writer, 0, 10);
-  std::filesystem::remove(file());
-  while (copies_in(directory()).empty()) std::this_thread::yield();
-  EXPECT_EQ(num_readable(copy()), 10u);
 }
 
 // What was cut off cannot be had back; nothing more is stored, or named as stored.

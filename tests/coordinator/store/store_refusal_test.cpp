@@ -42,19 +42,6 @@ class StoreRefusal : public test::StoreTest {
   }
 };
 
-TEST_F(StoreRefusal, OfWhatIsNoDatabase) {
-  expect_refusal_of_both("does not exist");
-  EXPECT_TRUE(file_names().empty());
-  std::filesystem::create_directory(file());
-  expect_refusal_of_both("is no file");
-  std::filesystem::remove(file());
-  test::write_file(file(), "name = \"hardy2013\"\n" + std::string(1000, '#'));
-  expect_refusal_of_both("is not an SQLite database");
-  test::write_file(file(), "");
-  expect_refusal_of_both("is not a Proofmass campaign: its application_id is 0, not 1349668211");
-  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-}
-
 TEST_F(StoreRefusal, ToCreateAFileThatExists) {
   test::write_file(file(), "precious");
   EXPECT_EQ(store_error_of([&] { (void)create(1); }), message("exists already"));
@@ -260,37 +247,6 @@ TEST_F(StoreRefusal, ToMakeAFileWithoutAName) {
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(""); }),
             "campaign database =  (names no file)");
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-}
-
-TEST_F(StoreRefusal, OfATruncatedFile) {
-  create(1000).commit(deliveries_of(0, 1000));
-  std::filesystem::resize_file(file(), std::filesystem::file_size(file()) / 2);
-  EXPECT_THAT(error_of_open(), HasSubstr("(is damaged: "));
-  EXPECT_THAT(error_of_open_read_only(), HasSubstr("(is damaged: "));
-}
-
-TEST_F(StoreRefusal, OfASecondCoordinator) {
-  const Store store = create(1);
-  EXPECT_THAT(error_of_open(), MatchesRegex("lock = .*/campaign.db.lock \\(held by process " +
-                                            std::to_string(::getpid()) +
-                                            " on .+; a campaign has one coordinator at a time\\)"));
-  EXPECT_THAT(store_error_of([&] { (void)create(1); }), HasSubstr("(held by process "));
-}
-
-TEST_F(StoreRefusal, OfAFileThatHasAnotherName) {
-  (void)create(1);
-  std::filesystem::create_hard_link(file(), directory() / "other.db");
-  EXPECT_EQ(error_of_open(),
-            message("has 2 names (hard links), must have one; make copies instead"));
-  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()); }), "");
-  std::filesystem::remove(directory() / "other.db");
-  EXPECT_EQ(error_of_open(), "");
-}
-
-TEST_F(StoreRefusal, OfADirectoryThatDoesNotExist) {
-  const std::filesystem::path missing = directory() / "missing";
-  EXPECT_EQ(store_error_of([&] { Store::create(missing / "campaign.db", campaign_of(1), ""); }),
-            "directory = " + missing.string() + " (No such file or directory)");
 }
 
 TEST_F(StoreRefusal, OfADirectoryThatIsNotWritable) {

@@ -180,31 +180,9 @@ TEST_F(StoreRest, ACoordinatorGoesOnWithoutTheLogAndSaysSo) {
   EXPECT_EQ(test::event_kinds_in(alone), "log_lost") << "said once";
 }
 
-// Whatever step of the protocol the process dies after: the file with its log has everything, and
-// the file alone has everything or says that it lacks its log.
-TEST_F(StoreRest, NoStepLeavesACopyThatPassesAsWholeAndIsNot) {
-  Store store = create(1000);
-  std::uint64_t num_stored = 0;
-  for (int round = 0; round < 20; ++round) {
-    const bool is_rest = round % 3 == 2;
-    if (is_rest) {
-      EXPECT_EQ(store.rest(), std::nullopt);
-      EXPECT_EQ(store.log_size(), 0u);
-    } else {
-      store.commit(deliveries_of(num_stored, num_stored + 7));
-      num_stored += 7;
-    }
-    const std::filesystem::path alone = copy();
-    std::size_t num_read = 0;
-    const std::string error =
-        test::store_error_of([&] { num_read = results_in(Store::open_read_only(alone)).size(); });
-    EXPECT_EQ(error.empty(), is_rest) << round;
-    EXPECT_EQ(num_read, is_rest ? num_stored : 0);
-  }
-}
-
-// The same before each single write. With one result at a time most rounds need no new page, so
-// that a file of which only some pages are written has the right length.
+// Whatever write the process dies before: the file with its log has everything, and the file alone
+// has everything or says that it lacks its log. With one result at a time most rounds need no new
+// page, so that a file of which only some pages are written has the right length.
 TEST_F(StoreRest, NoWriteLeavesACopyThatPassesAsWholeAndIsNot) {
   Store store = create(1000);
   std::uint64_t num_stored = 0, num_copies = 0, num_whole = 0;

@@ -216,13 +216,6 @@ TEST_F(StoreTest, CommitsARunOnce) {
   EXPECT_EQ(database.integer("SELECT count(*) FROM delivery"), 4);
 }
 
-TEST_F(StoreTest, RefusesARunBeyondTheCampaign) {
-  Store store = create(2);
-  EXPECT_EQ(store_error_of([&] { store.commit(deliveries_of(0, 3)); }),
-            "run_result.run_index = 2 (must be below num_runs = 2)");
-  EXPECT_THAT(store.finished_runs(), IsEmpty());
-}
-
 TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
   Store store = create(2);
   std::vector<Delivery> deliveries = deliveries_of(0, 2);
@@ -335,28 +328,6 @@ TEST_F(StoreTest, KeepsItsOwner) {
     store.set_owner("anna");
   }
   EXPECT_EQ(Store::open_read_only(file()).owner(), "anna");
-}
-
-TEST_F(StoreTest, IsReadableWhileItsCoordinatorWrites) {
-  Store writer = create(10);
-  const Store reader = Store::open_read_only(file());
-  EXPECT_EQ(results_in(reader).size(), 0u);
-  EXPECT_THAT(reader.finished_runs(), IsEmpty());
-  writer.commit(deliveries_of(0, 7));
-  EXPECT_EQ(results_in(reader).size(), 7u);
-  EXPECT_EQ(Store::open_read_only(file()).num_runs(), 10u);
-}
-
-TEST_F(StoreTest, LosesNothingWhenClosedWhileSomebodyReads) {
-  std::optional<Store> writer = create(300);
-  writer->commit(deliveries_of(0, 300));
-  const Store reader = Store::open_read_only(file());
-  std::uint64_t num_read = 0;
-  reader.for_each_result([&](const RunResult&) {
-    if (num_read++ == 10) writer.reset();
-  });
-  EXPECT_EQ(num_read, 300u);
-  EXPECT_EQ(results_in(Store::open(file())).size(), 300u);
 }
 
 TEST_F(StoreTest, IsReadableInADirectoryThatIsNotWritable) {

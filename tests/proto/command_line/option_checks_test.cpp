@@ -61,15 +61,6 @@ std::string refusal(const std::string& arguments) {
   return {};
 }
 
-TEST(Refusal, NamesTheNearestCommandAndOption) {
-  EXPECT_EQ(refusal("raport"),
-            "command = raport (must be one that --help lists; nearest is report)");
-  EXPECT_EQ(refusal("run --rnus 3"),
-            "option = --rnus (must be one that --help lists; nearest is --runs)");
-  EXPECT_EQ(refusal("run --rnus=3"),
-            "option = --rnus=3 (must be one that --help lists; nearest is --runs)");
-}
-
 TEST(Refusal, SaysThatACommandIsMissing) {
   EXPECT_EQ(refusal(""), "command = none (must be one that --help lists)");
 }
@@ -94,10 +85,6 @@ TEST(Refusal, NamesAnUnknownOptionBeforeAMissingArgument) {
   EXPECT_EQ(refusal("query --runs"), "option = --runs (must be one that --help lists)");
   EXPECT_EQ(refusal("query"), "DB is required; usage: program query [OPTIONS] DB SQL");
   EXPECT_EQ(refusal("query a"), "SQL is required; usage: program query [OPTIONS] DB SQL");
-}
-
-TEST(Refusal, SaysThatAnOptionLacksItsValue) {
-  EXPECT_EQ(refusal("run --runs"), "option = --runs (needs a value behind it)");
 }
 
 /// What a program with `watch --connect`, a hidden option and `list` says of this option file,
@@ -175,17 +162,6 @@ TEST(OptionFile, IsNamedByAVariableUnlessAnArgumentNamesIt) {
   EXPECT_EQ(level_by(first, "--config " + second), "2");
   EXPECT_EQ(level_by(first, "--level 3"), "3");
   EXPECT_EQ(level_by("nowhere.toml", ""), "config = nowhere.toml (cannot be read)");
-}
-
-TEST(OptionFile, MustBeThere) {
-  CLI::App app("", "program");
-  app.set_config("--config");
-  try {
-    app.parse("--config nowhere.toml");
-    FAIL();
-  } catch (const CLI::ParseError& error) {
-    EXPECT_EQ(refusal_of(app, error), "config = nowhere.toml (cannot be read)");
-  }
 }
 
 TEST(Choice, SetsTheValueOfItsWord) {

@@ -107,19 +107,6 @@ std::string mismatch(const std::string& endpoint, const std::string& rule) {
   return "coordinator = " + endpoint + " (" + rule + ")";
 }
 
-// Whichever end notices first breaks off, and the other then knows less.
-TEST(ConnectionMonitor, TellsAPlainPeerThatKeysAreNeeded) {
-  zmq::context_t context;
-  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
-                                           {.domain = Domain::workers, .keys = make_key_pair()});
-  const std::string endpoint = endpoint_of(router);
-  Peer peer(endpoint, {});
-  EXPECT_THAT(peer.refusal(),
-              AnyOf(mismatch(endpoint, "admits only who has a key: give --keys"),
-                    mismatch(endpoint,
-                             "breaks the connection off: it wants --keys, or is no coordinator")));
-}
-
 TEST(ConnectionMonitor, TellsAPeerWithKeysThatTheCoordinatorUsesNone) {
   zmq::context_t context;
   const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
@@ -127,14 +114,6 @@ TEST(ConnectionMonitor, TellsAPeerWithKeysThatTheCoordinatorUsesNone) {
   Peer peer(endpoint, worker_of(make_key_pair().public_key));
   EXPECT_THAT(peer.refusal(), AnyOf(mismatch(endpoint, "uses no keys: start it with --keys too"),
                                     mismatch(endpoint, other_key_rule)));
-}
-
-TEST(ConnectionMonitor, TellsThatTheCoordinatorHasAnotherKey) {
-  zmq::context_t context;
-  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
-                                           {.domain = Domain::workers, .keys = make_key_pair()});
-  Peer peer(endpoint_of(router), worker_of(make_key_pair().public_key));
-  EXPECT_EQ(peer.refusal(), mismatch(endpoint_of(router), other_key_rule));
 }
 
 TEST(ConnectionMonitor, SaysEachReasonOnce) {

@@ -37,18 +37,6 @@ std::string message(const std::filesystem::path& file, const std::string& rule) 
   return "key file = " + file.string() + " (" + rule + ")";
 }
 
-TEST(KeyFiles, AreReadAsTheyWereWritten) {
-  const ScratchDirectory directory;
-  const KeyPair pair = make_key_pair();
-  write_key_pair(directory.path(), "worker", KeyRole::worker, pair);
-
-  const KeyPair read = read_key_pair(directory / "worker.key", KeyRole::worker);
-
-  EXPECT_EQ(read.public_key, pair.public_key);
-  EXPECT_EQ(read.secret_key.reveal(), pair.secret_key.reveal());
-  EXPECT_EQ(read_public_key(directory / "worker.pub", KeyRole::worker), pair.public_key);
-}
-
 // ZeroMQ derives the public half from the secret one: an independent truth.
 TEST(KeyFiles, HoldKeysOfCurve25519) {
   const KeyPair pair = make_key_pair();
@@ -75,21 +63,6 @@ TEST(KeyFiles, PublicOneDoesNotHoldTheSecret) {
   write_key_pair(directory.path(), "client", KeyRole::client, pair);
   EXPECT_NE(text_of(directory / "client.key").find(pair.secret_key.reveal()), std::string::npos);
   EXPECT_EQ(text_of(directory / "client.pub").find(pair.secret_key.reveal()), std::string::npos);
-}
-
-TEST(KeyFiles, AreNeverReplaced) {
-  for (const std::string existing : {"worker.key", "worker.pub"}) {
-    const ScratchDirectory directory;
-    write_text(directory / existing, "mine", 0600);
-    EXPECT_EQ(refusal_of([&] {
-                write_key_pair(directory.path(), "worker", KeyRole::worker, make_key_pair());
-              }),
-              message(directory / existing, "File exists"));
-    EXPECT_EQ(text_of(directory / existing), "mine");
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory.path()),
-                            std::filesystem::directory_iterator()),
-              1);
-  }
 }
 
 TEST(KeyFiles, ThatOthersCanReadAreRefused) {
@@ -248,12 +221,6 @@ TEST(WholeFile, ReplacesOnlyWhenAsked) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory.path()),
                           std::filesystem::directory_iterator()),
             1);
-}
-
-TEST(WholeFile, CannotStandInADirectoryThatIsNotThere) {
-  EXPECT_EQ(refusal_of(
-                [] { write_whole_file("list", "/nonexistent/list", "x", 0644, IfThere::replace); }),
-            "list = /nonexistent/list (cannot be written: No such file or directory)");
 }
 
 }  // namespace

@@ -39,14 +39,6 @@ TEST(Router, BindsAllKindsOfAddresses) {
   EXPECT_TRUE(any.starts_with("tcp://[::]:") || any.starts_with("tcp://0.0.0.0:")) << any;
 }
 
-TEST(Router, SaysWhyItCannotBeBound) {
-  zmq::context_t context;
-  const zmq::socket_t first = make_router(context, "bind", "tcp://127.0.0.1:*", {});
-  const std::string endpoint = first.get(zmq::sockopt::last_endpoint);
-  EXPECT_EQ(test::refusal_of([&] { (void)make_router(context, "bind_clients", endpoint, {}); }),
-            "bind_clients = " + endpoint + " (Address already in use)");
-}
-
 // A coordinator may be back for a few seconds only, and a client waits 10 s by default.
 TEST(Dealer, OfAClientTriesAgainEachSecond) {
   zmq::context_t context;

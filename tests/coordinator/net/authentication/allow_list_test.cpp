@@ -103,15 +103,6 @@ class AllowListFile : public ::testing::Test {
   std::string two_ = new_key();
 };
 
-TEST_F(AllowListFile, NamesTheOwnersOfKeys) {
-  write(one_ + " worker-1\n");
-  const AllowList list(file_, wire::Domain::workers);
-  ASSERT_NE(list.owner_of(one_), nullptr);
-  EXPECT_EQ(list.owner_of(one_)->name, "worker-1");
-  EXPECT_EQ(list.owner_of(two_), nullptr);
-  EXPECT_EQ(list.owner_of(""), nullptr);
-}
-
 TEST_F(AllowListFile, ChangesAreSeen) {
   write(one_ + " a\n");
   AllowList list(file_, wire::Domain::workers);

@@ -130,11 +130,6 @@ std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const 
          ": must be in its authorized_" + role + "s, and this its address for " + role + "s)";
 }
 
-std::string key_log(const std::string& domain, const KeyPair& keys, const std::string& reason) {
-  return "domain=" + domain + " address=127.0.0.1 key=" + keys.public_key.text() + " reason=\"" +
-         reason + "\"";
-}
-
 TEST_F(AuthenticatorTest, AdmitsListedKeysAndNamesThemWithEachMessage) {
   for (const auto& [domain, role, keys] : {std::tuple{Domain::workers, KeyRole::worker, worker_},
                                            {Domain::clients, KeyRole::client, client_}}) {
@@ -146,47 +141,6 @@ TEST_F(AuthenticatorTest, AdmitsListedKeysAndNamesThemWithEachMessage) {
   EXPECT_EQ(authenticator_->client(client_.public_key.text(), now_).value().name,
             to_text(KeyRole::client));
   EXPECT_TRUE(events_.empty()) << logged();
-}
-
-TEST_F(AuthenticatorTest, RefusesAnUnknownKeyAndBothEndsKnowWhy) {
-  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, stranger_));
-  EXPECT_EQ(refusal(peer), key_refusal(stranger_, endpoint(Domain::workers), "worker"));
-  EXPECT_EQ(logged(), key_log("workers", stranger_, "unknown key"));
-}
-
-TEST_F(AuthenticatorTest, RefusesAWorkerAtTheClientsDoor) {
-  Peer peer(endpoint(Domain::clients), identity(KeyRole::worker, worker_));
-  EXPECT_EQ(refusal(peer), key_refusal(worker_, endpoint(Domain::clients), "worker"));
-  EXPECT_EQ(logged(), key_log("clients", worker_, "key of a worker"));
-}
-
-TEST_F(AuthenticatorTest, RefusesAClientAtTheWorkersDoor) {
-  Peer peer(endpoint(Domain::workers), identity(KeyRole::client, client_));
-  EXPECT_EQ(refusal(peer), key_refusal(client_, endpoint(Domain::workers), "client"));
-  EXPECT_EQ(logged(), key_log("workers", client_, "key of a client"));
-}
-
-TEST_F(AuthenticatorTest, RefusesAPlainPeer) {
-  Peer peer(endpoint(Domain::workers), {});
-  const std::string told = refusal(peer);
-  EXPECT_TRUE(told.starts_with("coordinator = " + endpoint(Domain::workers) + " (")) << told;
-  const std::string who = "domain=workers address=unknown key=none ";
-  // Whichever end notices first breaks off.
-  EXPECT_TRUE(logged() == who + "reason=\"without a key\"" ||
-              logged() == who + "reason=\"ends during the handshake, as one without a key does\"")
-      << logged();
-}
-
-TEST_F(AuthenticatorTest, RefusesWhoTrustsAnotherCoordinator) {
-  ClientSecurity security = identity(KeyRole::worker, worker_);
-  security.identity->coordinator = stranger_.public_key;
-  Peer peer(endpoint(Domain::workers), security);
-  EXPECT_EQ(refusal(peer), "coordinator = " + endpoint(Domain::workers) +
-                               " (breaks the connection off: it has another key than "
-                               "coordinator.pub, or none, or is no coordinator)");
-  EXPECT_EQ(logged(),
-            "domain=workers address=unknown key=none reason=\"trusts the key of another "
-            "coordinator\"");
 }
 
 TEST_F(AuthenticatorTest, AdmitsAKeyThatIsListedLater) {

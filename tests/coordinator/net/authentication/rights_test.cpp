@@ -23,14 +23,6 @@ TEST(RightsOfAKey, AreAListOfWords) {
   }
 }
 
-TEST(RightsOfAKey, MustIncludeWhatIsAskedFor) {
-  EXPECT_EQ(test::refusal_of([] { require_right(asker("anna", "submit"), Right::observe); }),
-            "key = anna (must have the right `observe` in authorized_clients of the coordinator)");
-  EXPECT_EQ(test::refusal_of([] { require_right(asker("anna", "control"), Right::submit); }),
-            "key = anna (must have the right `submit` in authorized_clients of the coordinator)");
-  EXPECT_EQ(test::refusal_of([] { require_right({}, Right::control); }), "accepted");
-}
-
 TEST(RightsOfAKey, ReachToItsOwnCampaignsAndThoseOfNobody) {
   const Asker anna = asker("anna", "observe,submit");
   EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", "anna"); }), "accepted");
