@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -66,6 +67,17 @@ class Model {
   /// processor of one version. Takes some tenths of a second.
   /// @param set  One of available_instruction_sets().
   [[nodiscard]] virtual std::uint64_t reference_digest(InstructionSet set) const = 0;
+
+  /// What a device proves before it computes anything that counts.
+  struct DeviceProof {
+    std::uint64_t digest = 0;  ///< reference_digest() by the device's own kernels.
+    std::size_t capacity = 0;  ///< DeviceSimulation::capacity().
+  };
+  /// @return Nothing if the model, or this build, has nothing for devices.
+  /// @throws DeviceError
+  [[nodiscard]] virtual std::optional<DeviceProof> prove(Device& /*device*/) const {
+    return std::nullopt;
+  }
 
   /// The campaign of a definition that another program sent or stored.
   ///

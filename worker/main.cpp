@@ -18,7 +18,11 @@ worker::PreparedCampaign prepare(const Campaign& campaign) {
                                                    const std::function<void(int)>& progress) {
                 return plan->simulate_batch(requests, set, progress);
               },
-          .num_steps = plan->num_steps()};
+          .num_steps = plan->num_steps(),
+          .simulate_on = plan->runs_on_devices() ? worker::SimulateOn([plan](Device& device) {
+            return plan->simulation_on(device);
+          })
+                                                 : nullptr};
 }
 
 }  // namespace

@@ -17,7 +17,7 @@
 namespace proofmass::worker {
 namespace {
 
-unsigned threads_max() { return wire::slots_max / static_cast<unsigned>(model().batch_size()); }
+constexpr unsigned threads_max = 256;
 
 /// The year 2286: ten digits, so that a time in milliseconds is refused.
 constexpr std::int64_t end_time_unix_s_max = 9'999'999'999;
@@ -59,11 +59,19 @@ void add_connection(CLI::App& app, Options& options) {
 }
 
 void add_work(CLI::App& app, Options& options) {
-  options.num_threads = std::min(wire::num_processors(), threads_max());
   app.add_option("--threads", options.num_threads,
                  "Threads that simulate, one a processor by default")
       ->envname("PROOFMASS_THREADS")
-      ->check(wire::in_range(1U, threads_max()));
+      ->check(wire::in_range(1U, threads_max));
+  app.add_option(
+         "--gpu", options.gpus,
+         "NVIDIA cards that simulate, too: none, all, or\nnumbers as in 0,1; none by default")
+      ->type_name("CARDS")
+      ->envname("PROOFMASS_GPU");
+  app.add_option("--gpu-check", options.gpu_check,
+                 "Part of a card's runs that a processor computes\nagain; 0.001 by default")
+      ->envname("PROOFMASS_GPU_CHECK")
+      ->check(wire::in_range(0.0, 1.0));
   app.add_option("--spool", options.spool,
                  "File for results that are not acknowledged\nwhen the worker ends")
       ->type_name(wire::file_type)
@@ -103,6 +111,12 @@ void add_options(CLI::App& app, Options& options) {
   add_connection(app, options);
   add_work(app, options);
   add_process(app, options);
+}
+
+unsigned num_threads_of(const Options& options, std::size_t num_cards) {
+  if (options.num_threads) return *options.num_threads;
+  const unsigned num_processors = std::min(wire::num_processors(), threads_max);
+  return num_processors - std::min(num_processors - 1, static_cast<unsigned>(num_cards));
 }
 
 Duration duration_from(std::string_view option, std::string_view text) {

@@ -23,7 +23,9 @@ struct Options {
   std::optional<std::filesystem::path> keys;  ///< Directory; nothing: without keys.
   bool is_plain_waived = false;               ///< Without keys beyond this machine.
   std::string name;                           ///< Empty: HOST-PID.
-  unsigned num_threads = 1;
+  std::optional<unsigned> num_threads;        ///< Nothing: one a processor that serves no card.
+  std::string gpus = "none";                  ///< `none`, `all` or numbers of cards as in `0,1`.
+  double gpu_check = 1e-3;                    ///< Part of a card's runs that are computed again.
   std::optional<Duration> walltime_max;
   std::optional<std::int64_t> end_time_unix_s;  ///< When the job ends that the worker is part of.
   std::optional<Duration> idle_timeout;         ///< Nothing: the worker waits for work.
@@ -40,6 +42,9 @@ struct Options {
 /// @param options  Set while the arguments are parsed, which throws InvalidArgument, too; outlives
 ///                 `app`.
 void add_options(CLI::App& app, Options& options);
+
+/// Threads that simulate, beside those that serve cards.
+[[nodiscard]] unsigned num_threads_of(const Options& options, std::size_t num_cards);
 
 /// A time such as `90`, `90s`, `15m`, `2h` or `1d`.
 /// @throws InvalidArgument reading `option = text (must be ...)`.

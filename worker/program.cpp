@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/campaign/name.hpp"
+#include "core/device.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -21,6 +22,7 @@
 #include "proto/link/surroundings.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
+#include "worker/gpu/cuda_device.hpp"
 #include "worker/net/serve.hpp"
 #include "worker/options.hpp"
 #include "worker/supervision/supervisor.hpp"
@@ -42,6 +44,35 @@ void die_with(pid_t parent) {
   if (getppid() != parent) throw Error("the program that started this worker has ended");
 }
 
+/// What computes beside the threads.
+struct Cards {
+  std::vector<std::shared_ptr<Device>> devices;
+  std::size_t capacity = 0;  ///< Runs at a time, of all together.
+};
+
+/// Opens the cards that the options name and has each prove that it computes as processors do.
+Cards open_cards(const Options& options, std::uint64_t reference_digest, const wire::Log& log) {
+  Cards cards;
+  for (const CudaCard& card : cuda_cards_of(options.gpus)) {
+    auto device = std::make_shared<CudaDevice>(card);
+    const std::optional<Model::DeviceProof> proof = model().prove(*device);
+    if (!proof) throw InvalidArgument("gpu = " + options.gpus + " (this build has no kernels)");
+    if (proof->digest != reference_digest) {
+      throw DeviceError(
+          fmt::format("card {}: computes other results than processors do: {:016x}, not {:016x}",
+                      card.index, proof->digest, reference_digest));
+    }
+    log({.kind = "card_ready",
+         .fields = {{"card", static_cast<std::uint64_t>(card.index)},
+                    {"name", card.name},
+                    {"driver", card.driver},
+                    {"slots", std::uint64_t{proof->capacity}}}});
+    cards.devices.push_back(std::move(device));
+    cards.capacity += proof->capacity;
+  }
+  return cards;
+}
+
 proto::Hello hello_for(const Options& options, const ChildStart& start) {
   const auto process_id = static_cast<std::uint64_t>(getpid());
   proto::Hello hello;
@@ -50,7 +81,6 @@ proto::Hello hello_for(const Options& options, const ChildStart& start) {
                             ? wire::name_from(fmt::format("{}-{}", hello.host(), process_id))
                             : options.name);
   hello.set_process_id(process_id);
-  hello.set_num_slots(static_cast<std::uint32_t>(options.num_threads * model().batch_size()));
   hello.set_model_version(std::string(model().version()));
   hello.set_build(PROOFMASS_VERSION);
   hello.set_reference_digest(model().reference_digest(best_instruction_set()));
@@ -149,13 +179,24 @@ int say_ended(const Ending& ending, const wire::Log& log) {
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
   constexpr int num_threads_beside = 4;  // ZeroMQ's, and one for heartbeats.
-  wire::require_threads(static_cast<int>(options.num_threads) + num_threads_beside);
   config.session = start.session;
   config.hello = hello_for(options, start);
+  const Cards cards = open_cards(options, config.hello.reference_digest(), config.log);
+  const unsigned num_threads = num_threads_of(options, cards.devices.size());
+  const std::size_t num_slots = num_threads * model().batch_size() + cards.capacity;
+  config.hello.set_num_slots(
+      static_cast<std::uint32_t>(std::min<std::size_t>(num_slots, wire::slots_max)));
+  // A card's thread, one that checks its runs, and those of its driver.
+  constexpr std::size_t num_threads_a_card = 6;
+  wire::require_threads(static_cast<int>(num_threads + num_threads_a_card * cards.devices.size()) +
+                        num_threads_beside);
   StopSignals signals(config.signals);
   const wire::Wake progress;
   Executor executor(program.prepare, [&progress] { progress.notify(); },
-                    {.num_threads = options.num_threads, .batch_size_max = model().batch_size()});
+                    {.num_threads = num_threads,
+                     .batch_size_max = model().batch_size(),
+                     .devices = cards.devices,
+                     .checked_fraction = options.gpu_check});
   const Ending ending = serve(config, executor, progress, signals);
   if (!executor.end_within(thread_end_max)) {
     config.log(

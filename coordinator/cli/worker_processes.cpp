@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -19,6 +20,8 @@ namespace {
 constexpr int grace_ms = 3000;  // A worker looks at signals between two steps, some 20 ms apart.
 
 constexpr int failures_in_a_row_max = 3;
+constexpr int exit_usage = 2;  // Of a worker.
+constexpr std::string_view first_name = "local-1";
 
 std::uint64_t num_done(const Service& service) {
   std::uint64_t count = 0;
@@ -46,12 +49,14 @@ WorkerProcesses::~WorkerProcesses() {
 void WorkerProcesses::start(const std::string& name) {
   const pid_t process_id = wire::start_program(
       {.arguments = {executable_.string(), "--connect", endpoint_, "--name", name, "--threads", "1",
-                     "--parent", std::to_string(getpid())},
+                     "--gpu", name == first_name ? gpus_ : "none", "--parent",
+                     std::to_string(getpid())},
        .environment = wire::environment_without_settings()});
   processes_.push_back({.name = name, .process_id = process_id});
 }
 
-void WorkerProcesses::start_local(std::uint64_t count) {
+void WorkerProcesses::start_local(std::uint64_t count, const std::string& gpus) {
+  gpus_ = gpus;
   for (std::uint64_t i = 1; i <= count; ++i) start(fmt::format("local-{}", i));
 }
 
@@ -63,7 +68,8 @@ std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
     exits.push_back({.name = process.name,
                      .process_id = process.process_id,
                      .text = wire::end_text(*status),
-                     .reason = reason_of(*status)});
+                     .reason = reason_of(*status),
+                     .is_refusal = WIFEXITED(*status) && WEXITSTATUS(*status) == exit_usage});
     return true;
   });
   return exits;
@@ -103,6 +109,7 @@ void LocalWorkers::replace(const WorkerProcesses::Exit& exit) {
 }
 
 void LocalWorkers::check(const WorkerProcesses::Exit& exit, const std::string& runs) {
+  if (exit.is_refusal) throw Error(fmt::format("worker {} refused its options", exit.name));
   const std::uint64_t num_done_now = num_done(service_);
   num_failures_ = num_done_now > num_done_at_failure_ ? 1 : num_failures_ + 1;
   num_done_at_failure_ = num_done_now;

@@ -25,6 +25,7 @@ class WorkerProcesses {
     std::string text;  ///< `killed by signal 9 (Killed)`, `exit code 1`.
     /// By reason_of_end(), with the kernel's want of memory since the last call.
     wire::LossReason reason = wire::LossReason::failed;
+    bool is_refusal = false;  ///< It cannot do what its options ask, and said so.
   };
 
   WorkerProcesses(std::filesystem::path executable, std::string endpoint);
@@ -35,7 +36,8 @@ class WorkerProcesses {
   /// @throws Error if the process cannot be made.
   void start(const std::string& name);
   /// Starts `local-1`, `local-2` and so on.
-  void start_local(std::uint64_t count);
+  /// @param gpus  As for the option --gpu of a worker; the first one has the cards.
+  void start_local(std::uint64_t count, const std::string& gpus);
 
   /// Those that have ended since the last call; does not wait.
   [[nodiscard]] std::vector<Exit> take_exits();
@@ -51,6 +53,7 @@ class WorkerProcesses {
 
   std::filesystem::path executable_;
   std::string endpoint_;
+  std::string gpus_ = "none";  ///< Of `local-1`.
   std::vector<Process> processes_;
   std::uint64_t num_oom_kills_;  ///< As the kernel counted them when last looked at.
 };

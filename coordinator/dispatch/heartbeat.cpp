@@ -19,7 +19,7 @@ namespace {
 using HeldByAttempt = std::map<Attempt, RunSet>;
 
 /// More than a worker can hold by the rules, so that one that claims everything gets it not.
-constexpr std::uint64_t num_adopted_max = 2 * wire::runs_per_lease_max;
+constexpr std::uint64_t num_adopted_max = wire::runs_held_max;
 
 RunSet all_of(const HeldByAttempt& held) {
   RunSet all;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/campaign/name.hpp"
+#include "core/device.hpp"
 #include "core/error.hpp"
 
 namespace proofmass {
@@ -27,6 +28,11 @@ void check_table_column(const std::vector<double>& column, const TableSource& so
 }
 
 }  // namespace
+
+std::unique_ptr<DeviceSimulation> Plan::simulation_on(Device& /*device*/) const {
+  PROOFMASS_EXPECT(runs_on_devices());
+  return nullptr;
+}
 
 std::string_view name_of(Interpretation interpretation) {
   if (interpretation == Interpretation::ensemble) return "ensemble";

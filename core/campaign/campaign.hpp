@@ -17,6 +17,8 @@
 
 namespace proofmass {
 
+class Device;  // Those who simulate on one include core/device.hpp.
+class DeviceSimulation;
 struct Recording;  // Those who replay a run include core/campaign/recording.hpp.
 struct RecordedSample;
 
@@ -109,6 +111,14 @@ class Plan {
   /// @return The result that simulate_batch() has for the request.
   [[nodiscard]] virtual RunResult replay(const RunRequest& request, const SampleSink& sink,
                                          const std::function<void(int)>& progress = {}) const = 0;
+
+  /// True if devices can compute the campaign's runs; otherwise they are left to processors.
+  [[nodiscard]] virtual bool runs_on_devices() const { return false; }
+  /// The campaign's runs on a device.
+  /// @param device  Outlives it, as does the plan. Nothing else is on it.
+  /// @pre runs_on_devices().
+  /// @throws DeviceError
+  [[nodiscard]] virtual std::unique_ptr<DeviceSimulation> simulation_on(Device& device) const;
 
   /// What replay() passes on.
   [[nodiscard]] virtual const Recording& recording() const = 0;

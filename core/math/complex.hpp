@@ -12,12 +12,12 @@ namespace proofmass {
 /// std::complex has on x86-64.
 class ComplexDouble {
  public:
-  ComplexDouble() = default;
+  constexpr ComplexDouble() = default;
   // Not explicit: real numbers are complex numbers.
-  ComplexDouble(double real, double imaginary = 0.0) : real_(real), imaginary_(imaginary) {}
+  constexpr ComplexDouble(double real, double imaginary = 0.0) : real_(real), imaginary_(imaginary) {}
 
-  [[nodiscard]] double real() const { return real_; }
-  [[nodiscard]] double imag() const { return imaginary_; }
+  [[nodiscard]] constexpr double real() const { return real_; }
+  [[nodiscard]] constexpr double imag() const { return imaginary_; }
 
  private:
   double real_ = 0.0;

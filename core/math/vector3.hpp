@@ -63,7 +63,11 @@ PROOFMASS_INLINE Vector3<T> scaled(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.x * b.x, a.y * b.y, a.z * b.z};
 }
 
-// For the extremes of a run. Each has a twin over the number type of a batch.
+// Functions of a number. Each has a twin over the number type of a batch.
+
+PROOFMASS_INLINE double square_root(double a) { return __builtin_sqrt(a); }
+
+// For the extremes of a run.
 
 /// |a|, and the larger or smaller of two numbers: `b` if `a` is not a number, as vector
 /// instructions have it.
@@ -163,9 +167,8 @@ PROOFMASS_INLINE Vector3<T> error_angles(const Quaternion<T>& q) {
 /// The rotation with these error angles, rad; each below 2.
 template <typename T>
 PROOFMASS_INLINE Quaternion<T> from_error_angles(const Vector3<T>& angles) {
-  using std::sqrt;
   const Vector3<T> half = T(0.5) * angles;
-  return {sqrt(T(1.0) - dot(half, half)), half};
+  return {square_root(T(1.0) - dot(half, half)), half};
 }
 
 /// One Newton step towards unit length; keeps rounding from accumulating over a session.

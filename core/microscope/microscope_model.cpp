@@ -117,6 +117,9 @@ class MicroscopeModel final : public Model {
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override {
     return proofmass::reference_digest(set);
   }
+  [[nodiscard]] std::optional<DeviceProof> prove(Device& device) const override {
+    return prove_device(device);
+  }
 
   [[nodiscard]] std::unique_ptr<Campaign> campaign_of(Definition definition, TableColumns columns,
                                                       std::string_view source) const override {

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <Random123/philox.h>
+
 #include <array>
 #include <cstdint>
 #include <string_view>
 
+#include "core/math/inline.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass {
@@ -12,7 +15,13 @@ namespace proofmass {
 using RandomBlock = std::array<std::uint32_t, 4>;
 
 /// Philox4x32-10 [Salmon2011]: a bijection of the counter for every key, used as a random function.
-[[nodiscard]] RandomBlock philox(const RandomBlock& counter, std::uint64_t key);
+[[nodiscard]] PROOFMASS_INLINE RandomBlock philox(const RandomBlock& counter, std::uint64_t key) {
+  const r123::Philox4x32::ctr_type c{{counter[0], counter[1], counter[2], counter[3]}};
+  const r123::Philox4x32::key_type k{
+      {static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32)}};
+  const auto r = r123::Philox4x32{}(c, k);
+  return {r[0], r[1], r[2], r[3]};
+}
 
 /// Number of a stream, from its name (32-bit FNV-1a). Adding a stream changes no other one.
 [[nodiscard]] std::uint32_t stream_id(std::string_view name);
@@ -21,13 +30,13 @@ using RandomBlock = std::array<std::uint32_t, 4>;
 /// so any part of any run can be computed alone.
 class RandomStream {
  public:
-  RandomStream(std::uint64_t seed, RunIndex run, std::uint32_t id)
+  PROOFMASS_INLINE RandomStream(std::uint64_t seed, RunIndex run, std::uint32_t id)
       : key_(seed),
         id_(id),
         run_low_(static_cast<std::uint32_t>(run.value)),
         run_high_(static_cast<std::uint32_t>(run.value >> 32)) {}
 
-  [[nodiscard]] RandomBlock block(std::uint32_t index) const {
+  [[nodiscard]] PROOFMASS_INLINE RandomBlock block(std::uint32_t index) const {
     return philox({index, id_, run_low_, run_high_}, key_);
   }
 

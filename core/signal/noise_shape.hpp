@@ -9,14 +9,12 @@
 
 namespace proofmass {
 
-/// A coloured noise as a rational filter of one white sequence, in parallel form:
+/// A rational filter of one white sequence, in parallel form:
 ///
 ///     yₖ = gain·wₖ + Σ cᵢ sᵢ + 2 Re(C S),    sᵢ ← pᵢ sᵢ + wₖ,    S ← P S + wₖ
 ///
-/// with w white of unit variance, and at most one pair of complex poles. The states of the parallel
-/// form have the covariance 1/(1 − pᵢpⱼ), so a stationary start is a matter of one triangular
-/// matrix.
-struct NoiseShape {
+/// with at most one pair of complex poles.
+struct NoiseFilter {
   static constexpr std::size_t num_poles_max = 12;
 
   double gain = 0.0;
@@ -26,6 +24,11 @@ struct NoiseShape {
   bool has_pair = false;
   ComplexDouble pair_pole;
   ComplexDouble pair_coefficient;
+};
+
+/// A coloured noise: a filter that is driven by white noise of unit variance. Its states have the
+/// covariance 1/(1 − pᵢpⱼ), so a stationary start is a matter of one triangular matrix.
+struct NoiseShape : NoiseFilter {
   /// Lower Cholesky factor of the stationary covariance of (s₁ … sₙ, Re S, Im S), rows first.
   std::vector<double> start_factor;
 

@@ -229,7 +229,7 @@ void check(const proto::ResultAck& ack) {
 }
 
 void check(const proto::Heartbeat& heartbeat) {
-  require_in(heartbeat.num_runs_max(), 0, runs_per_lease_max, "num_runs_max");
+  require_in(heartbeat.num_runs_max(), 0, runs_held_max, "num_runs_max");
   require_count(heartbeat.held_size(), 0, ranges_per_message_max, "held");
   require_count(heartbeat.set_aside_size(), 0, ranges_per_message_max, "set_aside");
   require_count(heartbeat.computing_size(), 0, slots_max, "computing");

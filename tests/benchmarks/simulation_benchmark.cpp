@@ -17,7 +17,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/model.hpp"
-#include "core/random/normal.hpp"
+#include "core/random/normal_deviates.hpp"
 #include "core/signal/line_weights.hpp"
 #include "tests/support/microscope_results.hpp"
 

@@ -47,11 +47,14 @@ Executor::Executor(Prepare prepare, std::function<void()> on_change, const Execu
     : prepare_(std::move(prepare)),
       on_change_(std::move(on_change)),
       config_(config),
-      num_serving_(config.num_threads) {
+      num_serving_(config.num_threads + config.devices.size()) {
   PROOFMASS_EXPECT(config.num_threads >= 1 && config.batch_size_max >= 1 &&
                    config.num_campaigns_max >= 1);
   for (std::size_t i = 0; i < config.num_threads; ++i) {
-    threads_.emplace_back([this] { serve(); });
+    threads_.emplace_back([this] { serve_processor(); });
+  }
+  for (const std::shared_ptr<Device>& device : config.devices) {
+    threads_.emplace_back([this, device] { serve_device(*device); });
   }
 }
 
@@ -181,10 +184,19 @@ std::optional<std::string> Executor::failure() const {
   return failure_;
 }
 
-void Executor::serve() {
+void Executor::serve_processor() {
+  serve([this] {
+    const std::shared_ptr<Batch> batch = next_batch();
+    if (batch != nullptr) compute(*batch);
+    return batch != nullptr;
+  });
+}
+
+void Executor::serve(const std::function<bool()>& compute_next) {
   bool has_failed = false;
   try {
-    while (const std::shared_ptr<Batch> batch = next_batch()) compute(*batch);
+    while (compute_next()) {
+    }
   } catch (const std::exception& error) {
     const std::lock_guard lock(mutex_);
     if (!failure_) failure_ = error.what();
@@ -202,22 +214,24 @@ std::shared_ptr<Executor::Batch> Executor::next_batch() {
   while (true) {
     if (is_ending_ || failure_) return nullptr;
     Assignment assignment = queue_.take(config_.batch_size_max, is_ready_now);
-    if (!assignment.requests.empty()) {
-      KnownCampaign& known = campaigns_.at(assignment.campaign);
-      known.used = ++num_uses_;
-      const auto batch = std::make_shared<Batch>();
-      batch->number = ++num_batches_;
-      batch->assignment = std::move(assignment);
-      batch->prepared = known.prepared;
-      batch->started_at = now();
-      return batches_[batch->number] = batch;
-    }
+    if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
     } else {
       changed_.wait(lock);
     }
   }
+}
+
+std::shared_ptr<Executor::Batch> Executor::begin_batch(Assignment assignment) {
+  KnownCampaign& known = campaigns_.at(assignment.campaign);
+  known.used = ++num_uses_;
+  const auto batch = std::make_shared<Batch>();
+  batch->number = ++num_batches_;
+  batch->assignment = std::move(assignment);
+  batch->prepared = known.prepared;
+  batch->started_at = now();
+  return batches_[batch->number] = batch;
 }
 
 bool Executor::is_ready(wire::CampaignId campaign) const {
@@ -250,7 +264,9 @@ void Executor::prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock) 
 
 void Executor::compute(Batch& batch) {
   try {
-    finish(batch, simulate(batch));
+    std::vector<RunResult> results = simulate(batch);
+    const std::size_t num_together = results.size();
+    finish(batch, std::move(results), num_together);
   } catch (const Abandoned&) {
     // The thread that dropped the batch has removed it from the list.
   }
@@ -258,24 +274,26 @@ void Executor::compute(Batch& batch) {
 
 std::vector<RunResult> Executor::simulate(Batch& batch) {
   const std::vector<RunRequest>& requests = batch.assignment.requests;
-  int num_steps = 0;
   const auto on_progress = [&](int num_steps_now) {
     if (batch.is_dropped) throw Abandoned{};
-    const int num_new = std::max(0, num_steps_now - num_steps);
-    if (num_new == 0) return;
-    num_steps += num_new;
-    batch.num_steps_done = num_steps;
-    num_steps_done_ += static_cast<std::uint64_t>(num_new) * requests.size();
+    note_steps(batch, num_steps_now);
   };
   std::vector<RunResult> results = batch.prepared->simulate(requests, on_progress);
   PROOFMASS_EXPECT(results.size() == requests.size());
   return results;
 }
 
-void Executor::finish(const Batch& batch, std::vector<RunResult> results) {
+void Executor::note_steps(Batch& batch, int num_steps_now) {
+  const int num_new = std::max(0, num_steps_now - batch.num_steps_done);
+  batch.num_steps_done += num_new;
+  num_steps_done_ += static_cast<std::uint64_t>(num_new) * batch.assignment.requests.size();
+}
+
+void Executor::finish(const Batch& batch, std::vector<RunResult> results,
+                      std::size_t num_together) {
   const Duration elapsed = now() - batch.started_at;
   const double elapsed_s = std::chrono::duration<double>(elapsed).count();
-  const double compute_s = elapsed_s / static_cast<double>(results.size());
+  const double compute_s = elapsed_s / static_cast<double>(num_together);
   const wire::CampaignId campaign = batch.assignment.campaign;
   {
     const std::lock_guard lock(mutex_);

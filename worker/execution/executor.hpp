@@ -13,6 +13,7 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/device.hpp"
 #include "worker/execution/execution.hpp"
 #include "worker/execution/run_queue.hpp"
 
@@ -24,10 +25,14 @@ namespace proofmass::worker {
 using Simulate = std::function<std::vector<RunResult>(std::span<const RunRequest> requests,
                                                       const std::function<void(int)>& progress)>;
 
+/// Begins to compute runs on a device, for the thread that serves it.
+using SimulateOn = std::function<std::unique_ptr<DeviceSimulation>(Device&)>;
+
 /// A campaign whose runs can be computed.
 struct PreparedCampaign {
   Simulate simulate;
-  int num_steps = 1;  ///< Of one run, all sessions together; at least 1.
+  int num_steps = 1;         ///< Of one run, all sessions together; at least 1.
+  SimulateOn simulate_on{};  ///< Empty if its runs are left to processors.
 };
 
 /// Prepares what the runs of a campaign share, which may take some time.
@@ -38,6 +43,9 @@ struct ExecutorConfig {
   std::size_t num_threads = 1;        ///< At least 1.
   std::size_t batch_size_max = 1;     ///< Runs that a thread computes together; at least 1.
   std::size_t num_campaigns_max = 4;  ///< Kept without runs of theirs at hand; at least 1.
+  /// Each is served by a thread of its own, beside `num_threads`.
+  std::vector<std::shared_ptr<Device>> devices{};
+  double checked_fraction = 0.0;  ///< Of a device's runs, which are computed here again.
 };
 
 /// Computes runs on threads of its own, in the order in which they are submitted.
@@ -46,6 +54,9 @@ struct ExecutorConfig {
 /// takes, and starts at once with what is there. What each run took, `elapsed_s`, is the time of
 /// its batch, of which it has an equal share in `compute_s`. A campaign is prepared by a thread
 /// when its first run is due, while the others go on.
+///
+/// A device is given runs where many wait, since a few take it as long as many. Some of them are
+/// computed by the processor, too; a device that differs ends the executor, as one that fails does.
 class Executor final : public Execution {
  public:
   /// @param prepare    Called on the threads, once for each definition.
@@ -86,7 +97,7 @@ class Executor final : public Execution {
     std::optional<Duration> batch_time;  ///< Of the last one among those that were as large.
   };
 
-  /// Runs that one thread computes together. The thread shares it with `batches_`, from which it is
+  /// Runs that are computed together. The thread shares it with `batches_`, from which it is
   /// taken when it is dropped.
   struct Batch {
     std::uint64_t number = 0;
@@ -97,15 +108,25 @@ class Executor final : public Execution {
     std::atomic<bool> is_dropped = false;
   };
 
-  void serve();
+  void serve(const std::function<bool()>& compute_next);
+  void serve_processor();
+  void serve_device(Device& device);
   /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
   [[nodiscard]] std::shared_ptr<Batch> next_batch();
+  [[nodiscard]] std::shared_ptr<Batch> begin_batch(Assignment assignment);
+  /// Waits for runs that are worth a device; null at the end.
+  [[nodiscard]] std::shared_ptr<Batch> next_batch_for_device();
+  /// More runs of the same campaign, if they wait; null if those of another one come first.
+  [[nodiscard]] std::shared_ptr<Batch> next_batch_like(const Batch& batch, std::size_t size_max);
+  void compute_on(Device& device, std::shared_ptr<Batch> first);
   [[nodiscard]] bool is_ready(wire::CampaignId campaign) const;
   [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
   void compute(Batch& batch);
   [[nodiscard]] std::vector<RunResult> simulate(Batch& batch);
-  void finish(const Batch& batch, std::vector<RunResult> results);
+  void note_steps(Batch& batch, int num_steps_now);
+  /// @param num_together  Runs that shared the time of the batch.
+  void finish(const Batch& batch, std::vector<RunResult> results, std::size_t num_together);
   void drop_batches(const std::function<bool(const Batch&)>& is_unwanted);
   void make_room();
   [[nodiscard]] bool is_in_use(wire::CampaignId campaign) const;

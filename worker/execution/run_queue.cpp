@@ -40,6 +40,25 @@ Assignment RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
   return assignment;
 }
 
+Assignment RunQueue::take_for_device(std::size_t count_min, std::size_t count_max,
+                                     const IsReady& is_ready) {
+  Assignment assignment;
+  assignment.campaign = first_campaign(is_ready);
+  const auto is_fit = [&](const Waiting& run) {
+    return run.campaign == assignment.campaign && !run.is_alone;
+  };
+  if (static_cast<std::size_t>(std::ranges::count_if(runs_, is_fit)) < count_min) return assignment;
+  for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
+    if (!is_fit(*run)) {
+      ++run;
+      continue;
+    }
+    assignment.requests.push_back(std::move(run->request));
+    run = runs_.erase(run);
+  }
+  return assignment;
+}
+
 std::vector<RunIndex> RunQueue::drop(wire::CampaignId campaign, std::span<const RunRange> ranges) {
   const auto is_in_range = [&](RunIndex run) {
     return std::ranges::any_of(ranges, [&](const RunRange& range) {

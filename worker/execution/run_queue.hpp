@@ -36,6 +36,11 @@ class RunQueue {
   /// one.
   [[nodiscard]] Assignment take(std::size_t count_max, const IsReady& is_ready);
 
+  /// As take(), for a device that computes thousands of runs at a time: of as many batches as it
+  /// takes, but none that is to be alone. None if fewer than `count_min` of them are here.
+  [[nodiscard]] Assignment take_for_device(std::size_t count_min, std::size_t count_max,
+                                           const IsReady& is_ready);
+
   /// Removes those of the runs that are here and returns them in ascending order.
   std::vector<RunIndex> drop(wire::CampaignId campaign, std::span<const RunRange> ranges);
   void drop(wire::CampaignId campaign);

@@ -301,7 +301,8 @@ void Conversation::say_hello(TimePoint now) {
 /// as there is room, so that the worker goes on with other campaigns.
 std::uint32_t Conversation::credit() const {
   if (leaving_) return 0;
-  constexpr std::size_t credit_max = wire::runs_per_lease_max;
+  const std::size_t credit_max = std::clamp<std::size_t>(
+      2 * std::size_t{hello_.num_slots()}, wire::runs_per_lease_max, wire::runs_held_max);
   const std::size_t num_kept = unacknowledged_.size();
   const std::size_t num_aside = unacknowledged_.num_set_aside();
   const std::size_t used = num_kept - num_aside + std::min(num_aside, credit_max / 2);

@@ -105,8 +105,8 @@ class GrowingFile final : public CampaignFiles {
 /// What takes time before the first run, and does not need the database: that of a new campaign is
 /// made meanwhile, which waits for the disk.
 struct RunStart {
-  explicit RunStart(std::uint64_t worker_count) : num_workers(worker_count) {
-    workers->start_local(num_workers);
+  RunStart(std::uint64_t worker_count, const std::string& gpus) : num_workers(worker_count) {
+    workers->start_local(num_workers, gpus);
   }
 
   std::uint64_t num_workers;
@@ -210,7 +210,8 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
       num_runs_in(campaign.store.finished_runs()) - num_finished_now;
   if (options.part) campaign.elsewhere = runs_beside(part, num_runs);
   if (start == nullptr) {
-    start = std::make_unique<RunStart>(num_workers(options, part.count - num_finished_now));
+    start = std::make_unique<RunStart>(num_workers(options, part.count - num_finished_now),
+                                       options.gpus);
   }
   make_active(campaign.store, options);
   const SignalThread signals;
@@ -356,7 +357,8 @@ int run_campaign(const RunOptions& options) {
   const std::uint64_t num_runs = campaign->num_runs;
   std::unique_ptr<RunStart> start;
   if (!std::filesystem::exists(database)) {
-    start = std::make_unique<RunStart>(num_workers(options, part_of(options, num_runs).count));
+    start = std::make_unique<RunStart>(num_workers(options, part_of(options, num_runs).count),
+                                       options.gpus);
   }
   Outcome outcome = compute(open_or_create(*campaign, stop_plan_of(options, num_runs), database),
                             num_runs, options, std::move(start));
@@ -379,6 +381,11 @@ void add_run_options(CLI::App& command, RunOptions& options) {
   command
       .add_option("--workers", options.num_workers, "Worker processes; one a processor by default")
       ->check(wire::in_range(1U, workers_max));
+  command
+      .add_option(
+          "--gpu", options.gpus,
+          "NVIDIA cards that simulate, too: none, all, or\nnumbers as in 0,1; none by default")
+      ->type_name("CARDS");
   command.add_flag("--quiet", options.is_quiet, "Show no progress");
 }
 

@@ -19,6 +19,7 @@ struct RunOptions {
   std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
   Overrides overrides;
   std::optional<unsigned> num_workers;   ///< By default one for each processor.
+  std::string gpus = "none";             ///< Cards of this machine, as for a worker.
   std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
   std::optional<RunRange> part;          ///< Only these runs are computed.
   StopOptions stop;

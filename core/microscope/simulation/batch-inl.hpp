@@ -67,7 +67,7 @@ HWY_INLINE Batch operator/(const Batch& a, const Batch& b) {
 HWY_INLINE Batch operator-(const Batch& a) {
   return map(a, [](V x) HWY_ATTR { return hn::Neg(x); });
 }
-HWY_INLINE Batch sqrt(const Batch& a) {
+HWY_INLINE Batch square_root(const Batch& a) {
   return map(a, [](V x) HWY_ATTR { return hn::Sqrt(x); });
 }
 

@@ -62,13 +62,13 @@ struct Loop {
   bool is_any_saturated = false;  ///< True once a sensor of any lane was beyond its range.
 
   /// Puts the satellite at rest in its reference attitude.
-  void begin(const SessionSignals::Reference& reference) {
+  PROOFMASS_INLINE void begin(const SessionSignals::Reference& reference) {
     attitude_IS = {T(reference.attitude_IR.scalar), broadcast<T>(reference.attitude_IR.vector)};
     omega_IS_S = broadcast<T>(reference.omega_IR_R);
   }
 
   /// Forgets what the loops did while they settled.
-  void begin_record() {
+  PROOFMASS_INLINE void begin_record() {
     largest_acceleration = largest_angle = T(0.0);
     is_any_saturated = false;
   }

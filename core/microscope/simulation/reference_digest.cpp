@@ -1,8 +1,10 @@
 #include "core/microscope/simulation/reference_digest.hpp"
 
 #include <bit>
+#include <memory>
 #include <vector>
 
+#include "core/device.hpp"
 #include "core/math/hash.hpp"
 #include "core/microscope/simulation/run.hpp"
 
@@ -33,20 +35,42 @@ std::vector<std::size_t> batch_sizes(InstructionSet set) {
 
 }  // namespace
 
+namespace {
+
+void add_to(std::uint64_t& hash, const RunResult& result) {
+  const auto add = [&](double value) { hash = fnv1a(hash, std::bit_cast<std::uint64_t>(value)); };
+  for (const double value : result.truth) add(value);
+  for (const double value : result.estimate) add(value);
+}
+
+}  // namespace
+
 std::uint64_t reference_digest(InstructionSet set) {
   const RunPlan plan(reference_campaign());
   std::uint64_t hash = fnv1a_basis;
-  const auto add = [&](double value) { hash = fnv1a(hash, std::bit_cast<std::uint64_t>(value)); };
   std::uint64_t next_run = 0;
   for (const std::size_t size : batch_sizes(set)) {
     std::vector<RunRequest> requests;
     for (std::size_t i = 0; i < size; ++i) requests.push_back({RunIndex{next_run++}, {}});
-    for (const RunResult& result : plan.simulate_batch(requests, set)) {
-      for (const double value : result.truth) add(value);
-      for (const double value : result.estimate) add(value);
-    }
+    for (const RunResult& result : plan.simulate_batch(requests, set)) add_to(hash, result);
   }
   return hash;
+}
+
+std::optional<Model::DeviceProof> prove_device(Device& device) {
+  const RunPlan plan(reference_campaign());
+  if (!plan.runs_on_devices()) return std::nullopt;
+  const std::unique_ptr<DeviceSimulation> simulation = plan.simulation_on(device);
+  std::vector<RunRequest> requests;
+  for (std::uint64_t run = 0; run < batch_lanes; ++run) requests.push_back({RunIndex{run}, {}});
+  simulation->add(0, requests);
+  Model::DeviceProof proof{.digest = fnv1a_basis, .capacity = simulation->capacity()};
+  while (simulation->num_in_flight() > 0) {
+    for (const DeviceSimulation::Ended& ended : simulation->advance()) {
+      for (const RunResult& result : ended.results) add_to(proof.digest, result);
+    }
+  }
+  return proof;
 }
 
 }  // namespace proofmass

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/math/instruction_set.hpp"
+#include "core/model.hpp"
 
 namespace proofmass {
 
@@ -13,5 +15,8 @@ namespace proofmass {
 ///
 /// @param set  One of available_instruction_sets().
 [[nodiscard]] std::uint64_t reference_digest(InstructionSet set);
+
+/// Model::prove(): the digest by a device's kernels, in the launches of every campaign.
+[[nodiscard]] std::optional<Model::DeviceProof> prove_device(Device& device);
 
 }  // namespace proofmass

@@ -13,64 +13,14 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
-#include "core/microscope/simulation/line_fit.hpp"
+#include "core/microscope/simulation/gpu/device_simulation.hpp"
 #include "core/microscope/simulation/recorded_signals.hpp"
 #include "core/microscope/simulation/run_health.hpp"
+#include "core/microscope/simulation/run_parts.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 
 namespace proofmass {
 namespace {
-
-/// Signals that are not recorded stay 0: where lanes are in different sessions they are summed,
-/// too.
-void keep_fit_lines(const SignalSums<double>& sums, SignalSet recorded, SessionPhasors& phasors) {
-  const std::size_t num_recorded = recorded == SignalSet::all ? num_signals : num_common_signals;
-  for (std::size_t s = 0; s < num_recorded; ++s) {
-    const bool is_of_health = s == index(Signal::differential_x) || s == index(Signal::product);
-    if (recorded == SignalSet::health && !is_of_health) continue;
-    for (std::size_t i = 0; i < phasors.num_fit_lines; ++i) {
-      phasors.amplitude[s][i] = {sums[s][2 * i], sums[s][2 * i + 1]};
-    }
-  }
-}
-
-/// Keeps what was recorded beside the session's own lines.
-void keep_further(const FurtherSums<double>& sums, const std::vector<LineGroup>& groups,
-                  std::size_t num_samples, SessionPhasors& phasors) {
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const std::vector<std::size_t>& lines = groups[g].lines;
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-      if (phasors.lines.size() <= lines[i]) phasors.lines.resize(lines[i] + 1);
-      for (std::size_t s = 0; s < num_line_signals; ++s) {
-        phasors.lines[lines[i]][s] = {sums.lines[g][s][2 * i], sums.lines[g][s][2 * i + 1]};
-      }
-    }
-  }
-  for (std::size_t s = 0; s < num_line_bases; ++s) {
-    phasors.means[s] = sums.plain[s] / static_cast<double>(num_samples);
-  }
-}
-
-template <typename Noise>
-SessionHealth to_health(const LaneGroup<double, Noise>& run) {
-  SessionHealth health{.acceleration_m_s2 = run.loop.largest_acceleration,
-                       .attitude_rad = run.loop.largest_angle};
-  set_monitored(run.monitor, health);
-  return health;
-}
-
-/// What is known of a run before it is simulated.
-RunRecord drawn_record(const Scenario& scenario, RunIndex run, const AcceptedDraw& draw) {
-  RunRecord record{
-      .run = run, .num_draws = draw.num_draws, .has_draw = draw.instrument.has_value()};
-  record.phasors.resize(scenario.sessions.size());
-  record.health.resize(scenario.sessions.size());
-  if (draw.instrument) {
-    record.truth =
-        true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
-  }
-  return record;
-}
 
 /// Turns the samples done in a session into the orbits done in the run.
 class SessionProgress {
@@ -106,76 +56,8 @@ bool are_in_range(const ParameterArray& values) { return std::ranges::all_of(val
 
 }  // namespace
 
-struct RunPlan::Impl {
-  Impl(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
-      : campaign(c),
-        method(m),
-        orbit(c.scenario.orbit),
-        environment(campaign.scenario.environment, campaign.environment_table,
-                    c.scenario.orbit.period_s),
-        noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
-        drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
-        attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)),
-        bounds(c.scenario),
-        recording(recording_of(c.scenario, noise)) {
-    weights.reserve(campaign.scenario.sessions.size());
-    residual_weights.resize(campaign.scenario.sessions.size());
-    for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
-      const Session& session = campaign.scenario.sessions[i];
-      weights.emplace_back(line_fit(campaign.scenario, session));
-      const RecordNeeds& asked = needs.emplace_back(method.needs(session));
-      groups.push_back(line_groups(campaign.scenario, session, asked));
-      PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
-      auto& of_groups = group_weights.emplace_back();
-      for (const LineGroup& group : groups.back()) of_groups.emplace_back(group.fit);
-      if (!session.excitations.empty() || is_monitored_before(i)) continue;
-      residual_weights[i].emplace(residual_fit(campaign.scenario, session));
-    }
-  }
-
-  /// True if the loops of a session without excitation are those of one before, which tells enough.
-  [[nodiscard]] bool is_monitored_before(std::size_t i) const {
-    const Session& session = campaign.scenario.sessions[i];
-    for (std::size_t k = 0; k < i; ++k) {
-      const Session& before = campaign.scenario.sessions[k];
-      if (is_quiet(k) && before.spin_rate_rad_s == session.spin_rate_rad_s &&
-          before.drag_free == session.drag_free) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  [[nodiscard]] bool is_quiet(std::size_t i) const { return residual_weights[i].has_value(); }
-
-  /// Makes the weights of a session, block by block.
-  struct Readers {
-    explicit Readers(const Impl& impl, std::size_t i)
-        : lines(impl.weights[i]),
-          buffer(weights_buffer_size(lines.weights().num_fit_lines(), impl.groups[i].size())) {
-      for (std::size_t g = 0; g < impl.groups[i].size(); ++g) {
-        further.push_back({WeightReader(impl.group_weights[i][g]), impl.groups[i][g].signals});
-      }
-      if (impl.is_quiet(i)) residual.emplace(*impl.residual_weights[i]);
-    }
-    WeightReader lines;
-    std::vector<LineReader> further;  ///< Of the lines that the method asks for.
-    std::vector<double> buffer;
-    std::optional<WeightReader> residual;  ///< Of a session that is monitored.
-  };
-
-  [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const {
-    const Session& session = campaign.scenario.sessions[i];
-    return {
-        .masses = mass_excitation(session) == nullptr ? TestMasses::at_rest : TestMasses::moving,
-        .reader = &readers.lines,
-        .drag_free = drag_free,
-        .attitude = attitude,
-        .product = target_info(session.target).product,
-        .signals = needs[i].signals,
-        .line_readers = readers.further,
-        .residual_reader = readers.residual ? &*readers.residual : nullptr};
-  }
+struct RunPlan::Impl : RunParts {
+  using RunParts::RunParts;
 
   /// @param observer  Null if nobody observes the run.
   void record_session_of_run(std::size_t i, const Instrument& instrument,
@@ -210,19 +92,7 @@ struct RunPlan::Impl {
     Readers readers(*this, i);
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
-    keep(i, {alone.sums, to_health(alone), alone.further}, record);
-  }
-
-  /// Keeps what a session left of a run.
-  void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
-    SessionPhasors& phasors = record.phasors[i];
-    phasors.num_fit_lines = weights[i].num_fit_lines();
-    keep_fit_lines(outcome.sums, needs[i].signals, phasors);
-    if (!groups[i].empty()) {
-      keep_further(outcome.further, groups[i], weights[i].num_samples(), phasors);
-    }
-    record.health[i] = outcome.health;
-    record.health[i].is_quiet = is_quiet(i);
+    keep(i, {alone.sums, session_health(alone.loop, alone.monitor), alone.further}, record);
   }
 
   /// A session of a batch, with all that it is computed from.
@@ -243,12 +113,12 @@ struct RunPlan::Impl {
                 .progress = SessionProgress::report_to,
                 .progress_context = &progress} {
       const Session& session = impl.campaign.scenario.sessions[i];
+      const NoiseStreams starts = start_streams(session.name);
       for (std::size_t l = 0; l < batch_lanes; ++l) {
         const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
         batch.runs[l] = lane.run;
         batch.constants[l] = make_loop_constants(lane.instrument, impl.campaign.scenario, session);
-        batch.noise_states[l] =
-            stationary_states(impl.noise, impl.campaign.seed, lane.run, session.name);
+        batch.noise_states[l] = stationary_states(impl.noise, impl.campaign.seed, lane.run, starts);
       }
     }
     SessionOfBatch(const SessionOfBatch&) = delete;
@@ -302,21 +172,6 @@ struct RunPlan::Impl {
     return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 &&
            std::ranges::all_of(groups, [](const auto& further) { return further.empty(); });
   }
-
-  MicroscopeCampaign campaign;
-  EstimationMethodInfo method;
-  KeplerOrbit orbit;
-  Environment environment;
-  NoiseModel noise;
-  DragFreeGains drag_free;
-  AttitudeGains attitude;
-  ShiftBounds bounds;
-  Recording recording;
-  std::vector<LineWeights> weights;                          ///< Of each session.
-  std::vector<RecordNeeds> needs;                            ///< Of each session.
-  std::vector<std::vector<LineGroup>> groups;                ///< Of each session's further lines.
-  std::vector<std::vector<LineWeights>> group_weights;       ///< Of those groups.
-  std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
 };
 
 RunPlan::RunPlan(const MicroscopeCampaign& campaign)
@@ -349,7 +204,7 @@ RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_valu
                                 const std::function<void(int)>& progress) const {
   const Scenario& scenario = impl_->campaign.scenario;
   const AcceptedDraw draw = draw_instrument(impl_->campaign, run, table_values);
-  RunRecord recorded = drawn_record(scenario, run, draw);
+  RunRecord recorded = impl_->drawn_record(run, draw);
   if (!draw.instrument) return recorded;
   SessionProgress sessions(scenario, progress);
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
@@ -372,6 +227,12 @@ RunResult RunPlan::replay(const RunRequest& request, const SampleSink& sink,
 }
 
 const Recording& RunPlan::recording() const { return impl_->recording; }
+
+bool RunPlan::runs_on_devices() const { return gpu::can_simulate(*impl_); }
+
+std::unique_ptr<DeviceSimulation> RunPlan::simulation_on(Device& device) const {
+  return std::make_unique<gpu::MicroscopeDeviceSimulation>(*this, *impl_, device);
+}
 
 std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> requests,
                                                InstructionSet set,
@@ -404,7 +265,7 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const auto& [run, table_values] = requests[i];
     const AcceptedDraw draw = draw_instrument(impl_->campaign, run, table_values);
-    records.push_back(drawn_record(impl_->campaign.scenario, run, draw));
+    records.push_back(impl_->drawn_record(run, draw));
     if (draw.instrument) lanes.push_back({.run = run, .instrument = *draw.instrument, .index = i});
   }
   if (lanes.empty()) return records;

@@ -92,6 +92,8 @@ class RunPlan final : public Plan {
   [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink& sink,
                                  const std::function<void(int)>& progress = {}) const override;
   [[nodiscard]] const Recording& recording() const override;
+  [[nodiscard]] bool runs_on_devices() const override;
+  [[nodiscard]] std::unique_ptr<DeviceSimulation> simulation_on(Device& device) const override;
 
   /// Of all sessions together.
   [[nodiscard]] int num_orbits() const;

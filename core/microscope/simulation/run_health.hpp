@@ -97,6 +97,15 @@ inline void set_monitored(const LoopMonitor<double>& monitor, SessionHealth& hea
   health.residual = monitor.residual;
 }
 
+/// What is kept of a session whose loops and monitor ended so.
+[[nodiscard]] inline SessionHealth session_health(const Loop<double>& loop,
+                                                  const LoopMonitor<double>& monitor) {
+  SessionHealth health{.acceleration_m_s2 = loop.largest_acceleration,
+                       .attitude_rad = loop.largest_angle};
+  set_monitored(monitor, health);
+  return health;
+}
+
 /// What is kept of the sessions of a run, in the scenario's order.
 using HealthRecord = std::vector<SessionHealth>;
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/microscope/control/star_tracker.hpp"
-#include "core/random/normal.hpp"
+#include "core/random/normal_deviates.hpp"
 
 namespace proofmass {
 namespace {
@@ -60,11 +60,6 @@ NoiseStreams noise_streams(std::string_view session_name) {
 
 namespace {
 
-const NoiseShape& shape_of(const NoiseModel& model, std::size_t channel) {
-  if (channel >= 6) return model.angular;
-  return channel % 3 == 0 ? model.linear_x : model.linear_yz;
-}
-
 NoiseState<double> stationary_state(const NoiseShape& shape, const RandomStream& stream) {
   const std::size_t n = shape.num_states();
   std::array<double, NoiseShape::num_poles_max> normals{};
@@ -87,13 +82,21 @@ NoiseState<double> stationary_state(const NoiseShape& shape, const RandomStream&
 
 }  // namespace
 
+NoiseStreams start_streams(std::string_view session_name) {
+  NoiseStreams streams{};
+  for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
+    streams[channel] =
+        stream_id(fmt::format("session/{}/{}/start", session_name, noise_channel_names()[channel]));
+  }
+  return streams;
+}
+
 NoiseStates<double> stationary_states(const NoiseModel& model, std::uint64_t seed, RunIndex run,
-                                      std::string_view session_name) {
+                                      const NoiseStreams& starts) {
   NoiseStates<double> states;
   for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
-    const std::uint32_t id =
-        stream_id(fmt::format("session/{}/{}/start", session_name, noise_channel_names()[channel]));
-    states[channel] = stationary_state(shape_of(model, channel), RandomStream(seed, run, id));
+    states[channel] =
+        stationary_state(shape_of(model, channel), RandomStream(seed, run, starts[channel]));
   }
   return states;
 }
@@ -104,7 +107,7 @@ SessionNoise::SessionNoise(const NoiseModel& model, std::uint64_t seed, RunIndex
       seed_(seed),
       run_(run),
       streams_(noise_streams(session_name)),
-      states_(stationary_states(model, seed, run, session_name)) {}
+      states_(stationary_states(model, seed, run, start_streams(session_name))) {}
 
 const SampleNoise<double>& SessionNoise::next() {
   if (next_in_block_ == samples_per_noise_block) {

@@ -47,22 +47,24 @@ inline constexpr std::size_t samples_per_noise_block = 4;
 template <typename T>
 using OfSamples = std::array<T, samples_per_noise_block>;
 
-/// Memory of a NoiseShape. It is driven by a white sequence of unit variance and does not depend on
-/// noise.scale.
+/// Memory of a NoiseFilter. It is driven by a white sequence of unit variance and does not depend
+/// on noise.scale.
 template <typename T>
 struct NoiseState {
-  std::array<T, NoiseShape::num_poles_max> real{};
+  std::array<T, NoiseFilter::num_poles_max> real{};
   T pair_real{};
   T pair_imaginary{};
 
   /// The next values, from the next of a white sequence of unit variance. Pole by pole, so that the
   /// state and the coefficients of a pole are read once for all samples.
-  PROOFMASS_INLINE OfSamples<T> advance(const NoiseShape& shape, const OfSamples<T>& white) {
+  /// @tparam Filter  NoiseFilter, or one whose number of poles the compiler knows.
+  template <typename Filter>
+  PROOFMASS_INLINE OfSamples<T> advance(const Filter& filter, const OfSamples<T>& white) {
     OfSamples<T> sum;
-    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] = T(shape.gain) * white[k];
-    for (std::size_t i = 0; i < shape.num_real; ++i) {
-      const T coefficient = T(shape.coefficient[i]);
-      const T pole = T(shape.pole[i]);
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] = T(filter.gain) * white[k];
+    for (std::size_t i = 0; i < filter.num_real; ++i) {
+      const T coefficient = T(filter.coefficient[i]);
+      const T pole = T(filter.pole[i]);
       T state = real[i];
       for (std::size_t k = 0; k < sum.size(); ++k) {
         sum[k] = sum[k] + coefficient * state;
@@ -70,17 +72,18 @@ struct NoiseState {
       }
       real[i] = state;
     }
-    if (shape.has_pair) advance_pair(shape, white, sum);
+    if (filter.has_pair) advance_pair(filter, white, sum);
     return sum;
   }
 
  private:
-  PROOFMASS_INLINE void advance_pair(const NoiseShape& shape, const OfSamples<T>& white,
+  template <typename Filter>
+  PROOFMASS_INLINE void advance_pair(const Filter& filter, const OfSamples<T>& white,
                                      OfSamples<T>& sum) {
-    const T twice_real = T(2.0 * shape.pair_coefficient.real());
-    const T twice_imaginary = T(2.0 * shape.pair_coefficient.imag());
-    const T pole_real = T(shape.pair_pole.real());
-    const T pole_imaginary = T(shape.pair_pole.imag());
+    const T twice_real = T(2.0 * filter.pair_coefficient.real());
+    const T twice_imaginary = T(2.0 * filter.pair_coefficient.imag());
+    const T pole_real = T(filter.pair_pole.real());
+    const T pole_imaginary = T(filter.pair_pole.imag());
     for (std::size_t k = 0; k < sum.size(); ++k) {
       sum[k] = sum[k] + twice_real * pair_real - twice_imaginary * pair_imaginary;
       const T rotated = pole_real * pair_real - pole_imaginary * pair_imaginary + white[k];
@@ -93,41 +96,48 @@ struct NoiseState {
 template <typename T>
 using NoiseStates = std::array<NoiseState<T>, num_coloured_channels>;
 
+/// The filter of a coloured channel.
+[[nodiscard]] inline const NoiseShape& shape_of(const NoiseModel& model, std::size_t channel) {
+  if (channel >= 6) return model.angular;
+  return channel % 3 == 0 ? model.linear_x : model.linear_yz;
+}
+
+/// Where a coloured channel's value goes: x, y, z of each sensor, then of the angular measurement.
+template <typename T>
+PROOFMASS_INLINE T& coloured_place(SampleNoise<T>& noise, std::size_t channel) {
+  return (channel < 6 ? noise.sensor_K[channel / 3] : noise.angular_S)[channel % 3];
+}
+
+/// Sets the noise of the channels without colour.
+/// @tparam Levels  NoiseModel, or what has its levels.
+/// @param white    white(c) yields the deviate of channel c, for c from num_coloured_channels on.
+template <typename T, typename Levels, typename White>
+PROOFMASS_INLINE void set_white(const Levels& levels, const White& white, SampleNoise<T>& noise) {
+  const Vector3<T> star{white(9), white(10), white(11)};
+  const auto& factor = levels.star_tracker_factor;
+  noise.star_tracker_S = {T(factor[0]) * star.x, T(factor[1]) * star.x + T(factor[2]) * star.y,
+                          T(factor[3]) * star.x + T(factor[4]) * star.y + T(factor[5]) * star.z};
+  noise.thrust_S = T(levels.thrust_deviation) * Vector3<T>{white(12), white(13), white(14)};
+  noise.torque_S = T(levels.torque_deviation) * Vector3<T>{white(15), white(16), white(17)};
+}
+
 /// The noise of a block of samples from white numbers.
 /// @param white  white(c) yields the next deviates of channel c as OfSamples<T>.
 template <typename T, typename White>
 PROOFMASS_INLINE void shape_block(const NoiseModel& model, NoiseStates<T>& states,
                                   const White& white, OfSamples<SampleNoise<T>>& block) {
-  const auto put = [&](const OfSamples<T>& values, const auto& place) {
-    for (std::size_t k = 0; k < values.size(); ++k) place(block[k]) = values[k];
-  };
-  const auto shape = [&](std::size_t channel, const NoiseShape& by, const auto& place) {
-    put(states[channel].advance(by, white(channel)), place);
-  };
-  using Noise = SampleNoise<T>;
-  for (std::size_t k = 0; k < 2; ++k) {
-    shape(3 * k, model.linear_x, [k](Noise& n) -> T& { return n.sensor_K[k].x; });
-    shape(3 * k + 1, model.linear_yz, [k](Noise& n) -> T& { return n.sensor_K[k].y; });
-    shape(3 * k + 2, model.linear_yz, [k](Noise& n) -> T& { return n.sensor_K[k].z; });
+  for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
+    const OfSamples<T> values =
+        states[channel].template advance<NoiseFilter>(shape_of(model, channel), white(channel));
+    for (std::size_t k = 0; k < values.size(); ++k) coloured_place(block[k], channel) = values[k];
   }
-  shape(6, model.angular, [](Noise& n) -> T& { return n.angular_S.x; });
-  shape(7, model.angular, [](Noise& n) -> T& { return n.angular_S.y; });
-  shape(8, model.angular, [](Noise& n) -> T& { return n.angular_S.z; });
-
-  const auto triple = [&](std::size_t first) {
-    const OfSamples<T> x = white(first), y = white(first + 1), z = white(first + 2);
-    OfSamples<Vector3<T>> triples;
-    for (std::size_t k = 0; k < triples.size(); ++k) triples[k] = {x[k], y[k], z[k]};
-    return triples;
-  };
-  const std::array<double, 6>& factor = model.star_tracker_factor;
-  const OfSamples<Vector3<T>> star = triple(9), thrust = triple(12), torque = triple(15);
+  std::array<OfSamples<T>, num_noise_channels> rest;
+  for (std::size_t channel = num_coloured_channels; channel < rest.size(); ++channel) {
+    rest[channel] = white(channel);
+  }
   for (std::size_t k = 0; k < block.size(); ++k) {
-    block[k].star_tracker_S = {
-        T(factor[0]) * star[k].x, T(factor[1]) * star[k].x + T(factor[2]) * star[k].y,
-        T(factor[3]) * star[k].x + T(factor[4]) * star[k].y + T(factor[5]) * star[k].z};
-    block[k].thrust_S = T(model.thrust_deviation) * thrust[k];
-    block[k].torque_S = T(model.torque_deviation) * torque[k];
+    set_white(
+        model, [&](std::size_t channel) { return rest[channel][k]; }, block[k]);
   }
 }
 
@@ -139,10 +149,14 @@ PROOFMASS_INLINE void shape_block(const NoiseModel& model, NoiseStates<T>& state
 using NoiseStreams = std::array<std::uint32_t, num_noise_channels>;
 [[nodiscard]] NoiseStreams noise_streams(std::string_view session_name);
 
-/// Stationary states of a run's coloured channels at the start of a session, drawn from the streams
-/// `session/s/c/start`.
+/// Streams that the states at the start of a session are drawn from: `session/s/c/start`, for the
+/// coloured channels.
+[[nodiscard]] NoiseStreams start_streams(std::string_view session_name);
+
+/// Stationary states of a run's coloured channels at the start of a session.
+/// @param starts  start_streams() of the session, whose names take longer than the states.
 [[nodiscard]] NoiseStates<double> stationary_states(const NoiseModel& model, std::uint64_t seed,
-                                                    RunIndex run, std::string_view session_name);
+                                                    RunIndex run, const NoiseStreams& starts);
 
 /// The noise of one session of one run, sample after sample, started in its stationary state.
 /// Channel c of session s draws from the stream `session/s/c`; four samples share a block.

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "core/math/inline.hpp"
 #include "core/microscope/session/session.hpp"
@@ -245,6 +247,34 @@ struct SampleKind {
   RecordedLines lines = RecordedLines::own;
 };
 
+/// The sample loops that are compiled, for processors and GPUs. Each session of the paper's
+/// campaign has one that computes what it needs and no more, except for the one that is monitored;
+/// the last one covers all others. A loop for each combination would take the compiler minutes.
+inline constexpr std::array sample_kinds{
+    SampleKind{.monitoring = Monitoring::on},
+    SampleKind{TestMasses::moving, SignalSet::common},
+    SampleKind{TestMasses::at_rest, SignalSet::common, false},
+    SampleKind{TestMasses::at_rest, SignalSet::common},
+    SampleKind{TestMasses::at_rest, SignalSet::all, false},
+    SampleKind{},
+};
+inline constexpr std::size_t monitored_kind = 0;
+inline constexpr std::size_t general_kind = sample_kinds.size() - 1;
+
+/// Index of the kind that takes the least time for a session.
+[[nodiscard]] constexpr std::size_t sample_kind_for(TestMasses masses, SignalSet signals,
+                                                    Product product, Monitoring monitoring) {
+  if (monitoring == Monitoring::on) return monitored_kind;
+  const bool has_product = product != Product::none;
+  for (std::size_t i = monitored_kind + 1; i < general_kind; ++i) {
+    const SampleKind& kind = sample_kinds[i];
+    if (kind.masses == masses && kind.signals == signals && (kind.has_product || !has_product)) {
+      return i;
+    }
+  }
+  return general_kind;
+}
+
 /// Advances all groups by some samples.
 /// @tparam kind     Covers what `setup` asks for.
 /// @param weights   Of these samples; none while the loops settle, when nothing is summed.
@@ -284,39 +314,28 @@ template <typename Signals, typename Group, typename Observer>
 using AdvanceGroups = void (*)(Signals&, const SessionSetup&, std::span<Group>, std::size_t,
                                const BlockWeights&, Observer&);
 
-/// The compiled loop for a session. Each session of the paper's campaign has one that computes what
-/// it needs and no more, except for the one that is monitored; the last one covers all others.
-/// Where further lines are recorded, two loops serve all sessions. A loop for each combination
-/// would take the compiler minutes.
+/// The compiled loop for a session. Where further lines are recorded, two loops serve all sessions.
 template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
-  using enum SignalSet;
   if (!setup.line_readers.empty()) {
     constexpr SampleKind kind{.monitoring = Monitoring::on, .lines = RecordedLines::further};
-    constexpr SampleKind kind_at_rest{at_rest, all, true, kind.monitoring, kind.lines};
+    constexpr SampleKind kind_at_rest{at_rest, SignalSet::all, true, kind.monitoring, kind.lines};
     return setup.masses == moving ? advance_groups<kind, Signals, Group, Observer>
                                   : advance_groups<kind_at_rest, Signals, Group, Observer>;
   }
-  if (setup.residual_reader != nullptr) {
-    return advance_groups<SampleKind{.monitoring = Monitoring::on}, Signals, Group, Observer>;
+  const Monitoring monitoring = setup.residual_reader != nullptr ? Monitoring::on : Monitoring::off;
+  const std::size_t wanted =
+      sample_kind_for(setup.masses, setup.signals, setup.product, monitoring);
+  return [&]<std::size_t... i>(std::index_sequence<i...>) {
+    constexpr auto compiled = [](std::size_t kind) {
+      return Observer::is_active && kind != monitored_kind ? general_kind : kind;
+    };
+    constexpr std::array loops{
+        &advance_groups<sample_kinds[compiled(i)], Signals, Group, Observer>...};
+    return loops[wanted];
   }
-  if constexpr (!Observer::is_active) {
-    const bool has_product = setup.product != Product::none;
-    if (setup.masses == moving && setup.signals == common) {
-      return advance_groups<SampleKind{moving, common}, Signals, Group, Observer>;
-    }
-    if (setup.masses == at_rest && setup.signals == common && has_product) {
-      return advance_groups<SampleKind{at_rest, common}, Signals, Group, Observer>;
-    }
-    if (setup.masses == at_rest && setup.signals == common) {
-      return advance_groups<SampleKind{at_rest, common, false}, Signals, Group, Observer>;
-    }
-    if (setup.masses == at_rest && !has_product) {
-      return advance_groups<SampleKind{at_rest, all, false}, Signals, Group, Observer>;
-    }
-  }
-  return advance_groups<SampleKind{}, Signals, Group, Observer>;
+  (std::make_index_sequence<sample_kinds.size()>());
 }
 
 /// Writes the weights of a block: first those of the lines to be fitted, then those at f_EP if the

@@ -1,4 +1,4 @@
-#include "core/random/normal.hpp"
+#include "core/random/normal_deviates.hpp"
 
 #include <gtest/gtest.h>
 

@@ -23,7 +23,7 @@
 #include "core/definition/document.hpp"
 #include "core/math/elementary.hpp"
 #include "core/model.hpp"
-#include "core/random/normal.hpp"
+#include "core/random/normal_deviates.hpp"
 #include "core/random/stream.hpp"
 
 namespace proofmass {

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/run_result.hpp"
+
+namespace proofmass {
+
+/// A device failed, or lacks what is asked of it. What it computed counts for nothing.
+class DeviceError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// An accelerator with memory and a queue of kernels of its own, as far as a simulation needs one.
+/// One thread uses it. Every function throws DeviceError if the device fails.
+class Device {
+ public:
+  using Address = std::uint64_t;
+
+  virtual ~Device() = default;
+
+  /// Has the kernels of a program, whose names launch() takes. They are in PTX.
+  virtual void load(std::string_view program) = 0;
+
+  /// Blocks of a kernel that are computed at the same time.
+  [[nodiscard]] virtual std::size_t num_resident_blocks(std::string_view kernel,
+                                                        std::size_t num_threads,
+                                                        std::size_t shared_bytes) = 0;
+  /// Memory that nobody uses, bytes.
+  [[nodiscard]] virtual std::size_t free_bytes() = 0;
+
+  /// Memory that lives as long as the device, or until all is released.
+  [[nodiscard]] virtual Address allocate(std::size_t num_bytes) = 0;
+  virtual void release_all() = 0;
+
+  /// Copy at once, beside the kernels that run.
+  virtual void copy_in(Address to, std::span<const std::byte> from) = 0;
+  virtual void copy_out(std::span<std::byte> to, Address from) = 0;
+
+  /// Which of two queues a kernel waits in; each runs its kernels one after the other. Where both
+  /// have one, blocks of that in the second queue begin first.
+  enum class Queue : std::uint8_t { first, second };
+
+  struct Launch {
+    std::string_view kernel;
+    std::size_t num_blocks = 0;
+    std::size_t num_blocks_y = 1;
+    std::size_t num_threads = 0;       ///< Of a block.
+    std::size_t shared_bytes = 0;      ///< Of a block.
+    std::span<void* const> arguments;  ///< Pointers to the kernel's arguments.
+  };
+  virtual void launch(Queue queue, const Launch& launch) = 0;
+
+  /// A point in a queue, after what was launched so far.
+  using Mark = std::size_t;
+  static constexpr Mark num_marks = 8;
+  virtual void set(Mark mark, Queue queue) = 0;
+  virtual void wait_in(Queue queue, Mark mark) = 0;  ///< Before what is launched next.
+  virtual void wait(Mark mark) = 0;
+};
+
+/// Runs of a campaign in flight on a device.
+class DeviceSimulation {
+ public:
+  virtual ~DeviceSimulation() = default;
+
+  /// Runs that are best added together.
+  [[nodiscard]] virtual std::size_t group_size() const = 0;
+  /// Runs that keep the device busy: so many are best in flight.
+  [[nodiscard]] virtual std::size_t capacity() const = 0;
+  [[nodiscard]] virtual std::size_t num_in_flight() const = 0;
+
+  /// @param group     A number for these runs that no others in flight have.
+  /// @param requests  At least one, at most group_size().
+  virtual void add(std::uint64_t group, std::span<const RunRequest> requests) = 0;
+  /// Steps that each run of a group in flight has done, as Plan::num_steps() counts them.
+  [[nodiscard]] virtual int num_steps_done(std::uint64_t group) const = 0;
+
+  struct Ended {
+    std::uint64_t group = 0;
+    std::vector<RunResult> results;  ///< The same bits as of Plan::simulate_batch(), in its order.
+  };
+  /// Goes on for some milliseconds.
+  /// @return The groups that ended.
+  [[nodiscard]] virtual std::vector<Ended> advance() = 0;
+};
+
+}  // namespace proofmass

@@ -1,0 +1,115 @@
+#include "core/microscope/simulation/run_parts.hpp"
+
+#include "core/error.hpp"
+#include "core/microscope/simulation/line_fit.hpp"
+
+namespace proofmass {
+namespace {
+
+/// Signals that are not recorded stay 0: where lanes are in different sessions they are summed,
+/// too.
+void keep_fit_lines(const SignalSums<double>& sums, SignalSet recorded, SessionPhasors& phasors) {
+  const std::size_t num_recorded = recorded == SignalSet::all ? num_signals : num_common_signals;
+  for (std::size_t s = 0; s < num_recorded; ++s) {
+    const bool is_of_health = s == index(Signal::differential_x) || s == index(Signal::product);
+    if (recorded == SignalSet::health && !is_of_health) continue;
+    for (std::size_t i = 0; i < phasors.num_fit_lines; ++i) {
+      phasors.amplitude[s][i] = {sums[s][2 * i], sums[s][2 * i + 1]};
+    }
+  }
+}
+
+/// Keeps what was recorded beside the session's own lines.
+void keep_further(const FurtherSums<double>& sums, const std::vector<LineGroup>& groups,
+                  std::size_t num_samples, SessionPhasors& phasors) {
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const std::vector<std::size_t>& lines = groups[g].lines;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      if (phasors.lines.size() <= lines[i]) phasors.lines.resize(lines[i] + 1);
+      for (std::size_t s = 0; s < num_line_signals; ++s) {
+        phasors.lines[lines[i]][s] = {sums.lines[g][s][2 * i], sums.lines[g][s][2 * i + 1]};
+      }
+    }
+  }
+  for (std::size_t s = 0; s < num_line_bases; ++s) {
+    phasors.means[s] = sums.plain[s] / static_cast<double>(num_samples);
+  }
+}
+
+}  // namespace
+
+RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
+    : campaign(c),
+      method(m),
+      orbit(c.scenario.orbit),
+      environment(campaign.scenario.environment, campaign.environment_table,
+                  c.scenario.orbit.period_s),
+      noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
+      drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
+      attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)),
+      bounds(c.scenario),
+      recording(recording_of(c.scenario, noise)) {
+  weights.reserve(campaign.scenario.sessions.size());
+  residual_weights.resize(campaign.scenario.sessions.size());
+  for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
+    const Session& session = campaign.scenario.sessions[i];
+    weights.emplace_back(line_fit(campaign.scenario, session));
+    const RecordNeeds& asked = needs.emplace_back(method.needs(session));
+    groups.push_back(line_groups(campaign.scenario, session, asked));
+    PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
+    auto& of_groups = group_weights.emplace_back();
+    for (const LineGroup& group : groups.back()) of_groups.emplace_back(group.fit);
+    if (!session.excitations.empty() || is_monitored_before(i)) continue;
+    residual_weights[i].emplace(residual_fit(campaign.scenario, session));
+  }
+}
+
+bool RunParts::is_monitored_before(std::size_t i) const {
+  const Session& session = campaign.scenario.sessions[i];
+  for (std::size_t k = 0; k < i; ++k) {
+    const Session& before = campaign.scenario.sessions[k];
+    if (is_quiet(k) && before.spin_rate_rad_s == session.spin_rate_rad_s &&
+        before.drag_free == session.drag_free) {
+      return true;
+    }
+  }
+  return false;
+}
+
+SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
+  const Session& session = campaign.scenario.sessions[i];
+  return {.masses = mass_excitation(session) == nullptr ? TestMasses::at_rest : TestMasses::moving,
+          .reader = &readers.lines,
+          .drag_free = drag_free,
+          .attitude = attitude,
+          .product = target_info(session.target).product,
+          .signals = needs[i].signals,
+          .line_readers = readers.further,
+          .residual_reader = readers.residual ? &*readers.residual : nullptr};
+}
+
+RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {
+  const Scenario& scenario = campaign.scenario;
+  RunRecord record{
+      .run = run, .num_draws = draw.num_draws, .has_draw = draw.instrument.has_value()};
+  record.phasors.resize(scenario.sessions.size());
+  record.health.resize(scenario.sessions.size());
+  if (draw.instrument) {
+    record.truth =
+        true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+  }
+  return record;
+}
+
+void RunParts::keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
+  SessionPhasors& phasors = record.phasors[i];
+  phasors.num_fit_lines = weights[i].num_fit_lines();
+  keep_fit_lines(outcome.sums, needs[i].signals, phasors);
+  if (!groups[i].empty()) {
+    keep_further(outcome.further, groups[i], weights[i].num_samples(), phasors);
+  }
+  record.health[i] = outcome.health;
+  record.health[i].is_quiet = is_quiet(i);
+}
+
+}  // namespace proofmass

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/campaign/shift_bounds.hpp"
+#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/estimation/methods.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
+#include "core/microscope/simulation/line_fit.hpp"
+#include "core/microscope/simulation/recorded_signals.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "core/microscope/simulation/sample_noise.hpp"
+#include "core/microscope/simulation/session_record.hpp"
+#include "core/signal/line_weights.hpp"
+
+namespace proofmass {
+
+/// What all runs of a campaign share, for those that simulate them: filters, weights, orbit,
+/// environment. Sessions are given by their index in the scenario.
+struct RunParts {
+  /// @pre campaign.validate() passed, and so did m.check() for its sessions.
+  RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m);
+
+  /// True if the session is monitored.
+  [[nodiscard]] bool is_quiet(std::size_t i) const { return residual_weights[i].has_value(); }
+
+  /// Makes the weights of a session, block by block.
+  struct Readers {
+    Readers(const RunParts& parts, std::size_t i)
+        : lines(parts.weights[i]),
+          buffer(weights_buffer_size(lines.weights().num_fit_lines(), parts.groups[i].size())) {
+      for (std::size_t g = 0; g < parts.groups[i].size(); ++g) {
+        further.push_back({WeightReader(parts.group_weights[i][g]), parts.groups[i][g].signals});
+      }
+      if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
+    }
+    WeightReader lines;
+    std::vector<LineReader> further;  ///< Of the lines that the method asks for.
+    std::vector<double> buffer;
+    std::optional<WeightReader> residual;  ///< Of a session that is monitored.
+  };
+
+  [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const;
+
+  /// What is known of a run before it is simulated.
+  [[nodiscard]] RunRecord drawn_record(RunIndex run, const AcceptedDraw& draw) const;
+
+  /// Keeps what a session left of a run.
+  void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const;
+
+  MicroscopeCampaign campaign;
+  EstimationMethodInfo method;
+  KeplerOrbit orbit;
+  Environment environment;
+  NoiseModel noise;
+  DragFreeGains drag_free;
+  AttitudeGains attitude;
+  ShiftBounds bounds;
+  Recording recording;
+  std::vector<LineWeights> weights;                          ///< Of each session.
+  std::vector<RecordNeeds> needs;                            ///< Of each session.
+  std::vector<std::vector<LineGroup>> groups;                ///< Of each session's further lines.
+  std::vector<std::vector<LineWeights>> group_weights;       ///< Of those groups.
+  std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
+
+ private:
+  /// True if the loops of a session without excitation are those of one before, which tells enough.
+  [[nodiscard]] bool is_monitored_before(std::size_t i) const;
+};
+
+}  // namespace proofmass

@@ -1,0 +1,170 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <future>
+#include <map>
+#include <utility>
+
+#include "core/math/hash.hpp"
+#include "core/model.hpp"
+#include "worker/execution/executor.hpp"
+
+// How an executor serves a device: runs flow through it group by group, and the thread looks after
+// it every few milliseconds.
+
+namespace proofmass::worker {
+namespace {
+
+/// A few runs take a device as long as many, and the processors beside it are faster with them.
+constexpr std::size_t runs_worth_a_device = 256;
+
+bool are_same(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
+  return std::ranges::equal(a, b, {}, bits, bits);
+}
+
+/// To the bit.
+bool are_same(const RunResult& a, const RunResult& b) {
+  return a.run == b.run && a.status == b.status && a.num_draws == b.num_draws &&
+         a.num_rounds == b.num_rounds && a.loss == b.loss && are_same(a.truth, b.truth) &&
+         are_same(a.estimate, b.estimate) && are_same(a.standard_error, b.standard_error) &&
+         are_same(a.health, b.health);
+}
+
+/// Whether a run is one of those to be checked: as good as at random, and the same every time.
+bool is_checked(RunIndex run, double fraction) {
+  const auto number = static_cast<double>(fnv1a(fnv1a_basis, run.value) >> 11);
+  return number * 0x1p-53 < fraction;
+}
+
+/// Computes some of a device's runs again, on a thread of its own so that the device goes on.
+class DeviceCheck {
+ public:
+  DeviceCheck(const Simulate& simulate, double fraction)
+      : simulate_(simulate), fraction_(fraction) {}
+
+  void add(const std::vector<RunRequest>& requests, const std::vector<RunResult>& results) {
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      if (is_checked(results[i].run, fraction_)) waiting_.push_back({requests[i], results[i]});
+    }
+  }
+
+  /// @throws DeviceError if the device was wrong.
+  void go_on() {
+    using namespace std::chrono_literals;
+    if (running_.valid()) {
+      if (running_.wait_for(0s) != std::future_status::ready) return;
+      running_.get();
+    }
+    if (waiting_.empty()) return;
+    const std::size_t count = std::min(waiting_.size(), model().batch_size());
+    std::vector<Run> runs(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
+    waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
+    running_ = std::async(std::launch::async, [this, runs = std::move(runs)] { check(runs); });
+  }
+
+  /// All that is left.
+  void end() {
+    while (running_.valid() || !waiting_.empty()) {
+      if (running_.valid()) running_.get();
+      go_on();
+    }
+  }
+
+ private:
+  struct Run {
+    RunRequest request;
+    RunResult result;
+  };
+
+  void check(const std::vector<Run>& runs) const {
+    std::vector<RunRequest> requests;
+    for (const Run& run : runs) requests.push_back(run.request);
+    const std::vector<RunResult> again = simulate_(requests, [](int) {});
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      if (are_same(again[i], runs[i].result)) continue;
+      throw DeviceError(fmt::format(
+          "run {} differs between device and processor: the device or its driver is broken, and no "
+          "run of this worker can be trusted",
+          runs[i].request.run.value));
+    }
+  }
+
+  const Simulate& simulate_;
+  double fraction_;
+  std::vector<Run> waiting_;
+  std::future<void> running_;
+};
+
+}  // namespace
+
+void Executor::serve_device(Device& device) {
+  serve([&] {
+    std::shared_ptr<Batch> batch = next_batch_for_device();
+    const bool is_served = batch != nullptr;
+    if (is_served) compute_on(device, std::move(batch));
+    return is_served;
+  });
+}
+
+std::shared_ptr<Executor::Batch> Executor::next_batch_for_device() {
+  const auto is_for_devices = [this](wire::CampaignId campaign) {
+    return is_ready(campaign) && campaigns_.at(campaign).prepared->simulate_on != nullptr;
+  };
+  std::unique_lock lock(mutex_);
+  while (!is_ending_ && !failure_) {
+    Assignment assignment =
+        queue_.take_for_device(runs_worth_a_device, runs_worth_a_device / 2, is_for_devices);
+    if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
+    changed_.wait(lock);
+  }
+  return nullptr;
+}
+
+std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
+                                                           std::size_t size_max) {
+  const wire::CampaignId campaign = batch.assignment.campaign;
+  const std::unique_lock lock(mutex_);
+  if (is_ending_ || failure_) return nullptr;
+  const auto is_ready_now = [this](wire::CampaignId other) { return is_ready(other); };
+  if (queue_.first_campaign(is_ready_now) != campaign) return nullptr;
+  Assignment assignment = queue_.take_for_device(
+      1, size_max, [&](wire::CampaignId other) { return other == campaign; });
+  return assignment.requests.empty() ? nullptr : begin_batch(std::move(assignment));
+}
+
+void Executor::compute_on(Device& device, std::shared_ptr<Batch> first) {
+  const std::shared_ptr<const PreparedCampaign> prepared = first->prepared;
+  const std::unique_ptr<DeviceSimulation> simulation = prepared->simulate_on(device);
+  DeviceCheck check(prepared->simulate, config_.checked_fraction);
+  std::map<std::uint64_t, std::shared_ptr<Batch>> in_flight;
+  std::shared_ptr<Batch> latest = std::move(first);
+  const auto add = [&](std::shared_ptr<Batch> batch) {
+    simulation->add(batch->number, batch->assignment.requests);
+    in_flight[batch->number] = latest = std::move(batch);
+  };
+  add(latest);
+  while (std::ranges::any_of(in_flight, [](const auto& b) { return !b.second->is_dropped; })) {
+    while (simulation->num_in_flight() + simulation->group_size() <= simulation->capacity()) {
+      std::shared_ptr<Batch> next = next_batch_like(*latest, simulation->group_size());
+      if (next == nullptr) break;
+      add(std::move(next));
+    }
+    const std::size_t num_together = simulation->num_in_flight();
+    for (DeviceSimulation::Ended& ended : simulation->advance()) {
+      const std::shared_ptr<Batch> batch = in_flight.extract(ended.group).mapped();
+      check.add(batch->assignment.requests, ended.results);
+      note_steps(*batch, prepared->num_steps);
+      finish(*batch, std::move(ended.results), num_together);
+    }
+    for (const auto& [number, batch] : in_flight) {
+      note_steps(*batch, simulation->num_steps_done(number));
+    }
+    check.go_on();
+  }
+  check.end();
+}
+
+}  // namespace proofmass::worker
