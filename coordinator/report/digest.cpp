@@ -54,6 +54,7 @@ void Digest::add(const RunResult& result) {
   layout.put(result.truth, result.has_truth(), num_quantities);
   layout.put(result.estimate, result.has_estimate(), num_quantities);
   layout.put(result.standard_error, true, result.standard_error.size());
+  layout.put(result.fit, true, result.fit.size());
   hash_.add(bytes_);
 
   if (result.health.empty()) return;

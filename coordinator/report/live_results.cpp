@@ -22,6 +22,7 @@ LiveResults::LiveResults(const Campaign& campaign)
 
 void LiveResults::add(const RunResult& result) {
   statistics_.add(result);
+  standard_errors_.add(result);
   if (!result.is_completed()) return;
   for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
     magnitudes_[i].add(std::abs(result.error(i)));
@@ -47,8 +48,12 @@ std::string LiveResults::html() const {
     }
     review.figures.push_back(std::move(figures));
   }
+  StandardErrorStatistics errors = standard_errors_.statistics();
+  if (!are_draws_independent_) leave_out_intervals(errors);
+  const Table of_errors = standard_error_table(errors);
   return "<h3>Accuracy so far</h3>\n" +
          html_table(accuracy_table(objectives_, review.results.statistics)) +
+         (of_errors.rows.empty() ? "" : html_table(of_errors)) +
          "<h3>Errors so far</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "coordinator/report/error_figures.hpp"
+#include "coordinator/report/standard_errors.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
@@ -21,14 +22,15 @@ class LiveResults {
 
   [[nodiscard]] CampaignStatistics statistics() const;
 
-  /// A fragment of HTML for a page with review_style(): the accuracy table and the histograms of
-  /// |error| of a review report. Headings are of level 3.
+  /// A fragment of HTML for a page with review_style(): the accuracy table, that of standard errors
+  /// if there are any, and the histograms of |error| of a review report. Headings are of level 3.
   [[nodiscard]] std::string html() const;
 
  private:
   std::vector<double> objectives_;
   bool are_draws_independent_;
   RunningStatistics statistics_;
+  RunningStandardErrors standard_errors_;
   std::vector<MagnitudeBins> magnitudes_;  ///< Of each quantity.
 };
 

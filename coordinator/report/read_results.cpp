@@ -145,9 +145,11 @@ std::string warnings_text(const CampaignWarnings& warnings) {
 
 ReadResults read_results(const Store& store, const Campaign& campaign,
                          const ResultVisitor& further) {
-  ReadResults results{.statistics = {}, .digests = {}, .totals = {}, .warnings = {}};
+  ReadResults results{
+      .statistics = {}, .digests = {}, .totals = {}, .warnings = {}, .standard_errors = {}};
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
+  RunningStandardErrors standard_errors;
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
@@ -157,6 +159,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());
       statistics.add(result);
+      standard_errors.add(result);
       kept.add(result);
       if (budget && result.is_completed()) {
         add_total(result.run, budget->of_run(result).total, totals, results.totals);
@@ -168,12 +171,15 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
     end_totals(std::move(totals), results.totals);
     results.digests = digest.finish();
     results.statistics = statistics.statistics();
+    results.standard_errors = standard_errors.statistics();
     for (std::size_t i = 0; i < objectives.size() && results.statistics.num_estimated > 0; ++i) {
       std::vector<double> errors = kept.take(store, i);
       complete(results.statistics.accuracy[i], errors);
       if (further.magnitudes) further.magnitudes(i, errors);
     }
-    if (!why_not_independent(campaign).empty()) leave_out_intervals(results.statistics);
+    if (why_not_independent(campaign).empty()) return;
+    leave_out_intervals(results.statistics);
+    leave_out_intervals(results.standard_errors);
   });
   return results;
 }

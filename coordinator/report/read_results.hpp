@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
+#include "coordinator/report/standard_errors.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
@@ -68,6 +69,7 @@ struct ReadResults {
   ResultDigests digests;
   std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
   CampaignWarnings warnings;
+  StandardErrorStatistics standard_errors;
 };
 
 /// Sees what read_results() reads.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/standard_errors.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
@@ -21,6 +22,7 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
   for (const Table& table :
        {accuracy_table(campaign.objectives(), statistics), interval_table(statistics, num_given_up),
         error_table(statistics, num_given_up, campaign.interpretation()),
+        standard_error_table(results.standard_errors),
         budget_table(campaign.error_budget(), statistics, results.totals)}) {
     if (!table.rows.empty()) text += "\n" + terminal_text(table, {.paint = paint});
   }

@@ -131,6 +131,25 @@ Json warnings_of(const CampaignWarnings& warnings) {
   return json;
 }
 
+/// Null without standard errors.
+Json standard_errors_of(const StandardErrorStatistics& statistics) {
+  if (statistics.quantities.empty()) return nullptr;
+  Json json{{"parameters", Json::array()}, {"fit", Json::object()}};
+  for (const StandardErrorStatistic& of : statistics.quantities) {
+    json["parameters"].push_back({{"parameter", model().results().quantities[of.quantity].name},
+                                  {"num_runs", of.num_runs},
+                                  {"mean", of.mean},
+                                  {"squared_ratio", of.squared_ratio},
+                                  {"squared_ratio_standard_error", of.squared_ratio_error},
+                                  {"num_within_95", of.num_within},
+                                  {"fraction_within_95_interval", bounds_of(of.within)}});
+  }
+  for (std::size_t i = 0; i < statistics.fit.size(); ++i) {
+    json["fit"]["mean_" + model().results().fit[i].column()] = statistics.fit[i];
+  }
+  return json;
+}
+
 Json json_of(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Requirement& requirement = answer.requirement;
@@ -205,6 +224,7 @@ std::string report_json(const Store& store, const Campaign& campaign,
              {{"num_within", statistics.num_within_objectives},
               {"num_runs", statistics.num_runs + num_given_up},
               {"fraction_within_interval", bounds_of(statistics.within_objectives(num_given_up))}}},
+            {"standard_errors", standard_errors_of(checked.results.standard_errors)},
             {"budget", budget_of(campaign, checked.results)},
             {"requirements", Json::array()},
             {"matrix", Json::array()}};

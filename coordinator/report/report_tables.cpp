@@ -26,12 +26,6 @@ namespace {
 constexpr const char* ours = "this campaign";
 constexpr const char* theirs = "the paper";
 
-Cell unit_cell(const Quantity& quantity) {
-  Cell cell(quantity.display_unit);
-  cell.document = unit_text(quantity.display_unit);
-  return cell;
-}
-
 /// As somebody gave it, without digits that nobody gave.
 Cell given_cell(double value, double scale) {
   Cell cell = figure_cell(value, scale);
@@ -209,6 +203,12 @@ Cell figure_cell(double value, double scale) {
 Cell no_figure() {
   Cell cell("-");
   cell.document = "–";
+  return cell;
+}
+
+Cell unit_cell(const Quantity& quantity) {
+  Cell cell(quantity.display_unit);
+  cell.document = unit_text(quantity.display_unit);
   return cell;
 }
 

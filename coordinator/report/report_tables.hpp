@@ -17,6 +17,8 @@ namespace proofmass::coordinator {
 /// A number in the display unit, and in SI units for programs.
 [[nodiscard]] Cell figure_cell(double value, double scale = 1.0);
 [[nodiscard]] Cell no_figure();
+/// The unit in which a table shows a quantity.
+[[nodiscard]] Cell unit_cell(const Quantity& quantity);
 
 /// Accuracy of each parameter beside the published one, and whose that is; always with rows.
 /// @param objectives  Of each quantity, SI.

@@ -182,6 +182,9 @@ std::vector<NamedPicture> review_pictures(const Review& review) {
     pictures.push_back({fmt::format("error:{}", name), error_chart(review, i)});
     pictures.push_back({fmt::format("convergence:{}", name), convergence_chart(review, i)});
   }
+  if (auto grid = pull_overview(review.results.standard_errors)) {
+    pictures.push_back({"pulls", *std::move(grid)});
+  }
   for (Chart& chart : characteristic_charts(review)) {
     pictures.push_back({"characteristic", std::move(chart)});
     break;  // Without requirements there is one: that of the default tolerance.

@@ -108,6 +108,12 @@ std::string characteristics_markup(const Review& review) {
              name_of(review.interpretation));
 }
 
+std::string standard_errors_markup(const Review& review) {
+  const StandardErrorStatistics& statistics = review.results.standard_errors;
+  const std::optional<ChartGrid> pulls = pull_overview(statistics);
+  return pulls ? flow(table_part(standard_error_table(statistics)) + figure_of(*pulls)) : "";
+}
+
 std::string budget_markup(const Review& review) {
   const std::optional<BarChart> chart = budget_chart(review);
   if (!chart) return "";
@@ -163,6 +169,7 @@ std::vector<Section> sections_of(const Review& review) {
                 characteristics_markup(review)) +
                table_part(interval_table(statistics, review.num_given_up)) +
                table_part(error_table(statistics, review.num_given_up, review.interpretation))},
+          {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
@@ -278,6 +285,7 @@ std::string review_markdown(const Review& review) {
       section("Accuracy", {accuracy_table(review.objectives, statistics),
                            interval_table(statistics, review.num_given_up),
                            error_table(statistics, review.num_given_up, review.interpretation)}) +
+      section("Standard errors", {standard_error_table(review.results.standard_errors)}) +
       section("Budget", {review_budget_table(review)}) +
       section("Causes of the errors", {cause_table(review)}) +
       section("How it was run",

@@ -31,6 +31,9 @@ std::vector<ValueColumn> make_columns(const ResultSchema& schema) {
     if (!quantity.has_standard_error) continue;
     append(columns, ValueKind::standard_error, num_standard_errors++, quantity);
   }
+  for (std::size_t i = 0; i < schema.fit.size(); ++i) {
+    append(columns, ValueKind::fit, i, schema.fit[i]);
+  }
   for (std::size_t i = 0; i < schema.health.size(); ++i) {
     append(columns, ValueKind::health, i, schema.health[i]);
   }
@@ -49,6 +52,8 @@ std::span<const double> values_in(const RunResult& result, ValueKind kind) {
       return result.estimate;
     case ValueKind::standard_error:
       return result.standard_error;
+    case ValueKind::fit:
+      return result.fit;
     case ValueKind::health:
       return result.health;
   }
@@ -68,6 +73,8 @@ std::string_view name_of(ValueKind kind) {
       return "error";
     case ValueKind::standard_error:
       return "standard_error";
+    case ValueKind::fit:
+      return "fit";
     case ValueKind::health:
       return "health";
   }

@@ -13,9 +13,9 @@
 namespace proofmass::coordinator {
 
 /// What is known of a quantity in one run, or of the health of the run.
-enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, health };
+enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, fit, health };
 
-/// `truth`, `estimate`, `error`, `standard_error`, `health`.
+/// `truth`, `estimate`, `error`, `standard_error`, `fit`, `health`.
 [[nodiscard]] std::string_view name_of(ValueKind kind);
 
 /// True if both are the same to the last bit; zeros have no sign, as in a campaign database.
@@ -35,8 +35,8 @@ struct ValueColumn {
   [[nodiscard]] std::optional<double> value_in(const RunResult& result) const;
 };
 
-/// Truths, estimates, errors, standard errors if there are any, and health: all columns of values,
-/// in the order of the table `run_result`.
+/// Truths, estimates, errors, standard errors and their fit if there are any, and health: all
+/// columns of values of the table `run_result`.
 [[nodiscard]] const std::vector<ValueColumn>& value_columns();
 
 }  // namespace proofmass::coordinator

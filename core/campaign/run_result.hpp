@@ -37,7 +37,8 @@ struct Quantity {
   [[nodiscard]] std::string column() const { return std::string(name) + std::string(unit_suffix); }
 };
 
-/// A number that tells how well a run went, from 0 to magnitude_max; the larger, the worse.
+/// A number from 0 to magnitude_max that tells how well a run went, the larger, the worse; or how
+/// well its estimates fit what was measured.
 struct HealthQuantity {
   std::string_view name;         ///< In files: `acceleration`.
   std::string_view unit_suffix;  ///< `_m_s2`, `_rad` or empty.
@@ -71,6 +72,8 @@ struct ResultSchema {
   /// level.
   std::vector<std::string_view> budget_terms = {};
   std::size_t budget_level = 0;
+  /// How well estimates that have standard errors fit what was measured.
+  std::vector<HealthQuantity> fit = {};
 };
 
 /// The name at a position from 1, as in Loss; `none` at 0.
@@ -126,7 +129,8 @@ struct RunResult {
   std::uint32_t num_rounds = 0;    ///< Estimation rounds until no estimate moved any more.
   std::vector<double> truth{};     ///< Of each quantity, SI; if has_truth().
   std::vector<double> estimate{};  ///< Of each quantity, SI; if has_estimate().
-  std::vector<double> standard_error{};  ///< SI, of those quantities that have one.
+  std::vector<double> standard_error{};  ///< SI, of those quantities that have one; or empty.
+  std::vector<double> fit{};             ///< Of each fit quantity, beside standard_error.
   std::vector<double> health{};          ///< Of each health quantity; may be empty if has_truth().
   Loss loss{};                           ///< Says more if the status is `lost`.
 

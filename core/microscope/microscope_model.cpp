@@ -70,7 +70,8 @@ Warner MicroscopeCampaign::warner() const {
   return [bounds = ShiftBounds(scenario)](const RunResult& result) {
     std::vector<Warning> warnings;
     if (result.health.empty()) return warnings;
-    for (const Shift& shift : bounds.of(health_of(result.health), result.truth)) {
+    for (const Shift& shift :
+         bounds.of(health_of(result.health), result.truth, result.standard_error)) {
       if (shift.part < warned_part) continue;
       warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
     }

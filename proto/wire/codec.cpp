@@ -175,13 +175,14 @@ void check_time(double time_s, std::string_view field) {
   throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", run_time_s_max));
 }
 
-void check_health(const Values& health, bool has_health,
-                  const std::vector<HealthQuantity>& quantities) {
-  require_size(health.size(), has_health ? quantities.size() : 0, "health");
-  for (int i = 0; i < health.size(); ++i) {
-    if (health[i] >= 0.0 && health[i] <= magnitude_max) continue;
-    throw ConfigError(fmt::format("health.{}", quantities[static_cast<std::size_t>(i)].column()),
-                      fmt::format("{}", health[i]),
+/// One value from 0 on for each quantity of `health` or `fit`, or none.
+void check_magnitudes(const Values& values, bool has_values,
+                      const std::vector<HealthQuantity>& quantities, std::string_view field) {
+  require_size(values.size(), has_values ? quantities.size() : 0, field);
+  for (int i = 0; i < values.size(); ++i) {
+    if (values[i] >= 0.0 && values[i] <= magnitude_max) continue;
+    const std::string name = quantities[static_cast<std::size_t>(i)].column();
+    throw ConfigError(fmt::format("{}.{}", field, name), fmt::format("{}", values[i]),
                       fmt::format("must be in [0, {}]", magnitude_max));
   }
 }
@@ -206,7 +207,8 @@ void check(const proto::ComputedRun& run, const ResultSchema& schema, std::size_
   check_values(run.truth(), result.has_truth() ? num_quantities : 0, "truth");
   check_values(run.estimate(), has_estimate ? num_quantities : 0, "estimate");
   check_values(run.standard_error(), has_errors ? num_errors : 0, "standard_error");
-  check_health(run.health(), result.has_truth(), schema.health);
+  check_magnitudes(run.health(), result.has_truth(), schema.health, "health");
+  check_magnitudes(run.fit(), has_errors, schema.fit, "fit");
   check_loss(run, result.status == RunStatus::lost, schema);
   check_time(run.compute_s(), "compute_s");
   check_time(run.elapsed_s(), "elapsed_s");

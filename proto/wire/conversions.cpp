@@ -44,6 +44,7 @@ ComputedRun computed_run(const proto::ComputedRun& message) {
   result.truth.assign(message.truth().begin(), message.truth().end());
   result.estimate.assign(message.estimate().begin(), message.estimate().end());
   result.standard_error.assign(message.standard_error().begin(), message.standard_error().end());
+  result.fit.assign(message.fit().begin(), message.fit().end());
   result.health.assign(message.health().begin(), message.health().end());
   result.loss = {.cause = message.loss_cause(), .session = message.loss_session()};
   return {.result = std::move(result),
@@ -67,6 +68,7 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
     message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());
     message.mutable_standard_error()->Assign(result.standard_error.begin(),
                                              result.standard_error.end());
+    message.mutable_fit()->Assign(result.fit.begin(), result.fit.end());
   }
   message.set_loss_cause(result.loss.cause);
   message.set_loss_session(result.loss.session);

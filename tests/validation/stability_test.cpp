@@ -78,7 +78,8 @@ class Stability : public testing::Test {
         std::abs(without_noise.estimate[parameter] - without_noise.truth[parameter]);
     const double objective = campaign.scenario.objectives[parameter];
     double part = 1.0 / 50.0;
-    for (const Shift& shift : bounds.of(test::health_of(result), result.truth)) {
+    for (const Shift& shift :
+         bounds.of(test::health_of(result), result.truth, result.standard_error)) {
       if (index(shift.parameter) == parameter) part += shift.part;
     }
     return 1.1 * 6.0 * campaign.scenario.noise.scale * deviation()[parameter] + 1.5 * systematic +

@@ -23,23 +23,28 @@ namespace {
 // Columns before the values: run_index, status, num_draws, num_rounds.
 constexpr int num_leading_columns = 4;
 
-/// Where the columns of the model's values stand, from 0.
+/// Where the columns of the model's values stand, from 0. Standard errors and their fit are read by
+/// themselves: where there are none, reading them would cost a tenth of all reading.
 struct Columns {
   explicit Columns(const ResultSchema& schema)
       : num_quantities(static_cast<int>(schema.quantities.size())),
         num_standard_errors(static_cast<int>(
             std::ranges::count_if(schema.quantities, &Quantity::has_standard_error))),
+        num_fit(static_cast<int>(schema.fit.size())),
         num_health(static_cast<int>(schema.health.size())) {}
 
-  int num_quantities, num_standard_errors, num_health;
+  int num_quantities, num_standard_errors, num_fit, num_health;
   int truth = num_leading_columns;
   int estimate = truth + num_quantities;
-  int standard_error = estimate + num_quantities;
-  int health = standard_error + num_standard_errors;
+  int health = estimate + num_quantities;
   int loss_cause = health + num_health;
   int loss_session = loss_cause + 1;
-  int count = loss_session + 1;
+  int num_all = loss_session + 1 + num_standard_errors + num_fit;
 };
+
+bool is_of_standard_errors(const ValueColumn& column) {
+  return column.kind == ValueKind::standard_error || column.kind == ValueKind::fit;
+}
 
 const Columns& columns() {
   static const Columns columns(model().results());
@@ -49,18 +54,35 @@ const Columns& columns() {
 std::string column_list() {
   std::string list = "run_index, status, num_draws, num_rounds";
   for (const ValueColumn& column : value_columns()) {
-    if (column.kind != ValueKind::error) list += ", " + column.name;
+    if (column.kind == ValueKind::error || is_of_standard_errors(column)) continue;
+    list += ", " + column.name;
   }
   return list + ", loss_cause, loss_session";
 }
 
+std::string list_of_standard_errors() {
+  std::string list;
+  for (const ValueColumn& column : value_columns()) {
+    if (is_of_standard_errors(column)) list += ", " + column.name;
+  }
+  return list;
+}
+
 std::string insert_sql() {
-  return fmt::format("INSERT INTO run_result ({}) VALUES ({}) ON CONFLICT DO NOTHING",
-                     column_list(), places(columns().count));
+  return fmt::format("INSERT INTO run_result ({}{}) VALUES ({}) ON CONFLICT DO NOTHING",
+                     column_list(), list_of_standard_errors(), places(columns().num_all));
 }
 
 std::string select_sql(std::string_view clause) {
   return fmt::format("SELECT {} FROM run_result {}", column_list(), clause);
+}
+
+/// @param condition  Of the runs.
+std::string select_standard_errors_sql(std::string_view condition) {
+  return fmt::format(
+      "SELECT run_index{} FROM run_result INDEXED BY run_result_standard_errors "
+      "WHERE ({}) AND {} ORDER BY run_index",
+      list_of_standard_errors(), has_standard_errors_sql(), condition);
 }
 
 /// Adds the bytes of a number to a digest, lowest first.
@@ -109,25 +131,19 @@ std::vector<double> read_values(const Statement& row, int first, int count) {
   return values;
 }
 
-bool has_value(const Statement& row, int column, int count) {
-  return count > 0 && row.optional_real(column).has_value();
-}
-
-// A run without a draw has none.
-std::vector<double> read_health(const Statement& row) {
-  if (!has_value(row, columns().health, columns().num_health)) return {};
-  std::vector<double> health;
-  health.reserve(static_cast<std::size_t>(columns().num_health));
-  for (int i = 0; i < columns().num_health; ++i) {
-    const int column = columns().health + i;
+// Of health or fit.
+std::vector<double> read_magnitudes(const Statement& row, int first, int count) {
+  std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(count));
+  for (int column = first; column < first + count; ++column) {
     const double value = row.optional_real(column).value_or(-1.0);
     if (!(value >= 0.0 && value <= magnitude_max)) {
       row.refuse_as_damaged(fmt::format("{} of run {} (must be in [0, {}])",
                                         row.column_name(column), row.count(0), magnitude_max));
     }
-    health.push_back(value);
+    values.push_back(value);
   }
-  return health;
+  return values;
 }
 
 std::uint32_t read_choice(const Statement& row, int column, std::size_t count) {
@@ -163,13 +179,48 @@ RunResult read_result(const Statement& row) {
   const Columns& at = columns();
   if (result.has_truth()) result.truth = read_values(row, at.truth, at.num_quantities);
   if (result.has_estimate()) result.estimate = read_values(row, at.estimate, at.num_quantities);
-  if (has_value(row, at.standard_error, at.num_standard_errors)) {
-    result.standard_error = read_values(row, at.standard_error, at.num_standard_errors);
+  // A run without a draw has no health.
+  if (at.num_health > 0 && row.optional_real(at.health)) {
+    result.health = read_magnitudes(row, at.health, at.num_health);
   }
-  result.health = read_health(row);
   result.loss = read_loss(row, result.status);
   return result;
 }
+
+/// Of a row of select_standard_errors_sql().
+void read_standard_errors(const Statement& row, RunResult& result) {
+  const Columns& at = columns();
+  result.standard_error = read_values(row, 1, at.num_standard_errors);
+  result.fit = read_magnitudes(row, 1 + at.num_standard_errors, at.num_fit);
+}
+
+/// Those of results that are read in run order, from the same state of the file.
+class StandardErrorRows {
+ public:
+  StandardErrorRows(const Database& database, std::optional<RunRange> runs) {
+    if (columns().num_standard_errors == 0) return;
+    rows_ = database.prepare(
+        select_standard_errors_sql(runs ? "run_index >= ? AND run_index < ?" : "TRUE"));
+    if (runs) rows_->bind_all(runs->first.value, runs->end());
+  }
+
+  /// Sets those of a result, if it has any. Begins to read with the first call.
+  void add_to(RunResult& result) {
+    if (!rows_) return;
+    if (!at_) advance();
+    while (*at_ < result.run) advance();
+    if (*at_ == result.run) read_standard_errors(*rows_, result);
+  }
+
+ private:
+  void advance() {
+    at_ = rows_->step() ? RunIndex{rows_->count(0)}
+                        : RunIndex{std::numeric_limits<std::uint64_t>::max()};
+  }
+
+  std::optional<Statement> rows_;
+  std::optional<RunIndex> at_;  ///< Of the next row; beyond all runs after the last.
+};
 
 }  // namespace
 
@@ -183,7 +234,10 @@ Statement select_errors(const Database& database, std::size_t quantity) {
 ResultRows::ResultRows(const Database& database)
     : database_(database),
       insert_(database.prepare(insert_sql())),
-      select_(database.prepare(select_sql("WHERE run_index = ?"))) {}
+      select_(database.prepare(select_sql("WHERE run_index = ?"))) {
+  if (columns().num_standard_errors == 0) return;
+  select_standard_errors_ = database.prepare(select_standard_errors_sql("run_index = ?"));
+}
 
 bool ResultRows::insert(const RunResult& result) {
   insert_.bind(1, result.run.value);
@@ -192,15 +246,19 @@ bool ResultRows::insert(const RunResult& result) {
   insert_.bind(4, result.num_rounds);
   int position = num_leading_columns;
   for (const ValueColumn& column : value_columns()) {
-    if (column.kind == ValueKind::error) continue;  // It is computed when it is read.
+    // An error is computed when it is read.
+    if (column.kind == ValueKind::error || is_of_standard_errors(column)) continue;
     insert_.bind(++position, column.value_in(result));
   }
   const bool is_lost = result.status == RunStatus::lost;
   const auto choice = [&](std::uint32_t value) {
     return is_lost ? std::optional(std::uint64_t{value}) : std::nullopt;
   };
-  insert_.bind(columns().loss_cause + 1, choice(result.loss.cause));
-  insert_.bind(columns().loss_session + 1, choice(result.loss.session));
+  insert_.bind(++position, choice(result.loss.cause));
+  insert_.bind(++position, choice(result.loss.session));
+  for (const ValueColumn& column : value_columns()) {
+    if (is_of_standard_errors(column)) insert_.bind(++position, column.value_in(result));
+  }
   insert_.finish();
   return database_.num_changes() == 1;
 }
@@ -210,8 +268,14 @@ RunResult ResultRows::read(RunIndex run) {
   if (!select_.step()) {
     database_.refuse_as_damaged(fmt::format("run_result lacks run {}", run.value));
   }
-  const RunResult result = read_result(select_);
+  RunResult result = read_result(select_);
   select_.finish();
+  if (!select_standard_errors_) return result;
+  select_standard_errors_->bind_all(run.value);
+  if (select_standard_errors_->step()) {
+    read_standard_errors(*select_standard_errors_, result);
+    select_standard_errors_->finish();
+  }
   return result;
 }
 
@@ -221,7 +285,8 @@ bool are_equal(const RunResult& left, const RunResult& right) {
          left.num_draws == right.num_draws && left.num_rounds == right.num_rounds &&
          (!left.has_truth() || left.truth == right.truth) &&
          (!left.has_estimate() ||
-          (left.estimate == right.estimate && left.standard_error == right.standard_error)) &&
+          (left.estimate == right.estimate && left.standard_error == right.standard_error &&
+           left.fit == right.fit)) &&
          left.health == right.health && left.loss == right.loss;
 }
 
@@ -235,6 +300,7 @@ std::uint64_t digest(const RunResult& result) {
   if (result.has_truth()) digest = digest_with(digest, result.truth);
   if (result.has_estimate()) digest = digest_with(digest, result.estimate);
   digest = digest_with(digest, result.standard_error);
+  digest = digest_with(digest, result.fit);
   digest = digest_with(digest, result.health);
   if (result.status != RunStatus::lost) return digest;
   digest = digest_with(digest, std::uint64_t{result.loss.cause});
@@ -267,15 +333,18 @@ namespace proofmass::coordinator {
 struct ResultReader::Impl {
   const detail::Database& database;
   detail::Statement row;
+  detail::StandardErrorRows standard_errors;
   std::optional<std::uint64_t> num_runs;  // Of the campaign; read with the first result.
   std::optional<RunIndex> last;
 };
 
 ResultReader::ResultReader(const detail::Database& database, std::optional<RunRange> runs)
     : impl_(std::make_unique<Impl>(
-          database, database.prepare(detail::select_sql(
-                        runs ? "WHERE run_index >= ? AND run_index < ? ORDER BY run_index"
-                             : "ORDER BY run_index")))) {
+          database,
+          database.prepare(
+              detail::select_sql(runs ? "WHERE run_index >= ? AND run_index < ? ORDER BY run_index"
+                                      : "ORDER BY run_index")),
+          detail::StandardErrorRows(database, runs))) {
   if (runs) impl_->row.bind_all(runs->first.value, runs->end());
 }
 
@@ -291,6 +360,7 @@ std::optional<RunResult> ResultReader::next() {
     impl_->num_runs = impl_->database.count("SELECT num_runs FROM campaign");
   }
   RunResult result = detail::read_result(impl_->row);
+  impl_->standard_errors.add_to(result);
   if (impl_->last && !(*impl_->last < result.run)) {
     impl_->database.refuse_as_damaged(fmt::format("result of run {} comes after that of run {}",
                                                   result.run.value, impl_->last->value));

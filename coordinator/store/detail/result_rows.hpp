@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
@@ -24,6 +25,7 @@ class ResultRows {
   const Database& database_;
   Statement insert_;
   Statement select_;
+  std::optional<Statement> select_standard_errors_;  ///< None if the model has none.
 };
 
 /// estimate − truth of a quantity in the completed runs below ?1, in run order.

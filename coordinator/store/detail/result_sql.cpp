@@ -41,11 +41,40 @@ std::string error_columns() {
   });
 }
 
-std::string standard_error_columns() {
+/// The columns that the schema has from version 10.
+std::string added_columns() {
   std::string text;
+  const auto add = [&](std::string_view prefix, const std::string& column) {
+    text += fmt::format("ALTER TABLE run_result ADD COLUMN {}_{} REAL;\n", prefix, column);
+  };
   for (const Quantity& quantity : quantities()) {
+    if (quantity.has_standard_error) add("standard_error", quantity.column());
+  }
+  for (const HealthQuantity& quantity : model().results().fit) add("fit", quantity.column());
+  if (text.empty()) return text;
+  return text + fmt::format(
+                    "CREATE INDEX run_result_standard_errors ON run_result (run_index)\n"
+                    "WHERE {};\n",
+                    has_standard_errors_sql());
+}
+
+/// NULL where no quantity has one.
+std::string standard_error_of_parameter() {
+  std::string text;
+  int position = 0;
+  for (const Quantity& quantity : quantities()) {
+    ++position;
     if (!quantity.has_standard_error) continue;
-    text += fmt::format("standard_error_{} REAL,\n  ", quantity.column());
+    text += fmt::format("\n         WHEN {} THEN r.standard_error_{}", position, quantity.column());
+  }
+  return text.empty() ? "NULL" : "CASE p.position" + text + " END";
+}
+
+/// Columns of r that begin with fit_, as they are called.
+std::string fit_of_row() {
+  std::string text;
+  for (const HealthQuantity& quantity : model().results().fit) {
+    text += fmt::format(", r.fit_{0} AS {0}", quantity.column());
   }
   return text;
 }
@@ -151,7 +180,10 @@ std::map<std::string_view, std::string> texts() {
       {"truth_columns", value_columns("truth", "status = 4")},
       {"estimate_columns", value_columns("estimate", "status > 2")},
       {"error_columns", error_columns()},
-      {"standard_error_columns", standard_error_columns()},
+      {"standard_error_columns", ""},  // In version 8 no model had any.
+      {"added_columns", added_columns()},
+      {"standard_error_of_parameter", standard_error_of_parameter()},
+      {"fit_values", fit_of_row()},
       {"health_columns", health_columns()},
       {"health_values", health_of_row()},
       {"status_name", name_of_choice("status", status_names())},
@@ -170,6 +202,18 @@ std::map<std::string_view, std::string> texts() {
 }
 
 }  // namespace
+
+std::string has_standard_errors_sql() {
+  std::string text;
+  const auto add = [&](std::string_view prefix, const std::string& column) {
+    text += fmt::format("{}{}_{} IS NOT NULL", text.empty() ? "" : "\n   OR ", prefix, column);
+  };
+  for (const Quantity& quantity : quantities()) {
+    if (quantity.has_standard_error) add("standard_error", quantity.column());
+  }
+  for (const HealthQuantity& quantity : model().results().fit) add("fit", quantity.column());
+  return text;
+}
 
 std::string with_quantities(std::string_view sql) {
   const std::map<std::string_view, std::string> replacements = texts();

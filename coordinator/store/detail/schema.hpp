@@ -26,19 +26,26 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 ///
 ///     {data_tables}         the tables of data that all runs share
 ///     {truth_columns}       columns of run_result, one a line; also {estimate_columns},
-///                           {error_columns}; with a comma behind each {standard_error_columns},
-///                           {health_columns}
+///                           {error_columns}; with a comma behind each {health_columns};
+///                           {standard_error_columns}, which are none; as statements that add
+///                           them {added_columns}, the standard errors and their fit, and the
+///                           index of the runs that have them
 ///     {status_name}         status of r, a row of run_result, as text; also {loss_cause_name},
 ///                           {loss_session_name}
-///     {health_values}       columns of r that begin with health_, without that
+///     {health_values}       columns of r that begin with health_, without that; with a comma
+///                           before each {fit_values}
 ///     {truth_of_parameter}  truth in r of the parameter p; also {estimate_of_parameter},
-///                           {error_of_parameter}
+///                           {error_of_parameter}, {standard_error_of_parameter}
 ///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²;
 ///                           {budget_total_at_level} that of a row r at its own level
 ///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
 ///     {digested_tables}     names of the tables that campaign.table_digest is of
 ///     {example_quantity}    its name, for comments; see example_quantity()
 [[nodiscard]] std::string with_quantities(std::string_view sql);
+
+/// What holds for a row of run_result with a standard error, or its fit; empty if the model has
+/// none.
+[[nodiscard]] std::string has_standard_errors_sql();
 
 /// The schema files as SQL, see with_quantities().
 [[nodiscard]] const std::vector<std::string>& migrations();

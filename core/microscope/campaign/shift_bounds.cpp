@@ -100,10 +100,18 @@ double least_noise_density(const Scenario& scenario) {
 /// Collects shifts of one run.
 class ShiftBounds::Sum {
  public:
-  Sum(const ShiftBounds& bounds, std::span<const double> truth) : bounds_(bounds), truth_(truth) {}
+  Sum(const ShiftBounds& bounds, std::span<const double> truth,
+      std::span<const double> standard_errors)
+      : bounds_(bounds), truth_(truth), standard_errors_(standard_errors) {}
 
   /// |truth| of a parameter, SI.
   double operator[](Parameter parameter) const { return std::abs(truth_[index(parameter)]); }
+
+  [[nodiscard]] bool has_standard_errors() const { return !standard_errors_.empty(); }
+  [[nodiscard]] Sensitivity sensitivity(Parameter parameter) const {
+    return has_standard_errors() ? bounds_.sensitivity(standard_errors_[index(parameter)])
+                                 : bounds_.of(parameter);
+  }
 
   void add(Effect effect, Parameter parameter, double shift, double part_of_loss = 1.0) {
     if (!(shift > 0.0)) return;
@@ -114,7 +122,7 @@ class ShiftBounds::Sum {
   /// Three standard deviations of an effect that is noise. A run is lost by it where it is beyond
   /// both the objective and what the noise of the sensors explains, six standard deviations.
   void add_noise(Effect effect, Parameter parameter, double shift) {
-    const double explained = 6.0 * bounds_.of(parameter).sensor_sigma;
+    const double explained = 6.0 * sensitivity(parameter).sensor_sigma;
     add(effect, parameter, shift, std::max(1.0, explained / bounds_.objectives_[index(parameter)]));
   }
 
@@ -123,13 +131,23 @@ class ShiftBounds::Sum {
  private:
   const ShiftBounds& bounds_;
   std::span<const double> truth_;
+  std::span<const double> standard_errors_;
 };
 
 ShiftBounds::ShiftBounds(const Scenario& scenario)
     : objectives_(scenario.objectives),
       least_density_(least_noise_density(scenario)),
-      block_s_(LineWeights::block_size * scenario.simulation.sample_period_s) {
+      block_s_(LineWeights::block_size * scenario.simulation.sample_period_s),
+      white_density_(0.5 * square(scenario.noise.linear_x.white_asd)),
+      duration_s_(0.0),
+      has_noise_(scenario.noise.scale > 0.0) {
+  if (has_noise_) white_density_ *= square(scenario.noise.scale);
   for (const Session& session : scenario.sessions) {
+    duration_s_ += fit_duration_s(scenario, session);
+    if (const Excitation* const motion = mass_excitation(session)) {
+      double& largest = mass_acceleration_m_s2_[index(motion->axis)];
+      largest = std::max(largest, square(turn_rad * motion->frequency_hz) * motion->amplitude);
+    }
     if (session.target == SessionTarget::no_target) continue;
     add_session(scenario, session);
     add_spin(scenario, session);
@@ -157,10 +175,15 @@ void ShiftBounds::add_session(const Scenario& scenario, const Session& session) 
       line_frequency_hz(session, session.fit_lines.front(), scenario.orbit.period_s);
   total.sensor_sigma = total.of_noise * scenario.noise.scale *
                        std::sqrt(0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
-  if (const Excitation* const motion = mass_excitation(session)) {
-    mass_acceleration_m_s2_[index(parameter_of(session.target))] =
-        square(turn_rad * motion->frequency_hz) * motion->amplitude;
-  }
+}
+
+// A fit with the weights W of its lines and the Jacobian J moves by C Jᵀ W δ if its lines move by
+// δ. By Schwarz's inequality that is σ √(δᵀWδ) at most, because C ≥ C JᵀWJ C. Two lines of each
+// session move by 1 m/s² at most.
+ShiftBounds::Sensitivity ShiftBounds::sensitivity(double standard_error) const {
+  return {.of_line = standard_error * std::sqrt(2.0 * duration_s_ / white_density_),
+          .of_noise = standard_error / std::sqrt(white_density_),
+          .sensor_sigma = has_noise_ ? standard_error : 0.0};
 }
 
 void ShiftBounds::add_spin(const Scenario& scenario, const Session& session) {
@@ -189,16 +212,17 @@ void ShiftBounds::add_residual(double residual_m_s2, Sum& sum) const {
   // A line of the residual is at most twice as large as that at f_EP.
   const double line_m_s2 = 2.0 * residual_m_s2;
   const double square_m_s2 = 0.5 * sum[k2d] * line_m_s2 * line_m_s2;
-  sum.add(Effect::residual, a_c11_delta_x, of(a_c11_delta_x).of_line * square_m_s2);
-  sum.add(Effect::residual, a_c11_delta_z, of(a_c11_delta_z).of_line * square_m_s2);
-  const auto add_product = [&](Parameter common, Parameter differential) {
-    const double along_x = 0.5 * mass_acceleration_m_s2_[index(common)] *
+  for (const Parameter delta : {a_c11_delta_x, a_c11_delta_z}) {
+    sum.add(Effect::residual, delta, sum.sensitivity(delta).of_line * square_m_s2);
+  }
+  const auto add_product = [&](Axis axis, Parameter common, Parameter differential) {
+    const double along_x = 0.5 * mass_acceleration_m_s2_[index(axis)] *
                            (sum[k2c] * (sum[common] + coupling_max_rad) +
                             sum[k2d] * (sum[differential] + coupling_max_rad));
-    sum.add(Effect::residual, common, of(common).of_line * line_m_s2 * along_x);
+    sum.add(Effect::residual, common, sum.sensitivity(common).of_line * line_m_s2 * along_x);
   };
-  add_product(a_c12, a_d12);
-  add_product(a_c13, a_d13);
+  add_product(Axis::y, a_c12, a_d12);
+  add_product(Axis::z, a_c13, a_d13);
 }
 
 void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
@@ -209,8 +233,9 @@ void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
   const double density = std::max(
       0.0, health.quadratic_noise * least_density_ - 2.0 * line_m_s2 * line_m_s2 * block_s_);
   for (std::size_t p = 0; p < num_parameters; ++p) {
-    sum.add_noise(Effect::quadratic_noise, static_cast<Parameter>(p),
-                  num_deviations * std::sqrt(density) * sensitivities_[p].of_noise);
+    const auto parameter = static_cast<Parameter>(p);
+    sum.add_noise(Effect::quadratic_noise, parameter,
+                  num_deviations * std::sqrt(density) * sum.sensitivity(parameter).of_noise);
   }
   const double x = num_deviations * std::sqrt(0.5 * health.square_noise);
   const double relative =
@@ -222,9 +247,10 @@ void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
                 of_k2 * std::sqrt(0.5 * (square(sum[k2c]) + square(sum[k2d]))));
 }
 
-std::vector<Shift> ShiftBounds::of(const LoopHealth& health, std::span<const double> truth) const {
+std::vector<Shift> ShiftBounds::of(const LoopHealth& health, std::span<const double> truth,
+                                   std::span<const double> standard_errors) const {
   using enum Parameter;
-  Sum sum(*this, truth);
+  Sum sum(*this, truth, standard_errors);
   add_residual(health.residual_m_s2, sum);
   const double tilt_rad = health.attitude_rad * health.attitude_rad;
   sum.add(Effect::attitude, a_c12, tilt_rad);
@@ -234,6 +260,7 @@ std::vector<Shift> ShiftBounds::of(const LoopHealth& health, std::span<const dou
   sum.add(Effect::attitude, a_c11_delta_x, tilted_m);
   sum.add(Effect::attitude, a_c11_delta_z, tilted_m);
   add_noises(health, sum);
+  if (sum.has_standard_errors()) return std::move(sum.shifts);  // Its sessions do not spin.
   sum.add(Effect::spin, a_d11_prime, of_spin_[index(a_d11_prime)] * sum[k2c] * sum[a_c11_delta_x]);
   sum.add(Effect::spin, a_c13, of_spin_[index(a_c13)] * sum[k2c]);
   for (const Parameter delta : {a_c11_delta_x, a_c11_delta_z}) {

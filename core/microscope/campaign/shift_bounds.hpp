@@ -44,9 +44,11 @@ class ShiftBounds {
   explicit ShiftBounds(const Scenario& scenario);
 
   /// Every shift that is not 0, in the order of effects. Parts may be infinite.
-  /// @param truth  Of each parameter, SI.
-  [[nodiscard]] std::vector<Shift> of(const LoopHealth& health,
-                                      std::span<const double> truth) const;
+  /// @param truth            Of each parameter, SI.
+  /// @param standard_errors  Of each estimate, of a method that has them: what bounds its shifts.
+  ///                         Else none.
+  [[nodiscard]] std::vector<Shift> of(const LoopHealth& health, std::span<const double> truth,
+                                      std::span<const double> standard_errors) const;
 
  private:
   /// The sessions of a target together.
@@ -63,6 +65,7 @@ class ShiftBounds {
   [[nodiscard]] const Sensitivity& of(Parameter parameter) const {
     return sensitivities_[static_cast<std::size_t>(parameter)];
   }
+  [[nodiscard]] Sensitivity sensitivity(double standard_error) const;
   void add_residual(double residual_m_s2, Sum& sum) const;
   void add_noises(const LoopHealth& health, Sum& sum) const;
 
@@ -70,7 +73,11 @@ class ShiftBounds {
   std::array<Sensitivity, num_parameters> sensitivities_{};
   double least_density_;  ///< Of which LoopHealth::quadratic_noise is a multiple.
   double block_s_;        ///< Duration of a block of BlockSteps.
-  std::array<double, num_parameters> mass_acceleration_m_s2_{};  ///< ω²Δ_TM of a_c12 and a_c13.
+  double white_density_;  ///< Of Γ_mes,dx, below that of every line; of scale 1 without noise.
+  double duration_s_;     ///< Of the records of all sessions that are fitted.
+  bool has_noise_;
+  /// Largest ω²Δ_TM of the masses that move along each axis.
+  std::array<double, 3> mass_acceleration_m_s2_{};
   /// Shifts by spin for K2c = 1 s²/m and, but for a_c13, Δx = 1 m.
   ParameterArray of_spin_{};
 };

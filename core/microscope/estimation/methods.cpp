@@ -11,16 +11,10 @@
 namespace proofmass {
 namespace {
 
-/// Databases have no column for standard errors: one more would be a new version of their schema.
-constexpr EstimationMethodInfo without_standard_errors(EstimationMethodInfo method) {
-  method.has_standard_errors = false;
-  return method;
-}
-
 // Positions are sent and stored: add at the end.
 constexpr std::array methods{
     hardy2013_method,
-    without_standard_errors(joint_method),
+    joint_method,
 };
 
 constexpr std::array<std::string_view, methods.size()> method_names = [] {
@@ -43,6 +37,7 @@ ResultSchema results_of(std::span<const EstimationMethodInfo> possible) {
   ResultSchema schema = microscope_results();
   if (std::ranges::none_of(possible, &EstimationMethodInfo::has_standard_errors)) return schema;
   for (Quantity& quantity : schema.quantities) quantity.has_standard_error = true;
+  schema.fit = {{"chi_squared", "", "1"}, {"degrees_of_freedom", "", "1"}};
   return schema;
 }
 

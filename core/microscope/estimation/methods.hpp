@@ -89,8 +89,9 @@ struct EstimationMethodInfo {
 /// Those that a campaign file can name.
 [[nodiscard]] std::span<const EstimationMethodInfo> estimation_methods();
 
-/// What results are where these methods can be chosen: microscope_results(), with standard errors
-/// if one of the methods has them. Runs that another one estimates have none.
+/// What results are where these methods can be chosen: microscope_results(), with standard errors,
+/// χ² and its degrees of freedom if one of the methods has them. Runs that another one estimates
+/// have none.
 [[nodiscard]] ResultSchema results_of(std::span<const EstimationMethodInfo> methods);
 
 /// The method that a scenario names.

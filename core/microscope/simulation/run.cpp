@@ -301,8 +301,10 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   result.truth.assign(record.truth.begin(), record.truth.end());
   const Estimation found = estimation(record);
   result.num_rounds = found.num_rounds;
-  const HealthFinding finding =
-      judge_health(scenario, impl_->bounds, record.health, record.phasors, record.truth);
+  const bool has_errors = impl_->method.has_standard_errors;
+  const HealthFinding finding = judge_health(
+      scenario, impl_->bounds, record.health, record.phasors, record.truth,
+      has_errors ? std::span<const double>(found.standard_errors) : std::span<const double>());
   for (const HealthValue& value : health_values()) {
     result.health.push_back(finding.health.*value.member);
   }
@@ -312,7 +314,6 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
                    .session = static_cast<std::uint32_t>(finding.loss.session)};
     return result;
   }
-  const bool has_errors = impl_->method.has_standard_errors;
   if (!are_in_range(found.values) || (has_errors && !are_in_range(found.standard_errors))) {
     result.status = RunStatus::not_finite;
     return result;
@@ -321,6 +322,11 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   result.estimate.assign(found.values.begin(), found.values.end());
   if (has_errors) {
     result.standard_error.assign(found.standard_errors.begin(), found.standard_errors.end());
+    result.fit = {0.0, 0.0};
+    for (const SessionFit& session : found.session_fits) {
+      result.fit[0] += session.chi_squared;
+      result.fit[1] += session.degrees_of_freedom;
+    }
   }
   return result;
 }

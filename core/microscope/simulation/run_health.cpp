@@ -111,8 +111,8 @@ LossCause cause_of(Effect effect) {
 
 /// Why the estimates of loops that held are lost all the same.
 LoopLoss loss_by_shift(const ShiftBounds& bounds, const LoopHealth& health,
-                       const ParameterArray& truth) {
-  for (const Shift& shift : bounds.of(health, truth)) {
+                       const ParameterArray& truth, std::span<const double> standard_errors) {
+  for (const Shift& shift : bounds.of(health, truth, standard_errors)) {
     if (shift.part <= shift.part_of_loss) continue;
     return {.cause = cause_of(shift.effect), .session = finding_session(shift.parameter)};
   }
@@ -154,7 +154,7 @@ LineFit residual_fit(const Scenario& scenario, const Session& session) {
 
 HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
                            const HealthRecord& record, const RunPhasors& phasors,
-                           const ParameterArray& truth) {
+                           const ParameterArray& truth, std::span<const double> standard_errors) {
   PROOFMASS_EXPECT(record.size() == scenario.sessions.size() && phasors.size() == record.size());
   QuietSums quiet;
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -175,7 +175,7 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
     finding.loss = {.cause = LossCause::saturation, .session = session.target};
   }
   if (finding.loss.cause == LossCause::none) {
-    finding.loss = loss_by_shift(bounds, finding.health, truth);
+    finding.loss = loss_by_shift(bounds, finding.health, truth, standard_errors);
   }
   return finding;
 }

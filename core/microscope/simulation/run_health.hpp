@@ -127,8 +127,10 @@ struct HealthFinding {
 /// @param record   Of scenario.sessions, in their order; as many.
 /// @param phasors  Of the same run: the squared signals that the quadratic factors are found from.
 /// @param truth    Of the run, SI.
+/// @param standard_errors  As ShiftBounds::of() takes them.
 [[nodiscard]] HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
                                          const HealthRecord& record, const RunPhasors& phasors,
-                                         const ParameterArray& truth);
+                                         const ParameterArray& truth,
+                                         std::span<const double> standard_errors);
 
 }  // namespace proofmass

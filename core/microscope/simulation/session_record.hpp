@@ -152,63 +152,72 @@ inline constexpr std::size_t line_block_size = LineWeights::block_size * 2 * num
   return LineWeights::block_size * 2 * (num_fit_lines + 1) + line_block_size * num_line_readers;
 }
 
+/// Sums of one reader of further lines: [signal of LineSignals][output].
+template <typename T>
+using LineSums = std::array<std::array<T, 2 * num_fit_lines_max>, num_line_signals>;
+
 /// Sums of what is recorded for methods that ask for further lines.
 template <typename T>
 struct FurtherSums {
-  /// Of each reader: [signal of LineSignals][output].
-  std::array<std::array<std::array<T, 2 * num_fit_lines_max>, num_line_signals>,
-             num_line_readers_max>
-      lines{};
+  std::array<LineSums<T>, num_line_readers_max> lines{};
   std::array<T, num_line_bases> plain{};  ///< Unweighted.
 };
 
-/// What is added for one line reader, in the order of LineSignals.
-/// @param values  The ground's signals.
-/// @param motion  Half the position of the moving masses, m.
-template <typename T>
-PROOFMASS_INLINE std::size_t line_signals(LineSignals signals,
-                                          const std::array<T, num_signals>& values,
-                                          const Observation<T>& observation, const T& motion,
-                                          std::array<T, num_line_signals>& line) {
-  for (std::size_t s = 0; s < num_line_bases; ++s) line[s] = values[s];
-  if (signals == LineSignals::squares) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      const T& x = observation.measured_K[k].x;
-      line[num_line_bases + k] = x * x;
+/// Adds one sample's signals of a line reader, in the order of LineSignals, to the sums of every
+/// output. The further ones are made where they are added: a list of them would be written to
+/// memory and read again.
+/// @param further  The signals that not every line has, each over `factor`.
+template <std::size_t num_further, typename T, typename Further>
+PROOFMASS_INLINE void add_line(const std::array<T, num_signals>& values, const Further& further,
+                               const T& factor, const double* weights, std::size_t num_outputs,
+                               LineSums<T>& sums) {
+  for (std::size_t i = 0; i < num_outputs; ++i) {
+    const T weight = T(weights[i]);
+    for (std::size_t s = 0; s < num_line_bases; ++s) {
+      sums[s][i] = sums[s][i] + weight * values[s];
     }
-    return num_line_bases + 2;
+    const T further_weight = weight * factor;
+    for (std::size_t s = 0; s < num_further; ++s) {
+      T& sum = sums[num_line_bases + s][i];
+      sum = sum + further_weight * further(s);
+    }
   }
-  const std::size_t first_row = index(Signal::gradient_xx), rest = index(Signal::gradient_yx);
-  if (signals == LineSignals::gradients) {
-    for (std::size_t i = 0; i < 6; ++i) line[num_line_bases + i] = values[rest + i];
-    return num_line_bases + 6;
-  }
-  for (std::size_t i = 0; i < 9; ++i) {
-    line[num_line_bases + i] = motion * values[i < 3 ? first_row + i : rest + i - 3];
-  }
-  return num_line_signals;
 }
 
 /// Adds one sample to the sums of the further lines.
+/// @param values   The ground's signals.
 /// @param weights  Of the block's first sample; `k` samples later is the one to be added.
 template <typename T, typename Shared>
 PROOFMASS_INLINE void add_further(const std::array<T, num_signals>& values,
                                   const Observation<T>& observation,
                                   const SharedSampleOf<Shared>& shared, const SessionSetup& setup,
                                   const double* weights, std::size_t k, FurtherSums<T>& sums) {
+  constexpr std::size_t first_row = index(Signal::gradient_xx), rest = index(Signal::gradient_yx);
   for (std::size_t s = 0; s < num_line_bases; ++s) sums.plain[s] = sums.plain[s] + values[s];
-  const T motion = T(0.5) * T(shared.mass_motion.position_m);
   for (std::size_t i = 0; i < setup.line_readers.size(); ++i) {
     const auto& [reader, signals] = setup.line_readers[i];
     const std::size_t num_outputs = 2 * reader.weights().num_fit_lines();
-    std::array<T, num_line_signals> line;
-    const std::size_t num_used = line_signals(signals, values, observation, motion, line);
     const double* const at = weights + i * line_block_size + k * num_outputs;
-    for (std::size_t output = 0; output < num_outputs; ++output) {
-      const T weight = T(at[output]);
-      for (std::size_t s = 0; s < num_used; ++s) {
-        T& sum = sums.lines[i][s][output];
-        sum = sum + weight * line[s];
+    switch (signals) {
+      case LineSignals::gradients: {
+        const auto row = [&](std::size_t s) { return values[rest + s]; };
+        add_line<6>(values, row, T(1.0), at, num_outputs, sums.lines[i]);
+        break;
+      }
+      case LineSignals::squares: {
+        const auto square = [&](std::size_t s) {
+          return observation.measured_K[s].x * observation.measured_K[s].x;
+        };
+        add_line<2>(values, square, T(1.0), at, num_outputs, sums.lines[i]);
+        break;
+      }
+      case LineSignals::moved: {
+        const auto element = [&](std::size_t s) {
+          return values[s < 3 ? first_row + s : rest + s - 3];
+        };
+        const T motion = T(0.5) * T(shared.mass_motion.position_m);
+        add_line<9>(values, element, motion, at, num_outputs, sums.lines[i]);
+        break;
       }
     }
   }

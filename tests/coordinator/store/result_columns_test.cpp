@@ -1,13 +1,16 @@
 #include "coordinator/store/result_columns.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
+#include <vector>
 
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+using ::testing::HasSubstr;
 
 using ResultColumns = test::StoreTest;
 
@@ -32,14 +35,73 @@ TEST_F(ResultColumns, AreThoseOfTheTable) {
   }
 }
 
+/// A result with standard errors σ_i = 2^(−10 − i): errors of 1σ, 2σ, 3σ in turn with the run.
+Delivery delivery_with_standard_errors(std::uint64_t run) {
+  Delivery delivery = test::delivery_of(run);
+  RunResult& result = delivery.result;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    const double sigma = std::ldexp(1.0, -10 - static_cast<int>(i));
+    result.truth[i] = 0.5;
+    result.estimate[i] = 0.5 - static_cast<double>(run % 3 + 1) * sigma;
+    result.standard_error.push_back(sigma);
+  }
+  result.fit = {36.25, 37.5};
+  return delivery;
+}
+
+TEST_F(ResultColumns, KeepStandardErrorsAndTheirFit) {
+  Store store = create(10);
+  std::vector<Delivery> deliveries = test::deliveries_of(4, 5);  // Without standard errors.
+  for (std::uint64_t run = 0; run < 4; ++run) {
+    deliveries.push_back(delivery_with_standard_errors(run));
+  }
+  store.commit(deliveries);
+  std::vector<RunResult> results;
+  store.for_each_result([&](const RunResult& result) { results.push_back(result); });
+  ASSERT_EQ(results.size(), 5U);
+  EXPECT_EQ(results[3].standard_error, deliveries[4].result.standard_error);
+  EXPECT_EQ(results[3].fit, deliveries[4].result.fit);
+  EXPECT_TRUE(results[4].standard_error.empty());
+  EXPECT_TRUE(results[4].fit.empty());
+  EXPECT_EQ(text("SELECT group_concat(standard_error * 1024.0) FROM error_long WHERE run_index = 0"
+                 " AND parameter IN ('a_c11_delta_x', 'a_c11_delta_z')"),
+            "1.0,0.5");
+  EXPECT_EQ(text("SELECT chi_squared || ' ' || degrees_of_freedom FROM run WHERE run_index = 1"),
+            "36.25 37.5");
+  // Errors of 1, 2, 3, 1 standard errors: a mean square of 15/4, two of four below 1.96.
+  EXPECT_EQ(text("SELECT group_concat(DISTINCT num_runs || ' ' || squared_ratio || ' ' || "
+                 "within_95) FROM standard_errors"),
+            "4 3.75 0.5");
+  EXPECT_EQ(text("SELECT group_concat(parameter) FROM standard_errors"),
+            text("SELECT group_concat(parameter) FROM (SELECT parameter FROM parameter ORDER BY "
+                 "position)"));
+}
+
+TEST_F(ResultColumns, HaveNoHalfOfTheStandardErrors) {
+  create(10).commit(std::vector{delivery_with_standard_errors(0)});
+  const auto refusal = [&] {
+    return test::store_error_of(
+        [&] { Store::open_read_only(file()).for_each_result([](const RunResult&) {}); });
+  };
+  change("UPDATE run_result SET fit_degrees_of_freedom = -1");
+  EXPECT_THAT(refusal(), HasSubstr("fit_degrees_of_freedom of run 0 (must be in [0, 1e+90])"));
+  change("UPDATE run_result SET fit_chi_squared = NULL");
+  EXPECT_THAT(refusal(), HasSubstr("fit_chi_squared of run 0 (must be in [0, 1e+90])"));
+  change("UPDATE run_result SET standard_error_k2c_s2_m = NULL");
+  EXPECT_THAT(refusal(), HasSubstr("standard_error_k2c_s2_m = NULL of run 0"));
+}
+
 TEST(ValueColumns, HaveTheUnitOfTheirParameter) {
   EXPECT_EQ(value_columns()[3].name, "truth_a_c12_rad");
   EXPECT_EQ(value_columns()[3].own_name, "a_c12_rad");
   EXPECT_EQ(value_columns()[3].unit, "rad");
   EXPECT_EQ(value_columns()[29].name, "error_k2c_s2_m");
   EXPECT_EQ(value_columns()[29].unit, "s²/m");
-  EXPECT_EQ(value_columns()[31].name, "health_attitude_rad");
-  EXPECT_EQ(value_columns()[31].unit, "rad");
+  EXPECT_EQ(value_columns()[33].name, "standard_error_a_c12_rad");
+  EXPECT_EQ(value_columns()[33].unit, "rad");
+  EXPECT_EQ(value_columns()[40].name, "fit_chi_squared");
+  EXPECT_EQ(value_columns()[43].name, "health_attitude_rad");
+  EXPECT_EQ(value_columns()[43].unit, "rad");
 }
 
 TEST(SameBits, AreMoreThanEqualValuesAndKnowNoSignOfZero) {

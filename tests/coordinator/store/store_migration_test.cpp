@@ -1,5 +1,5 @@
 // Files that older programs made: here those of the first version of the schema, while the newest
-// has the steps of the program and one more (schema/0010_later.sql).
+// has the steps of the program and one more (schema/0011_later.sql).
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -56,7 +56,7 @@ class StoreMigration : public test::StoreTest {
 };
 
 // If the linker took the library's own files, there would be one version less.
-TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 10); }
+TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 11); }
 
 TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   make_older_file();
@@ -66,7 +66,7 @@ TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   EXPECT_THAT(store.finished_runs(),
               ElementsAre(RunRange{RunIndex{0}, 2}, RunRange{RunIndex{4}, 1}));
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.integer("PRAGMA user_version"), 10);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 11);
   EXPECT_EQ(
       database.text("SELECT group_concat(run_index || ' ' || worker || ' ' || attempt || ' ' || "
                     "d.compute_s || ' ' || received_unix_s, ';') "
@@ -76,6 +76,20 @@ TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
   EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
   EXPECT_EQ(store.commit(test::deliveries_of(0, 5)).num_new, 2u);
+}
+
+// Its runs have none, as those of today that a method without them estimates.
+TEST_F(StoreMigration, AddsStandardErrorsThatOldRunsDoNotHave) {
+  make_older_file();
+  Store store = Store::open(file());
+  for (const RunResult& result : test::results_in(store)) {
+    EXPECT_TRUE(result.standard_error.empty());
+    EXPECT_TRUE(result.fit.empty());
+  }
+  EXPECT_EQ(integer("SELECT count(*) FROM standard_errors"), 0);
+  EXPECT_EQ(integer("SELECT count(*) FROM pragma_table_info('run_result') WHERE name LIKE "
+                    "'standard_error_%' OR name LIKE 'fit_%'"),
+            12);
 }
 
 // A file keeps the budget of the program that made it, which took one level for all runs. Run 2 has

@@ -66,6 +66,10 @@ RunResult some_result(RunIndex run, RunStatus status) {
     if (result.has_estimate()) result.estimate[i] = 1.0 / (3.0 + static_cast<double>(i));
   }
   if (result.has_truth()) result.health = values_of({1e-7, 2e-5, 1.1e-12, 3e-4, 1e90});
+  if (status == RunStatus::completed) {
+    result.standard_error.assign(num_parameters, 1.0 / 3.0);
+    result.fit = {37.0 / 3.0, hard_numbers[0] * hard_numbers[0]};
+  }
   if (status == RunStatus::lost)
     result.loss = loss_of(LossCause::residual, SessionTarget::k2_sensor_2);
   return result;
@@ -178,6 +182,8 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
     EXPECT_EQ(got.result.run, sent.result.run);
     EXPECT_EQ(got.result.status, sent.result.status);
     EXPECT_EQ(got.result.health, sent.result.health);
+    EXPECT_EQ(got.result.standard_error, sent.result.standard_error);
+    EXPECT_EQ(got.result.fit, sent.result.fit);
     EXPECT_EQ(got.result.loss, sent.result.loss);
     EXPECT_EQ(got.result.num_draws, 3U);
     EXPECT_EQ(got.result.num_rounds, 7U);

@@ -313,6 +313,21 @@ TEST(MalformedResultBatch, HasAttemptAndResults) {
             "results = 0 entries (must be in [1, 4096])");
 }
 
+TEST(MalformedComputedRun, HasAllStandardErrorsWithTheirFitOrNone) {
+  const auto with = [](int num_errors, double chi_squared) {
+    return [=](auto& run) {
+      for (int i = 0; i < num_errors; ++i) run.add_standard_error(1.0);
+      run.add_fit(chi_squared);
+      run.add_fit(3.0);
+    };
+  };
+  EXPECT_EQ(refusal_of_run(with(10, 1.0)), "accepted");
+  EXPECT_EQ(refusal_of_run(with(9, 1.0)),
+            "standard_error = 9 entries (must be 10 with this status)");
+  EXPECT_EQ(refusal_of_run(with(10, -1.0)), "fit.chi_squared = -1 (must be in [0, 1e+90])");
+  EXPECT_EQ(refusal_of_run(with(0, 1.0)), "fit = 2 entries (must be 0 with this status)");
+}
+
 TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
   EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_health(); }),
             "health = 0 entries (must be 5 with this status)");

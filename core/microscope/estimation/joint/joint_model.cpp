@@ -1,5 +1,6 @@
 #include "core/microscope/estimation/joint/joint_model.hpp"
 
+#include <numbers>
 #include <span>
 
 namespace proofmass {
@@ -105,6 +106,20 @@ Vector motion_direction(const Session& session, const Unknowns& x) {
   return {x[Unknown::coupling_y] - x[Parameter::a_c13], Dual(0.0) - x[Unknown::alignment_x], 1.0};
 }
 
+/// What multiplies the line of [T̂ − În]_xx at low frequency, while one mass moves along X.
+Dual rectified_gradient(const Session& session, const Dual& k2_1, const Dual& k2_2) {
+  const Excitation* const excitation = mass_excitation(session);
+  if (excitation == nullptr || excitation->axis != Axis::x ||
+      excitation->motion == MassMotion::opposition) {
+    return 0.0;
+  }
+  const double speed_m_s =
+      2.0 * std::numbers::pi * excitation->frequency_hz * excitation->amplitude;
+  const Dual half_square(0.5 * speed_m_s * speed_m_s);
+  return excitation->motion == MassMotion::mass_1 ? half_square * k2_1
+                                                  : Dual(0.0) - half_square * k2_2;
+}
+
 Dual constant_of(const std::array<double, num_line_bases>& means, const Unknowns& x) {
   const Vector offcentring = x.offcentring();
   Dual b = x[Unknown::differential_bias];
@@ -152,6 +167,7 @@ LineCoefficients line_coefficients(const Session& session,
   Vector half_offcentring = x.offcentring();
   for (Dual& component : half_offcentring) component = half * component;
   of.gradients = tilted_product({one + kappa, a_c12 / a_c11, a_c13 / a_c11}, half_offcentring, x);
+  of.gradients[0] = of.gradients[0] + rectified_gradient(session, k2_1, k2_2);
   of.moved = tilted_product({a_c11 + kappa, a_c12, a_c13}, motion_direction(session, x), x);
   return of;
 }

@@ -64,6 +64,19 @@ TEST(ResultDigest, DependsOnEveryNumber) {
   EXPECT_EQ(digests.size(), 1 + changed.size());
 }
 
+TEST(ResultDigest, DependsOnStandardErrorsAndTheirFit) {
+  const RunResult known = known_result(RunStatus::completed);
+  RunResult with_errors = known;
+  with_errors.standard_error.assign(num_parameters, 0.5);
+  with_errors.fit = {3.0, 4.0};
+  RunResult other_fit = with_errors;
+  other_fit.fit[0] = 3.5;
+  for (const auto& [a, b] : {std::pair{known, with_errors}, std::pair{with_errors, other_fit}}) {
+    EXPECT_NE(digest(a), digest(b));
+    EXPECT_FALSE(are_equal(a, b));
+  }
+}
+
 TEST(AreEqual, ComparesHealthAndLoss) {
   const RunResult known = known_result(RunStatus::lost);
   RunResult other = known;

@@ -110,14 +110,14 @@ constexpr ParameterArray largest_truth{20e-6, 20e-6,  20e-6,  2.6e-3,  2.6e-3,
 
 double part_of(const Scenario& scenario, const LoopHealth& health, Effect effect,
                Parameter parameter) {
-  for (const Shift& shift : ShiftBounds(scenario).of(health, largest_truth)) {
+  for (const Shift& shift : ShiftBounds(scenario).of(health, largest_truth, {})) {
     if (shift.effect == effect && shift.parameter == parameter) return shift.part;
   }
   return 0.0;
 }
 
 TEST(ShiftBounds, GiveNoWarningInANominalCampaign) {
-  for (const Shift& shift : ShiftBounds(Scenario()).of(nominal_health, largest_truth)) {
+  for (const Shift& shift : ShiftBounds(Scenario()).of(nominal_health, largest_truth, {})) {
     EXPECT_LT(shift.part, warned_part) << name_of(shift.effect) << index(shift.parameter);
   }
 }
@@ -145,6 +145,36 @@ TEST(ShiftBounds, AreThoseOfTheTable) {
               14000.0 * 20e-6 * (17.5 * 17.5 + 0.5) * n * n / 1.5e-4, 1e-6);
 }
 
+// The bounds by standard errors: noise of the density of the sensors' floor makes errors of σ at
+// most, of which three are given, and a line moves an estimate by no more than σ for each standard
+// deviation that the line moves.
+TEST(ShiftBounds, FollowTheStandardErrorsOfAMethodThatHasThem) {
+  const Scenario scenario;
+  const ShiftBounds bounds(scenario);
+  const ParameterArray sigmas{4e-9, 4e-9, 6e-8, 4e-4, 4e-4, 3e-7, 2e-7, 2e-7, 8.0, 9.0};
+  const auto part = [&](const LoopHealth& health, Effect effect, Parameter parameter) {
+    for (const Shift& shift : bounds.of(health, largest_truth, sigmas)) {
+      if (shift.effect == effect && shift.parameter == parameter) return shift.part;
+    }
+    return 0.0;
+  };
+  for (const Shift& shift : bounds.of(nominal_health, largest_truth, sigmas)) {
+    EXPECT_LT(shift.part, warned_part) << name_of(shift.effect) << index(shift.parameter);
+    EXPECT_NE(shift.effect, Effect::spin);
+  }
+  const double floor = 0.5 * 1.4e-12 * 1.4e-12;
+  LoopHealth health{.quadratic_noise = 4.0 * floor / least_noise_density(scenario)};
+  EXPECT_NEAR(part(health, Effect::quadratic_noise, Parameter::a_c12), 3.0 * 2.0 * 4e-4 / 9e-4,
+              1e-9);
+  health = {.residual_m_s2 = 1e-9};
+  // 140 orbits less the transients, two lines each, moved by ½ K2d (2e-9)².
+  const double duration_s =
+      140.0 * scenario.orbit.period_s -
+      static_cast<double>(scenario.sessions.size()) * scenario.estimation.transient_s;
+  EXPECT_NEAR(part(health, Effect::residual, Parameter::a_c11_delta_x),
+              4e-9 * std::sqrt(2.0 * duration_s / floor) * 0.5 * 14000.0 * 4e-18 / 1e-7, 1e-6);
+}
+
 // Noise that the user asks for is no reason to lose a run: errors show it.
 TEST(ShiftBounds, LoseNoRunToNoiseThatTheSensorsExplain) {
   Scenario scenario;
@@ -156,7 +186,7 @@ TEST(ShiftBounds, LoseNoRunToNoiseThatTheSensorsExplain) {
     ParameterArray truth = largest_truth;
     truth[index(Parameter::k2d)] = truth[index(Parameter::k2c)] = 0.0;
     truth[index(only)] = 14000.0;
-    for (const Shift& shift : ShiftBounds(scenario).of(health, truth)) {
+    for (const Shift& shift : ShiftBounds(scenario).of(health, truth, {})) {
       EXPECT_LE(shift.part, shift.part_of_loss) << name_of(shift.effect) << index(shift.parameter);
     }
   }

@@ -136,7 +136,8 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
   for (const Quantity& quantity : results_of(with).quantities) {
     EXPECT_TRUE(quantity.has_standard_error) << quantity.name;
   }
-  for (const Quantity& quantity : results_of(estimation_methods()).quantities) {
+  const std::array without{*estimation_methods().begin()};
+  for (const Quantity& quantity : results_of(without).quantities) {
     EXPECT_FALSE(quantity.has_standard_error) << quantity.name;
   }
 }

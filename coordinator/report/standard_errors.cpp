@@ -1,0 +1,169 @@
+#include "coordinator/report/standard_errors.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/report_tables.hpp"
+#include "core/model.hpp"
+#include "core/statistics/distribution.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+std::vector<std::size_t> quantities_with_errors() {
+  std::vector<std::size_t> indices;
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    if (quantities[i].has_standard_error) indices.push_back(i);
+  }
+  return indices;
+}
+
+const Quantity& quantity_of(const StandardErrorStatistic& statistic) {
+  return model().results().quantities[statistic.quantity];
+}
+
+double share_within(const StandardErrorStatistic& statistic) {
+  return static_cast<double>(statistic.num_within) / static_cast<double>(statistic.num_runs);
+}
+
+/// `the fits have a mean chi_squared of 36.4, degrees_of_freedom 36.2`; empty without any.
+std::string fit_sentence(const std::vector<double>& fit) {
+  std::string text;
+  for (std::size_t i = 0; i < fit.size(); ++i) {
+    text += fmt::format("{}{} {}", text.empty() ? "means of the fits: " : ", ",
+                        model().results().fit[i].column(), figure_text(fit[i]));
+  }
+  return text;
+}
+
+Chart pull_chart(const StandardErrorStatistic& statistic, bool is_first) {
+  const Histogram& histogram = statistic.pulls;
+  Bars bars{.edges = histogram.edges};
+  Line law{.name = is_first ? "normal law" : "", .ink = Ink::second, .dash = Dash::dashed};
+  for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
+    bars.heights.push_back(static_cast<double>(histogram.counts[i]));
+    const double from = histogram.edges[i], to = histogram.edges[i + 1];
+    law.points.push_back(
+        {0.5 * (from + to), static_cast<double>(statistic.num_runs) *
+                                (normal_cumulative(to) - normal_cumulative(from))});
+  }
+  const Quantity& quantity = quantity_of(statistic);
+  return {.text = {.id = fmt::format("pull-{}", quantity.name),
+                   .title = std::string(quantity.symbol),
+                   .description = ""},
+          .x = {.label = "error / standard error"},
+          .y = {.label = "runs"},
+          .layers = {std::move(bars), std::move(law), LimitLine{.value = -normal_95},
+                     LimitLine{.value = normal_95}},
+          .plot_height = 90.0};
+}
+
+}  // namespace
+
+void leave_out_intervals(StandardErrorStatistics& statistics) {
+  for (StandardErrorStatistic& statistic : statistics.quantities) statistic.within.reset();
+}
+
+void RunningStandardErrors::add(const RunResult& result) {
+  if (!result.is_completed() || result.standard_error.empty()) return;
+  ++num_runs_;
+  const std::vector<std::size_t> indices = quantities_with_errors();
+  quantities_.resize(indices.size());
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const double error = result.error(indices[i]);
+    const double sigma = result.standard_error[i];
+    Sums& sums = quantities_[i];
+    sums.errors += sigma;
+    sums.squares += sigma * sigma;
+    sums.squared_errors += error * error;
+    sums.fourth_powers += error * error * error * error;
+    if (std::abs(error) < normal_95 * sigma) ++sums.num_within;
+    if (sigma > 0.0 && is_in_range(error / sigma)) sums.pulls.add(error / sigma);
+  }
+  fit_.resize(result.fit.size());
+  for (std::size_t i = 0; i < fit_.size(); ++i) fit_[i] += result.fit[i];
+}
+
+StandardErrorStatistics RunningStandardErrors::statistics() const {
+  StandardErrorStatistics statistics;
+  const std::vector<std::size_t> indices = quantities_with_errors();
+  const auto n = static_cast<double>(num_runs_);
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    const Sums& sums = quantities_[i];
+    const double mean_square = sums.squares / n, squared_error = sums.squared_errors / n;
+    const double scatter = sums.fourth_powers / n - squared_error * squared_error;
+    const auto over_square = [&](double x) { return mean_square > 0.0 ? x / mean_square : 0.0; };
+    statistics.quantities.push_back(
+        {.quantity = indices[i],
+         .num_runs = num_runs_,
+         .mean = sums.errors / n,
+         .squared_ratio = over_square(squared_error),
+         .squared_ratio_error = over_square(std::sqrt(std::max(scatter, 0.0) / n)),
+         .num_within = sums.num_within,
+         .within =
+             probability_interval(static_cast<double>(sums.num_within), n, default_confidence),
+         .pulls = sums.pulls.histogram()});
+  }
+  for (const double sum : fit_) statistics.fit.push_back(sum / n);
+  return statistics;
+}
+
+Table standard_error_table(const StandardErrorStatistics& statistics) {
+  if (statistics.quantities.empty()) return {};
+  constexpr const char* ratio = "error²/σ²";
+  constexpr const char* within = "within 1.96 σ, %";
+  Table table{
+      .id = "standard-error-table",
+      .caption = fmt::format("Standard errors σ of the estimates of {} {}",
+                             statistics.quantities.front().num_runs,
+                             statistics.quantities.front().num_runs == 1 ? "run" : "runs"),
+      .columns = {{"parameter", true, 11},
+                  {"unit", true, 9},
+                  {"mean", false, 9},
+                  {"mean", false, 10, ratio, true},
+                  {"±", false, 9, ratio},
+                  {"runs", false, 9, within, true},
+                  {"from", false, 9, within},
+                  {"to", false, 9, within}},
+      .notes = {
+          "honest ones have a ratio of 1, and 95 % of the errors within; from, to: 95 % interval"}};
+  for (const StandardErrorStatistic& statistic : statistics.quantities) {
+    const Quantity& quantity = quantity_of(statistic);
+    Row row{quantity.symbol,
+            unit_cell(quantity),
+            figure_cell(statistic.mean, quantity.display_scale),
+            figure_cell(statistic.squared_ratio),
+            figure_cell(statistic.squared_ratio_error),
+            figure_cell(share_within(statistic), 0.01)};
+    for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
+      row.push_back(statistic.within ? figure_cell((*statistic.within).*end, 0.01) : no_figure());
+    }
+    table.rows.push_back(std::move(row));
+  }
+  if (!statistics.fit.empty()) table.notes.push_back(fit_sentence(statistics.fit));
+  return table;
+}
+
+std::optional<ChartGrid> pull_overview(const StandardErrorStatistics& statistics) {
+  if (statistics.quantities.empty()) return std::nullopt;
+  ChartGrid grid{.text = {.id = "pulls",
+                          .title = "Errors in units of their standard errors",
+                          .description = "Histograms beside the normal law of honest standard "
+                                         "errors; the lines hold 95 % of it."},
+                 .num_columns = 2,
+                 .charts = {}};
+  for (const StandardErrorStatistic& statistic : statistics.quantities) {
+    grid.charts.push_back(pull_chart(statistic, grid.charts.empty()));
+    grid.text.description += fmt::format(" {}: {} % of the runs.", quantity_of(statistic).symbol,
+                                         figure_text(100.0 * share_within(statistic)));
+  }
+  return grid;
+}
+
+}  // namespace proofmass::coordinator

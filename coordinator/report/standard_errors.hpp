@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/histogram.hpp"
+#include "coordinator/table/table.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/statistics/interval.hpp"
+
+namespace proofmass::coordinator {
+
+/// Whether the standard errors of a quantity say how far its estimates are off: over the completed
+/// runs that have them. Of honest ones squared_ratio is 1, and 95 % of the errors are within
+/// normal_95 of them.
+struct StandardErrorStatistic {
+  std::size_t quantity = 0;  ///< Index into the quantities of the ResultSchema.
+  std::uint64_t num_runs = 0;
+  double mean = 0.0;           ///< Of the standard errors, SI.
+  double squared_ratio = 0.0;  ///< Mean of error² over the mean of the standard errors' squares.
+  double squared_ratio_error = 0.0;  ///< Its own standard error.
+  std::uint64_t num_within = 0;      ///< Runs whose |error| is within normal_95 standard errors.
+  std::optional<Interval> within;    ///< Of their share among all draws, 95 %.
+  Histogram pulls;                   ///< Of error / standard error.
+};
+
+/// Half the width of the interval, in standard deviations, that holds 95 % of a normal law.
+inline constexpr double normal_95 = 1.96;
+
+struct StandardErrorStatistics {
+  std::vector<StandardErrorStatistic> quantities;  ///< None if no run has standard errors.
+  std::vector<double> fit;                         ///< Means of the fit quantities of these runs.
+};
+
+/// For draws that are not independent.
+void leave_out_intervals(StandardErrorStatistics& statistics);
+
+/// Computes them from results that are seen once. Memory is fixed.
+class RunningStandardErrors {
+ public:
+  void add(const RunResult& result);
+  [[nodiscard]] StandardErrorStatistics statistics() const;
+
+ private:
+  struct Sums {
+    double errors = 0.0;   ///< Of the standard errors; below of their squares.
+    double squares = 0.0;  ///< Those of all the others are of what they are called.
+    double squared_errors = 0.0;
+    double fourth_powers = 0.0;  ///< Of the errors.
+    std::uint64_t num_within = 0;
+    ErrorBins pulls;
+  };
+  std::uint64_t num_runs_ = 0;
+  std::vector<Sums> quantities_;  ///< Of those that have a standard error.
+  std::vector<double> fit_;
+};
+
+/// No rows without standard errors.
+[[nodiscard]] Table standard_error_table(const StandardErrorStatistics& statistics);
+
+/// Error over standard error of each quantity beside the normal law that it should follow; nothing
+/// without standard errors.
+[[nodiscard]] std::optional<ChartGrid> pull_overview(const StandardErrorStatistics& statistics);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,115 @@
+#include "coordinator/report/standard_errors.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <vector>
+
+#include "coordinator/charts/svg.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/review_documents.hpp"
+#include "coordinator/table/terminal_table.hpp"
+#include "tests/coordinator/charts/markup_reading.hpp"
+#include "tests/coordinator/report/review_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A run whose errors are this many of its standard errors, which are a tenth of the objectives.
+RunResult result_off_by(std::uint64_t run, double pull) {
+  RunResult result = test::result_of(run);
+  const std::vector<double> objectives = test::campaign_of(1).objectives();
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    result.truth[i] = 0.0;
+    result.estimate[i] = 0.1 * pull * objectives[i];
+    result.standard_error.push_back(0.1 * objectives[i]);
+  }
+  result.fit = {30.0 + static_cast<double>(run), 32.0};
+  return result;
+}
+
+const std::vector<double> pulls{-3.0, -1.0, 0.5, 1.5, 2.0};
+
+StandardErrorStatistics of_five_runs() {
+  RunningStandardErrors running;
+  for (std::size_t run = 0; run < pulls.size(); ++run) running.add(result_off_by(run, pulls[run]));
+  running.add(test::result_of(5));                            // Without standard errors.
+  running.add(test::result_of(6, RunStatus::not_converged));  // Counts as a miss elsewhere.
+  return running.statistics();
+}
+
+// Squares of the pulls: 9, 1, 0.25, 2.25 and 4, whose mean is 3.3 and whose standard deviation,
+// with n, is √(103.125/5 − 3.3²) = 3.1197.
+TEST(StandardErrors, AreHeldAgainstTheErrors) {
+  const StandardErrorStatistics statistics = of_five_runs();
+  ASSERT_EQ(statistics.quantities.size(), 10U);
+  const std::vector<double> objectives = test::campaign_of(1).objectives();
+  for (const StandardErrorStatistic& of : statistics.quantities) {
+    EXPECT_EQ(of.num_runs, 5U);
+    EXPECT_NEAR(of.mean / objectives[of.quantity], 0.1, 1e-15);
+    EXPECT_NEAR(of.squared_ratio, 3.3, 1e-12);
+    EXPECT_NEAR(of.squared_ratio_error, std::sqrt(103.125 / 5.0 - 3.3 * 3.3) / std::sqrt(5.0),
+                1e-12);
+    EXPECT_EQ(of.num_within, 3U);
+    EXPECT_NEAR(of.pulls.edges.front(), -3.0, 0.126);  // Bins are 1/8 wide.
+    std::uint64_t num_runs = 0;
+    for (const std::uint64_t count : of.pulls.counts) num_runs += count;
+    EXPECT_EQ(num_runs, 5U);
+  }
+  EXPECT_EQ(statistics.fit, (std::vector<double>{32.0, 32.0}));
+}
+
+// 3 of 5 by Clopper and Pearson: 14.7 % to 94.7 %.
+TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
+  const StandardErrorStatistics statistics = of_five_runs();
+  const std::string text = terminal_text(standard_error_table(statistics), {});
+  EXPECT_THAT(text, AllOf(HasSubstr("Standard errors σ of the estimates of 5 runs"),
+                          HasSubstr("chi_squared 32, degrees_of_freedom 32")));
+  EXPECT_THAT(
+      text, ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 +1.40 .* +60.0 +14.7 +94.7"));
+  const std::string svg = svg_of(*pull_overview(statistics), SvgUse::embedded);
+  EXPECT_EQ(test::malformed_part(svg), "");
+  EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law")));
+}
+
+TEST(StandardErrors, AreNowhereWithoutAny) {
+  RunningStandardErrors running;
+  running.add(test::result_of(0));
+  EXPECT_TRUE(standard_error_table(running.statistics()).rows.empty());
+  EXPECT_FALSE(pull_overview(running.statistics()));
+}
+
+using StandardErrorsTest = test::ReviewTest;
+
+TEST_F(StandardErrorsTest, AreInEveryReport) {
+  const MicroscopeCampaign campaign = test::campaign_of(5);
+  Store store = Store::create(file(), campaign, canonical_definition(campaign));
+  std::vector<Delivery> deliveries;
+  for (std::size_t run = 0; run < pulls.size(); ++run) {
+    deliveries.push_back(test::delivery_of(run));
+    deliveries.back().result = result_off_by(run, pulls[run]);
+  }
+  store.commit(deliveries);
+  const std::string caption = "Standard errors σ of the estimates of 5 runs";
+  const Review review = review_of(store, 5);
+  EXPECT_THAT(report_text(store, test::campaign_of(5)), HasSubstr(caption));
+  EXPECT_THAT(review_html(review), AllOf(HasSubstr(caption), HasSubstr("id=\"pulls-title\"")));
+  EXPECT_THAT(review_markdown(review), HasSubstr(caption));
+  EXPECT_THAT(report_json(store, test::campaign_of(5), {}, {}),
+              AllOf(HasSubstr("\"num_within_95\": 3"), HasSubstr("\"mean_chi_squared\": 32.0")));
+}
+
+TEST_F(StandardErrorsTest, AreInNoReportWithoutThem) {
+  const Store store = store_with(5);
+  EXPECT_THAT(review_html(review_of(store, 5)), Not(HasSubstr("tandard error")));
+  EXPECT_THAT(review_markdown(review_of(store, 5)), Not(HasSubstr("tandard error")));
+  EXPECT_THAT(report_json(store, test::campaign_of(5), {}, {}),
+              HasSubstr("\"standard_errors\": null"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
