@@ -1,15 +1,6 @@
 #include "coordinator/report/sensitivity.hpp"
 
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <span>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/table/terminal_table.hpp"
@@ -18,14 +9,10 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/report/text_lines.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::Each;
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 /// Every quantity uniform in [-1, 1]; the error of K2c is that with index 7, and that of a_c12 the
 /// square of that with index 20.

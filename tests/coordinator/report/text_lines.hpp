@@ -1,12 +1,7 @@
 #pragma once
 
-#include <gmock/gmock.h>
-
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "proto/text/visible_text.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 
