@@ -7,13 +7,22 @@
 #include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/table/terminal_table.hpp"
-#include "tests/coordinator/report/text_lines.hpp"
+#include "proto/text/visible_text.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) <= 80; }
 
 // Tables as lines of a terminal.
 
@@ -60,9 +69,9 @@ TEST(GivenUpRuns, AreNamed) {
 TEST(GivenUpRuns, AreNamedAsFarAsTheLineHasRoom) {
   std::vector<RunRange> runs;
   for (std::uint64_t run = 100'000'000; run < 100'000'100; run += 2) runs.push_back({{run}, 1});
-  const std::vector<std::string> lines = test::lines_of(given_up_text(runs));
+  const std::vector<std::string> lines = lines_of(given_up_text(runs));
   ASSERT_EQ(lines.size(), 1U);
-  EXPECT_THAT(lines[0], test::FitsATerminal());
+  EXPECT_THAT(lines[0], FitsATerminal());
   EXPECT_THAT(lines[0], testing::EndsWith(" 100000004 ..."));
 }
 
@@ -86,17 +95,17 @@ TEST(IntervalTable, BeginsAtZeroWhereAMagnitudeDoes) {
   CampaignStatistics statistics = paper_statistics(2);
   AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c11_delta_x)];
   accuracy.mean_interval = Interval{.lower = -83.0e-9, .upper = 125.4e-9, .confidence = 0.95};
-  EXPECT_THAT(test::lines_of(interval_text(statistics, 0)),
+  EXPECT_THAT(lines_of(interval_text(statistics, 0)),
               Contains("a_c11·Δx       10.0       0     125 │    7.30       -       - │"
                        "        0      -"));
 }
 
 TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
-  EXPECT_THAT(test::lines_of(interval_text(paper_statistics(1), 0)),
+  EXPECT_THAT(lines_of(interval_text(paper_statistics(1), 0)),
               Contains("a_c11·Δx       10.0       -       - │       -       -       - │"
                        "        0      -"));
   EXPECT_THAT(accuracy_text(MicroscopeCampaign{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
-  EXPECT_THAT(test::lines_of(accuracy_text(MicroscopeCampaign{}, paper_statistics(1))),
+  EXPECT_THAT(lines_of(accuracy_text(MicroscopeCampaign{}, paper_statistics(1))),
               Contains("a_c11·Δx   nm             100    40.0    10.0       -      0 │"
                        "    40    10   7.3"));
 }
@@ -131,16 +140,15 @@ TEST(Report, FitsATerminal) {
     }
     MicroscopeCampaign campaign;
     for (double& objective : campaign.scenario.objectives) objective *= factor;
-    EXPECT_THAT(test::lines_of(accuracy_text(campaign, statistics)), Each(test::FitsATerminal()));
-    EXPECT_THAT(test::lines_of(interval_text(statistics, 0)), Each(test::FitsATerminal()));
-    EXPECT_THAT(test::lines_of(error_text(statistics, most)), Each(test::FitsATerminal()));
-    EXPECT_THAT(test::lines_of(budget_text(campaign, statistics, RunTotals{.worst_run = {most}})),
-                Each(test::FitsATerminal()));
+    EXPECT_THAT(lines_of(accuracy_text(campaign, statistics)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(interval_text(statistics, 0)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(error_text(statistics, most)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(budget_text(campaign, statistics, RunTotals{.worst_run = {most}})),
+                Each(FitsATerminal()));
   }
-  EXPECT_THAT(
-      test::lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
-                                  most, statistics, std::string(64, 'f'))),
-      Each(test::FitsATerminal()));
+  EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
+                                    most, statistics, std::string(64, 'f'))),
+              Each(FitsATerminal()));
 }
 
 using StoredReport = test::StoreTest;
