@@ -2,14 +2,6 @@
 // numbers were made by the release build on x86-64. They change only with the model, together with
 // model_version.
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <bit>
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "core/math/elementary.hpp"
 #include "core/math/hash.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
@@ -18,6 +10,7 @@
 #include "core/random/normal_deviates.hpp"
 #include "core/random/stream.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,17 +1,7 @@
 // Files that hold anything: campaign databases by all that reads them, and the texts that people
 // write.
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cstdint>
-#include <filesystem>
-#include <fstream>
-#include <functional>
 #include <regex>
-#include <set>
-#include <string>
-#include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/campaign_file/data_file.hpp"
@@ -21,10 +11,11 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "proto/link/keys.hpp"
-#include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/fuzz/file_mutator.hpp"
 #include "tests/fuzz/file_world.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -33,7 +24,7 @@ constexpr std::uint64_t num_files = 20 * num_file_uses;
 constexpr std::uint64_t num_texts = 1000;
 
 TEST(MutatedCampaignFiles, AreReadOrRefused) {
-  const TemporaryDirectory directory;
+  const ScratchDirectory directory;
   std::filesystem::create_directories(directory / "seeds");
   std::filesystem::create_directories(directory / "used");
   const auto originals = make_seed_files(directory / "seeds");
@@ -47,7 +38,7 @@ TEST(MutatedCampaignFiles, AreReadOrRefused) {
 
 // Without this a mutation that nothing reads would pass.
 TEST(MutatedCampaignFiles, BeginFromFilesThatEveryUseTakes) {
-  const TemporaryDirectory directory;
+  const ScratchDirectory directory;
   std::filesystem::create_directories(directory / "seeds");
   std::filesystem::create_directories(directory / "used");
   const auto used = directory / "used/x.db";
@@ -77,7 +68,7 @@ class MutatedTexts : public testing::Test {
     EXPECT_LT(num_read, num_texts);
   }
 
-  TemporaryDirectory directory_;
+  ScratchDirectory directory_;
 };
 
 TEST_F(MutatedTexts, AreDefinitionsOrRefused) {

@@ -1,17 +1,9 @@
 // What the fuzzer found and began from, and many changes of it, without the fuzzer.
 
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
-#include <string>
-#include <vector>
-
 #include "tests/fuzz/fuzz_input.hpp"
 #include "tests/fuzz/mutator.hpp"
 #include "tests/fuzz/seed_inputs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {

@@ -1,10 +1,7 @@
-#include <gtest/gtest.h>
-
-#include <variant>
-
 #include "proto/wire/codec.hpp"
 #include "proto/wire/conversions.hpp"
 #include "tests/system/simulated_network_coordinator.hpp"
+#include "tests/test.hpp"
 
 // What a coordinator may send, whatever has happened to it.
 

@@ -1,24 +1,17 @@
 #include "tests/system/simulated_network_coordinator.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
 #include <cstdio>
-#include <cstdlib>
-#include <utility>
-#include <variant>
 
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/names.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/support/messages.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {
 
-using namespace std::chrono_literals;
 using coordinator::Phase;
 
 coordinator::DispatchConfig quick_config() {

@@ -8,17 +8,10 @@
 // first n worlds, which should be 20,000 after a change of the dispatch or of a worker's
 // conversation; PROOFMASS_TOTALS=1 prints how often each event occurred.
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdint>
 #include <cstdio>
-#include <cstdlib>
-#include <map>
-#include <optional>
-#include <string>
 
 #include "tests/system/simulated_network_world.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {

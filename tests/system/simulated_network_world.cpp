@@ -1,21 +1,13 @@
 #include "tests/system/simulated_network_world.hpp"
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <tuple>
-#include <utility>
-#include <variant>
 
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/messages.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr Duration deadline = 2h;  // Of simulated time.
 

@@ -3,12 +3,7 @@
 
 #include "tests/tidy/assertions.hpp"
 
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <vector>
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {

@@ -1,8 +1,4 @@
-#include <gtest/gtest.h>
-
-#include <string>
-#include <vector>
-
+#include "tests/test.hpp"
 #include "tests/tidy/rules.hpp"
 
 namespace proofmass::test {

@@ -1,14 +1,4 @@
 #include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <fstream>
-#include <map>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/correlation.hpp"
@@ -20,6 +10,7 @@
 #include "core/statistics/requirement.hpp"
 #include "core/statistics/sensitivity.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

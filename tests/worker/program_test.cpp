@@ -1,17 +1,137 @@
 #include "worker/program.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
+#include <CLI/CLI.hpp>
 #include <csignal>
-#include <string>
-#include <utility>
-#include <vector>
+
+#include "core/error.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+#include "tests/test.hpp"
+#include "worker/options.hpp"
 
 namespace proofmass::worker {
 namespace {
+
+Options parsed(std::vector<std::string> arguments) {
+  Options options;
+  CLI::App app("worker");
+  add_options(app, options);
+  std::reverse(arguments.begin(), arguments.end());  // As CLI11 wants them.
+  try {
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    throw InvalidArgument(wire::refusal_of(app, error));
+  }
+  return options;
+}
+
+std::string error_of(const std::vector<std::string>& arguments) {
+  try {
+    (void)parsed(arguments);
+  } catch (const InvalidArgument& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(WorkerOptions, HaveDefaults) {
+  const Options options = parsed({"--connect", "ipc:///tmp/a"});
+  EXPECT_EQ(options.endpoint, "ipc:///tmp/a");
+  EXPECT_EQ(options.drain_time, 100s);
+  EXPECT_FALSE(options.walltime_max.has_value());
+  EXPECT_FALSE(options.give_up_after.has_value());
+  EXPECT_FALSE(options.keys.has_value());
+  EXPECT_GE(options.num_threads, 1U);
+  EXPECT_EQ(options.log_format, wire::LogFormat::text);
+  EXPECT_TRUE(options.is_supervised);
+}
+
+TEST(WorkerOptions, ComeFromArguments) {
+  const Options options =
+      parsed({"--connect",      "tcp://a:1", "--keys",          "k",
+              "--name",         "n",         "--threads",       "3",
+              "--max-walltime", "90m",       "--spool",         "s",
+              "--drain-time",   "30",        "--give-up-after", "2h",
+              "--log-format",   "json",      "--no-supervisor", "--insecure-plain",
+              "--parent",       "12"});
+  EXPECT_EQ(options.keys, "k");
+  EXPECT_EQ(options.name, "n");
+  EXPECT_EQ(options.num_threads, 3U);
+  EXPECT_EQ(options.walltime_max, 90min);
+  EXPECT_EQ(options.spool, "s");
+  EXPECT_EQ(options.drain_time, 30s);
+  EXPECT_EQ(options.give_up_after, 2h);
+  EXPECT_EQ(options.log_format, wire::LogFormat::json);
+  EXPECT_FALSE(options.is_supervised);
+  EXPECT_TRUE(options.is_plain_waived);
+  EXPECT_EQ(options.parent, 12);
+}
+
+TEST(WorkerOptions, ComeFromTheEnvironment) {
+  setenv("PROOFMASS_CONNECT", "ipc:///tmp/b", 1);
+  setenv("PROOFMASS_MAX_WALLTIME", "1d", 1);
+  setenv("PROOFMASS_SPOOL", "/s", 1);
+  setenv("SLURM_JOB_END_TIME", "1800000000", 1);
+  const Options options = parsed({});
+  unsetenv("PROOFMASS_CONNECT");
+  unsetenv("PROOFMASS_MAX_WALLTIME");
+  unsetenv("PROOFMASS_SPOOL");
+  unsetenv("SLURM_JOB_END_TIME");
+  EXPECT_EQ(options.endpoint, "ipc:///tmp/b");
+  EXPECT_EQ(options.walltime_max, 24h);
+  EXPECT_EQ(options.spool, "/s");
+  EXPECT_EQ(options.end_time_unix_s, 1'800'000'000);
+}
+
+TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
+  const test::ScratchDirectory directory;
+  const std::string file = (directory / "worker.toml").string();
+  std::ofstream(file) << "connect = \"tcp://c:5\"\nthreads = 2\nmax-walltime = \"2h\"\n"
+                         "insecure-plain = true\n";
+  const Options options = parsed({"--config", file, "--threads", "4"});
+  EXPECT_EQ(options.endpoint, "tcp://c:5");
+  EXPECT_EQ(options.num_threads, 4U);
+  EXPECT_EQ(options.walltime_max, 2h);
+  EXPECT_TRUE(options.is_plain_waived);
+}
+
+TEST(WorkerOptions, MustBeOfTheKnownKinds) {
+  const auto error_with = [&](const std::string& name, const std::string& value) {
+    return error_of({"--connect", "ipc:///tmp/a", name, value});
+  };
+  EXPECT_EQ(error_with("--threads", "0"), "--threads = 0 (must be in [1, 256])");
+  EXPECT_EQ(error_with("--end-time", "noon"),
+            "--end-time = noon (must be a whole number in [0, 9999999999])");
+  EXPECT_EQ(error_with("--log-format", "xml"), "--log-format = xml (must be one of json, text)");
+  EXPECT_EQ(error_with("--faults", "drop=2").substr(0, 15), "faults.drop = 2");  // Of tests alone.
+  EXPECT_EQ(error_with("--max-walltime", "5x"),
+            "max-walltime = 5x (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
+}
+
+TEST(DurationFrom, KnowsUnits) {
+  EXPECT_EQ(duration_from("t", "90"), 90s);
+  EXPECT_EQ(duration_from("t", "90s"), 90s);
+  EXPECT_EQ(duration_from("t", "15m"), 15min);
+  EXPECT_EQ(duration_from("t", "2h"), 2h);
+  EXPECT_EQ(duration_from("t", "366d"), 24h * 366);
+}
+
+TEST(DurationFrom, RefusesWhatIsNoTime) {
+  for (const char* const text : {"", "0", "-1", "1.5h", "h", "1 h", "1H", "367d", "1h30m",
+                                 "99999999999999999999", "9999999999999999d", " 1"}) {
+    try {
+      (void)duration_from("drain-time", text);
+      ADD_FAILURE() << text;
+    } catch (const InvalidArgument& error) {
+      EXPECT_EQ(error.what(),
+                "drain-time = " + std::string(text) +
+                    " (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
+    }
+  }
+}
 
 struct Outcome {
   int exit_code = -1;

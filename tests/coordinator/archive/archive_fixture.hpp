@@ -1,11 +1,5 @@
 #pragma once
 
-#include <bit>
-#include <cstdint>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"

@@ -1,12 +1,7 @@
 // A disk that changes bits: whatever is read from a campaign database is what was stored, or is
 // refused.
 
-#include <gtest/gtest.h>
-
 #include <exception>
-#include <fstream>
-#include <random>
-#include <string>
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
@@ -15,11 +10,44 @@
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/coordinator/archive/damaged_file.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+std::size_t number_at(const std::string& bytes, std::size_t at, std::size_t size) {
+  std::size_t number = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    number = number << 8 | static_cast<unsigned char>(bytes.at(at + i));
+  }
+  return number;
+}
+
+/// Makes two rows of a small table, numbered below 128 by their key and all on one page, change
+/// their keys, as bits that flip on a disk may: their order is not that of the tree any more.
+void swap_keys(const std::filesystem::path& file, const std::string& table, unsigned a,
+               unsigned b) {
+  const auto page = static_cast<std::size_t>(
+      detail::Database(file, detail::Access::read_only)
+          .integer("SELECT rootpage FROM sqlite_schema WHERE name = '" + table + "'"));
+  std::ifstream stream(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  const std::size_t start = (page - 1) * number_at(bytes, 16, 2);
+  constexpr char table_leaf = 13;
+  if (bytes.at(start) != table_leaf) throw std::runtime_error("the table has several pages");
+  std::vector<std::size_t> keys;  // Where the keys a and b stand.
+  for (std::size_t cell = 0; cell < number_at(bytes, start + 3, 2); ++cell) {
+    std::size_t at = start + number_at(bytes, start + 8 + 2 * cell, 2);
+    while ((bytes.at(at) & 0x80) != 0) ++at;  // The size of the row.
+    ++at;
+    const auto key = static_cast<unsigned char>(bytes.at(at));
+    if (key == a || key == b) keys.push_back(at);
+  }
+  if (keys.size() != 2) throw std::runtime_error("the rows are not there");
+  std::swap(bytes[keys[0]], bytes[keys[1]]);
+  std::ofstream(file, std::ios::binary) << bytes;
+}
 
 constexpr const char* refused = "refused";
 
@@ -165,7 +193,7 @@ TEST_F(RowsOutOfOrder, OfResultsAreRefused) {
   // A file of one page of results.
   std::filesystem::remove(file());
   (void)test::store_of(file(), test::campaign_of(9), test::results_of_each_status(9));
-  test::swap_keys(file(), "run_result", 5, 2);
+  swap_keys(file(), "run_result", 5, 2);
   expect_refusal("result of run 3 comes after that of run 5");
   std::string results;
   EXPECT_FALSE(verify(
@@ -180,7 +208,7 @@ TEST_F(RowsOutOfOrder, OfResultsAreRefused) {
 }
 
 TEST_F(RowsOutOfOrder, OfDeliveriesAreRefused) {
-  test::swap_keys(file(), "delivery", 5, 12);
+  swap_keys(file(), "delivery", 5, 12);
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(test::error_of([&] { (void)store.finished_runs(); }),
             "campaign database = " + file().string() +

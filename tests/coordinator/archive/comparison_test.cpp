@@ -1,12 +1,6 @@
 #include "coordinator/archive/comparison.hpp"
 
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -14,12 +8,10 @@
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 /// A campaign with its results.
 struct Side {

@@ -1,28 +1,17 @@
 #include "coordinator/archive/export.hpp"
 
-#include <gmock/gmock.h>
-
-#include <cstdlib>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "coordinator/report/digest.hpp"
+#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/resimulation.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::Each;
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// What h5py, another reader of the format than the library's own functions, has read.
 nlohmann::json read_by_h5py(const std::filesystem::path& file, const std::filesystem::path& text) {
@@ -43,19 +32,6 @@ class Export : public test::StoreTest {
   Store store_;
 };
 
-/// A lost run, one that is completed, and one of an older program, without health.
-Store store_with_health(const std::filesystem::path& file) {
-  std::vector<Delivery> deliveries = test::deliveries_of(0, 3);
-  RunResult& lost = deliveries[0].result;
-  lost.status = RunStatus::lost;
-  lost.health = test::values_of({2e-5, 1.0 / 3.0, 1e-12, 0.25, 1e90});
-  lost.loss = test::loss_of(LossCause::saturation, SessionTarget::k2_sensor_1);
-  deliveries[1].result.health = test::values_of({1e-7, 2e-5, 1e-12, 0.25, 3e-4});
-  Store store = test::store_of(file, test::campaign_of(3), {});
-  (void)store.commit(deliveries);
-  return store;
-}
-
 TEST_F(Export, CanBeInterrupted) {
   EXPECT_THROW(export_hdf5(store_, output(), [] { return true; }), Interrupted);
   EXPECT_FALSE(file_names().contains("output"));
@@ -74,193 +50,202 @@ TEST_F(Export, IsOfOneInstant) {
   EXPECT_EQ(num_runs, 3U);
 }
 
-TEST_F(Export, OfHdf5HasHealthAndWhereARunWasLost) {
-  const Store store = store_with_health(directory() / "lost.db");
-  export_hdf5(store, output(), test::never_stopped);
-  const auto read = read_by_h5py(output(), directory() / "read");
-  EXPECT_EQ(read["status"], nlohmann::json({"lost", "completed", "completed"}));
-  EXPECT_EQ(read["loss_cause"], nlohmann::json({"saturation", "none", "none"}));
-  EXPECT_EQ(read["loss_session"], nlohmann::json({"k2_sensor_1", "none", "none"}));
-  EXPECT_EQ(read["units"]["health/residual_m_s2"], "m/s²");
-  EXPECT_EQ(read["bits"]["health/attitude_rad"][0], test::bits_of(1.0 / 3.0));
-  EXPECT_TRUE(read["bits"]["health/attitude_rad"][2].is_null());
-}
-
-TEST_F(Export, OfNoRunIsWhole) {
-  const Store empty = Store::create(directory() / "empty.db", test::campaign_of(1), "");
-  export_hdf5(empty, output(), test::never_stopped);
-  const auto read = read_by_h5py(output(), directory() / "read");
-  EXPECT_EQ(read["run_index"].size(), 0U);
-  EXPECT_EQ(read["attributes"]["num_finished"], 0);
-}
-
-TEST_F(Export, OfHdf5IsReadByAnotherProgram) {
-  export_hdf5(store_, output(), test::never_stopped);
-  const auto read = read_by_h5py(output(), directory() / "read");
-  EXPECT_EQ(read["attributes"]["name"], "hardy2013");
-  EXPECT_EQ(read["attributes"]["seed"], 1);
-  EXPECT_EQ(read["attributes"]["num_runs"], 5);
-  EXPECT_EQ(read["attributes"]["num_finished"], 5);
-  EXPECT_EQ(read["attributes"]["digest"], digest_of(store_));
-  EXPECT_EQ(read["attributes"]["definition"], store_.definition());
-  EXPECT_EQ(read["attributes"]["model_version"], store_.model_version());
-  EXPECT_EQ(read["run_index"], nlohmann::json({0, 1, 2, 3, 4}));
-  EXPECT_EQ(read["status"],
-            nlohmann::json({"completed", "not_converged", "not_finite", "no_draw", "completed"}));
-  EXPECT_EQ(read["num_draws"], nlohmann::json({2, 2, 2, 2, 2}));
-  EXPECT_EQ(read["units"]["error/k2d_s2_m"], "s²/m");
-  const RunResult result = test::result_of(1);
-  EXPECT_EQ(read["bits"]["truth/a_c12_rad"][1], test::bits_of(result.truth[3]));
-  EXPECT_EQ(read["bits"]["estimate/k2c_s2_m"][1], test::bits_of(result.estimate[9]));
-  EXPECT_EQ(read["bits"]["error/a_d11_prime"][1],
-            test::bits_of(result.estimate[5] - result.truth[5]));
-  EXPECT_TRUE(read["bits"]["estimate/a_c12_rad"][2].is_null());
-  EXPECT_FALSE(read["bits"]["truth/a_c12_rad"][2].is_null());
-  EXPECT_TRUE(read["bits"]["truth/a_c12_rad"][3].is_null());
-  EXPECT_EQ(read["bits"].size(), 35U);
-}
-
-// More rows than are written at a time.
-TEST_F(Export, OfHdf5HoldsManyRuns) {
-  constexpr std::uint64_t num_many = 40'000;
-  Store store = Store::create(directory() / "many.db", test::campaign_of(num_many), "");
-  (void)store.commit(test::deliveries_of(0, num_many));
-  export_hdf5(store, output(), test::never_stopped);
-  const std::string script =
-      "import h5py, numpy, sys; f = h5py.File(sys.argv[1]); i = f['run_index'][:]; t = "
-      "f['truth/a_c11_delta_x_m'][:]; sys.exit(not (len(i) == len(t) == 40000 and (i == "
-      "numpy.arange(40000)).all() and (t == (i + 1.0) / 3.0).all()))";
-  EXPECT_EQ(std::system(("/usr/bin/python3 -c \"" + script + "\" " + output().string()).c_str()),
-            0);
-}
-
-TEST_F(Export, OfHdf5DoesNotAppearOnAFullDisk) {
-  std::string error;
-  {
-    const test::FileSizeLimit limit(4096);
-    error = test::error_of([&] { export_hdf5(store_, output(), test::never_stopped); });
-  }
-  EXPECT_EQ(error, "output = " + output().string() + " (cannot be written: File too large)");
-  EXPECT_FALSE(file_names().contains("output"));
-  EXPECT_THAT(file_names(), Each(Not(EndsWith(".new"))));
-}
-
-constexpr std::uint64_t num_runs = 24;
-constexpr std::uint64_t run_without_draw = 5;
-constexpr std::size_t table_element = 25;
-
-/// Laws of several kinds, two of them tables; wide misalignments, so that many a draw is rejected;
-/// a scale factor that is never accepted in one run.
-MicroscopeCampaign varied_campaign(std::uint64_t count = num_runs) {
-  MicroscopeCampaign campaign = test::campaign_of(count);
-  campaign.seed = 20260314;
-  auto& laws = campaign.dispersions;
-  for (std::size_t i = 6; i < 12; ++i) {
-    laws[i].minimum *= 1.5;
-    laws[i].maximum *= 1.5;
-  }
-  laws[24].law = Law::normal;
-  laws[24].standard_deviation = 1e-5;
-  laws[0] = {.law = Law::table, .file = "a.csv", .column = "scale"};
-  laws[table_element] = {.law = Law::table, .file = "a.csv", .column = "y"};
-  campaign.table_columns.resize(2);
-  for (std::uint64_t run = 0; run < count; ++run) {
-    campaign.table_columns[0].push_back(run == run_without_draw ? 0.9 : 0.0);
-    campaign.table_columns[1].push_back(1e-5 / (3.0 + static_cast<double>(run)));
-  }
-  return campaign;
-}
-
-/// Bits of the drawn values of each run, nothing for a run without; by run index and quantity.
-using Bits = std::map<std::pair<std::uint64_t, std::string>, std::optional<std::uint64_t>>;
-
-/// Drawn once more, by the laws and the rule of acceptance alone.
-Bits drawn_again(const MicroscopeCampaign& campaign, const std::vector<std::uint64_t>& runs) {
-  Bits bits;
-  for (const std::uint64_t run : runs) {
-    std::optional<DrawnValues> accepted;
-    for (std::uint32_t draw = 0; draw < num_draws_max && !accepted; ++draw) {
-      const std::vector<double> row{campaign.table_columns[0][run], campaign.table_columns[1][run]};
-      const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, {run}, draw, row);
-      if (is_accepted(make_instrument(values), campaign.scenario.acceptance)) accepted = values;
-    }
-    for (std::size_t i = 0; i < num_drawn; ++i) {
-      bits[{run, drawn_names()[i]}] =
-          accepted ? std::optional(test::bits_of((*accepted)[i])) : std::nullopt;
-    }
-  }
-  return bits;
-}
-
-class ExportDraws : public test::StoreTest {
- protected:
-  // Runs 3 and 7 have no result yet.
-  ExportDraws() {
-    std::vector<RunResult> results;
-    for (std::uint64_t run = 0; run < num_runs; ++run) {
-      if (run == 3 || run == 7) continue;
-      runs_.push_back(run);
-      results.push_back(test::result_of(run, static_cast<RunStatus>(1 + run % 3)));
-    }
-    (void)test::store_of(file(), varied_campaign(), results);
-    expected_ = drawn_again(varied_campaign(), runs_);
-  }
-
-  [[nodiscard]] std::filesystem::path output() const { return directory() / "output"; }
-
-  /// The columns `draw/` of an export, as h5py reads them.
-  [[nodiscard]] nlohmann::json exported(const Store& store,
-                                        const IsStopped& is_stopped = test::never_stopped) const {
-    export_hdf5(store, output(), is_stopped, DrawColumns::included);
-    return read_by_h5py(output(), directory() / "read");
-  }
-
-  [[nodiscard]] Bits bits_in(const nlohmann::json& read) const {
-    EXPECT_EQ(read["run_index"].size(), runs_.size());
-    Bits bits;
-    for (const std::string& name : drawn_names()) {
-      const auto& column = read["bits"].at("draw/" + name);
-      EXPECT_EQ(column.size(), runs_.size());
-      for (std::size_t i = 0; i < runs_.size(); ++i) {
-        bits[{runs_[i], name}] =
-            column[i].is_null() ? std::nullopt : std::optional(column[i].get<std::uint64_t>());
-      }
-    }
-    return bits;
-  }
-
-  std::vector<std::uint64_t> runs_;  ///< Those with a result.
-  Bits expected_;
-};
-
-// The run without a draw among them has no values, and no run without a result has a row.
-TEST_F(ExportDraws, AreThoseOfAnIndependentDrawWithUnits) {
-  const nlohmann::json read = exported(Store::open_read_only(file()));
-  const Bits bits = bits_in(read);
-  EXPECT_EQ(bits, expected_);
-  EXPECT_FALSE((bits.at({run_without_draw, drawn_names()[0]}).has_value()));
-  EXPECT_EQ((bits.at({23, drawn_names()[table_element]})), test::bits_of(1e-5 / 26.0));
-  EXPECT_EQ(read["bits"].size(), 35U + num_drawn);
-  EXPECT_EQ(read["units"]["draw/offcentring_m.x"], "m");
-  EXPECT_EQ(read["units"]["draw/scale_factor_error.sensor_1_x"], "1");
-}
-
 // A campaign that grows while it is exported, run by run, is drawn as it was when the export began.
-TEST_F(ExportDraws, AreOfTheStateThatTheRunsAreOf) {
-  Store growing = Store::open(file());
+TEST_F(Export, OfDrawsIsOfTheStateThatTheRunsAreOf) {
+  const auto exported = [&](const IsStopped& is_stopped) {
+    export_hdf5(Store::open_read_only(file()), output(), is_stopped, DrawColumns::included);
+    return read_by_h5py(output(), directory() / "read");
+  };
+  const nlohmann::json before = exported(test::never_stopped);
   const auto grow = [&, is_first = true]() mutable {
     if (!std::exchange(is_first, false)) return false;
-    const MicroscopeCampaign more = varied_campaign(num_runs + 1);
-    growing.extend(more, canonical_definition(more));
-    (void)growing.commit(test::deliveries_of(num_runs, num_runs + 1));
+    store_.extend(test::campaign_of(6), canonical_definition(test::campaign_of(6)));
+    (void)store_.commit(test::deliveries_of(5, 6));
     return false;
   };
-  const Store store = Store::open_read_only(file());
-  EXPECT_EQ(bits_in(exported(store, grow)), expected_);
+  EXPECT_EQ(exported(grow), before);
+  EXPECT_EQ(exported(test::never_stopped)["run_index"].size(), 6U);
+}
 
-  runs_.push_back(num_runs);
-  EXPECT_EQ(bits_in(exported(Store::open_read_only(file()))),
-            drawn_again(varied_campaign(num_runs + 1), runs_));
+class Listing : public test::StoreTest {
+ protected:
+  std::filesystem::path make(const std::string& name) const {
+    const std::filesystem::path path = directory() / name;
+    (void)Store::create(path, test::campaign_of(10), "");
+    return path;
+  }
+  static std::string refusal(const std::filesystem::path& place) {
+    const std::vector<std::filesystem::path> places{place};
+    return test::error_of([&] { (void)list_campaigns(places); });
+  }
+};
+
+TEST_F(Listing, SaysWhichDirectoryItCannotRead) {
+  const auto closed = directory() / "closed";
+  std::filesystem::create_directory(closed);
+  std::filesystem::permissions(directory(), std::filesystem::perms::all);
+  std::filesystem::permissions(closed, std::filesystem::perms::none);
+  std::string error;
+  {
+    const test::OrdinaryUser user;
+    error = refusal(closed);
+  }
+  std::filesystem::permissions(closed, std::filesystem::perms::all);
+  EXPECT_EQ(error, "directory = " + closed.string() + " (cannot be read: Permission denied)");
+}
+
+TEST_F(Listing, NamesAFileThatItMayNotRead) {
+  const auto closed = make("closed.db");
+  std::filesystem::permissions(directory(), std::filesystem::perms::all);
+  std::filesystem::permissions(closed, std::filesystem::perms::none);
+  const test::OrdinaryUser user;
+  for (const auto& place : {directory(), closed}) {
+    const auto campaigns = list_campaigns({&place, 1});
+    ASSERT_EQ(campaigns.size(), 1U);
+    EXPECT_EQ(campaigns[0].problem, "campaign database = " + closed.string() +
+                                        " (unable to open database file: Permission denied)");
+  }
+}
+
+const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name.db",
+                             .problem = "",
+                             .name = "a campaign with a long name, too",
+                             .seed = 18446744073709551615U,
+                             .num_runs = 1'000'000'000,
+                             .num_finished = 999'999'999,
+                             .phase = wire::CampaignPhase::cancelled,
+                             .created_utc = "2024-02-29T12:00:10Z"};
+
+TEST(ListingText, FitsATerminal) {
+  const std::string text = terminal_text(listing_table({&extreme, 1}), {.line_width_max = 80});
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
+  EXPECT_THAT(text, HasSubstr("… "));
+  EXPECT_THAT(text, HasSubstr(" cancell… "));
+  EXPECT_THAT(text, HasSubstr(" 18446744073709551615 2024-02-29\n"));
+}
+
+TEST(ListingJson, IsComplete) {
+  const ListedCampaign damaged{.file = "b.db", .problem = "is damaged"};
+  const std::vector<ListedCampaign> campaigns{extreme, damaged};
+  const auto json = nlohmann::json::parse(listing_json(campaigns))["campaigns"];
+  EXPECT_EQ(json[0]["file"], "/some/where/a-file-with-a-rather-long-name.db");
+  EXPECT_TRUE(json[0]["problem"].is_null());
+  EXPECT_EQ(json[0]["seed"], "18446744073709551615");
+  EXPECT_EQ(json[0]["phase"], "cancelled");
+  EXPECT_EQ(json[0]["num_runs"], 1'000'000'000);
+  EXPECT_EQ(json[0]["num_finished"], 999'999'999);
+  EXPECT_EQ(json[0]["created_utc"], "2024-02-29T12:00:10Z");
+  EXPECT_EQ(json[1], nlohmann::json({{"file", "b.db"}, {"problem", "is damaged"}}));
+}
+
+using ::testing::ThrowsMessage;
+
+std::vector<RunIndex> chosen_runs(const std::vector<RunRange>& runs, double fraction) {
+  ChosenRuns chosen(runs, fraction);
+  std::vector<RunIndex> all;
+  for (std::uint64_t i = 0; i < chosen.size(); ++i) all.push_back(chosen.next(i));
+  return all;
+}
+
+std::vector<RunRange> first_runs(std::uint64_t count) { return {{RunIndex{0}, count}}; }
+
+TEST(ChosenRuns, AreAsManyAsAskedFor) {
+  EXPECT_EQ(chosen_runs(first_runs(1000), 0.01).size(), 10U);
+  EXPECT_EQ(chosen_runs(first_runs(1000), 0.0101).size(), 11U);
+  EXPECT_EQ(chosen_runs(first_runs(1000), 0.0).size(), 1U);
+  EXPECT_EQ(chosen_runs(first_runs(3), 0.01).size(), 1U);
+  EXPECT_THAT(chosen_runs({{{3}, 2}, {{9}, 1}, {{20}, 2}}, 1.0),
+              ElementsAre(RunIndex{3}, RunIndex{4}, RunIndex{9}, RunIndex{20}, RunIndex{21}));
+  EXPECT_THAT(chosen_runs({}, 1.0), IsEmpty());
+}
+
+TEST(ChosenRuns, AreSpreadEvenlyAndDifferent) {
+  for (const std::size_t count : {std::size_t{1}, std::size_t{17}, std::size_t{999}}) {
+    const std::vector<RunIndex> chosen = chosen_runs(first_runs(1000), double(count) / 1000.0);
+    ASSERT_EQ(chosen.size(), count);
+    for (std::size_t i = 0; i < count; ++i) {
+      // One of each of `count` parts of equal length.
+      EXPECT_GE(double(chosen[i].value), double(i) * 1000.0 / double(count) - 1.0);
+      EXPECT_LT(double(chosen[i].value), double(i + 1) * 1000.0 / double(count));
+    }
+    EXPECT_EQ(std::set<RunIndex>(chosen.begin(), chosen.end()).size(), count);
+  }
+}
+
+// The middle of each part, so that the last runs have the chance of the first.
+TEST(ChosenRuns, AreInTheMiddleOfEachPart) {
+  const std::vector<RunIndex> expected{{50}, {150}, {250}, {350}};
+  EXPECT_EQ(chosen_runs(first_runs(400), 0.01), expected);
+}
+
+TEST(ResultDifferences, AreOfBitsThatMeanSomething) {
+  const RunResult stored = test::result_of(3, RunStatus::not_finite);
+  RunResult computed = stored;
+  computed.estimate = {99.0};  // Without a meaning.
+  EXPECT_THAT(differences_of(stored, computed), IsEmpty());
+  computed.truth[0] = 0.5;
+  computed.num_draws = 7;
+  computed.num_rounds = 9;
+  const std::vector<ResultDifference> differences = differences_of(stored, computed);
+  ASSERT_EQ(differences.size(), 3U);
+  EXPECT_EQ(differences[0].column, "num_draws");
+  EXPECT_EQ(differences[1].column, "num_rounds");
+  EXPECT_EQ(differences[1].stored, "3");
+  EXPECT_EQ(differences[1].computed, "9");
+  EXPECT_EQ(differences[2].run, RunIndex{3});
+  EXPECT_EQ(differences[2].column, "truth_a_c11_delta_x_m");
+  EXPECT_EQ(differences[2].stored, "1.3333333333333333");
+  EXPECT_EQ(differences[2].computed, "0.5");
+}
+
+TEST(ResultDifferences, OfAnotherStatusAreThatAlone) {
+  const RunResult stored = test::result_of(3);
+  RunResult computed = test::result_of(3, RunStatus::no_draw);
+  computed.num_draws = 1000;
+  const std::vector<ResultDifference> differences = differences_of(stored, computed);
+  ASSERT_EQ(differences.size(), 1U);
+  EXPECT_EQ(differences[0].column, "status");
+  EXPECT_EQ(differences[0].stored, "completed");
+  EXPECT_EQ(differences[0].computed, "no_draw");
+}
+
+// More threads than batches, and a last batch that is not full.
+TEST(Resimulation, FindsTheSameWithAnyNumberOfThreads) {
+  const MicroscopeCampaign campaign = test::quick_campaign(35);
+  std::vector<RunResult> results = test::simulated(campaign);
+  for (const std::size_t run : {std::size_t{34}, std::size_t{2}}) results[run].truth[1] += 1.0;
+  for (const std::size_t num_threads : {std::size_t{1}, std::size_t{2}, std::size_t{5}}) {
+    const auto differences = simulate_again(campaign, results, num_threads, test::never_stopped);
+    ASSERT_EQ(differences.size(), 2U);
+    EXPECT_EQ(differences[0].run, RunIndex{2});
+    EXPECT_EQ(differences[1].run, RunIndex{34});
+  }
+}
+
+// The threads that end because another one failed do not hide its reason.
+TEST(Resimulation, EndsWithTheFirstFailureOfAnyThread) {
+  const MicroscopeCampaign campaign = test::quick_campaign(48);
+  const std::vector<RunResult> results = test::simulated(campaign);
+  for (const std::size_t num_threads : {std::size_t{1}, std::size_t{3}}) {
+    std::atomic<int> num_questions = 0;
+    const auto is_stopped = [&]() -> bool {
+      if (++num_questions == 2) throw std::runtime_error("no clock");
+      return false;
+    };
+    EXPECT_THAT([&] { (void)simulate_again(campaign, results, num_threads, is_stopped); },
+                ThrowsMessage<std::runtime_error>("no clock"));
+  }
+}
+
+// Values of a table are those of the run, not of its place among those that are simulated.
+TEST(Resimulation, TakesTheTableValuesOfEachRun) {
+  MicroscopeCampaign campaign = test::quick_campaign(4);
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.table_columns = {{1e-4, 2e-4, 3e-4, 4e-4}};
+  const std::vector<RunResult> results = test::simulated(campaign);
+  const std::vector<RunResult> last{results[3]};
+  EXPECT_THAT(simulate_again(campaign, last, 1, test::never_stopped), IsEmpty());
 }
 
 }  // namespace

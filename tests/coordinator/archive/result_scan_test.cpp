@@ -1,23 +1,18 @@
-// What a campaign database keeps beside its results, and what verification says if it is not so.
-
 #include "coordinator/archive/result_scan.hpp"
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
+#include "coordinator/archive/verification.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using ::testing::StartsWith;
+// What a campaign database keeps beside its results, and what verification says if it is not so.
 
 class DerivedChecks : public test::VerificationTest {
  protected:
@@ -50,17 +45,6 @@ class DerivedChecks : public test::VerificationTest {
     }
   }
 };
-
-TEST_F(DerivedChecks, HoldParametersAgainstTheDefinition) {
-  EXPECT_THAT(failing_after("UPDATE parameter SET objective = 260, paper_worst = 1, unit = 'm',"
-                            " label = 'zz' WHERE parameter = 'k2d'"),
-              Contains("definition"));
-  EXPECT_THAT(check("definition").details,
-              ElementsAre("parameter.label of k2d = zz (must be K2d/K1c²)",
-                          "parameter.unit of k2d = m (must be s²/m)",
-                          HasSubstr("parameter.objective of k2d = 260 (must be "),
-                          HasSubstr("parameter.paper_worst of k2d = 1 (must be ")));
-}
 
 TEST_F(DerivedChecks, FindAStatisticThatDoesNotFollowFromTheResults) {
   make_file();
@@ -96,10 +80,6 @@ TEST_F(DerivedChecks, FindWhatDoesNotFollow) {
        {"DELETE FROM statistic", {"statistics"}, lacking},
        {"DELETE FROM statistic; DELETE FROM budget_entry", {"statistics"}, lacking_more},
        {"DELETE FROM summary", {"statistics"}, all_and_more},
-       {"UPDATE budget_entry SET after_mean = 1, before = 2 WHERE term = 'total'",
-        {"statistics"},
-        {"budget_entry.before of total = 2 (must be ",
-         "budget_entry.after_mean of total = 1 (must be "}},
        {"UPDATE budget_entry SET term = 'own' WHERE term = 'residual_y'",
         {"statistics"},
         {"budget_entry lacks residual_y", "budget_entry has a row too many: own"}},
@@ -109,13 +89,9 @@ TEST_F(DerivedChecks, FindWhatDoesNotFollow) {
         {"summary.num_estimated = 13 (must be 18)", "summary.num_not_converged = 2 (must be 0)",
          "summary.num_not_finite = 3 (must be 0)", "summary.num_no_draw = 5 (must be 0)", interval,
          "summary.num_given_up = 4 (must be at most 0)"}},
-       {"UPDATE summary SET within_objectives_lower = 0.5", {"statistics"}, {interval}},
        {"UPDATE summary SET num_finished = 17",
         {"statistics"},
         {"summary.num_finished = 17 (must be 18, the sum of its kinds)"}},
-       {"UPDATE budget_coefficient SET value = 1 WHERE parameter = 'k2d'",
-        {"definition"},
-        {"budget_coefficient.value of k2d in differential_quadratic = 1 (must be "}},
        {"INSERT INTO audit VALUES (5, 1, 0, '0000000000000000', '1111111111111111', 0)",
         {"audit", "integrity"},
         {"run 5: "}}});
@@ -180,17 +156,6 @@ TEST_F(DerivedChecks, AreOfOneStateOfTheFile) {
             "none are stored: a coordinator has the file, or was killed");
 }
 
-TEST_F(DerivedChecks, HoldIfASecondResultIsTheSame) {
-  {
-    Store store = test::store_of(file(), campaign_, results_);
-    update_statistics(store, campaign_);
-    const Delivery again{.result = results_[5], .worker = {7}, .attempt = {2}, .compute_s = 9.0};
-    (void)store.commit({&again, 1});
-  }
-  EXPECT_TRUE(verify_all());
-  EXPECT_EQ(check("audit").finding, "1 second result: each is the stored one");
-}
-
 TEST_F(DerivedChecks, FindResultsThatContradictEachOther) {
   {
     Store store = test::store_of(file(), campaign_, results_);
@@ -241,9 +206,6 @@ TEST_F(DerivedStopChecks, FindWhatDoesNotFollow) {
         {"stop_checks"},
         {"stop_check.estimate" + check + "1 (must be ",
          "stop_check.upper" + check + "NULL (must be "}},
-       {"UPDATE stop_check SET is_reached = NOT is_reached",
-        {"stop_checks"},
-        {"stop_check.is_reached" + check}},
        {"DELETE FROM stop_check", {"stop_checks"}, {"stop_check lacks std(a_c13) after 18 runs"}},
        {"INSERT INTO stop_check VALUES ('max(k2c)', 18, 1, 1, 1, 0, 1, '');"
         "INSERT INTO stop_check VALUES ('p9(k2c)', 128, 1, 1, 1, 0, 1, '');"
@@ -294,6 +256,46 @@ TEST_F(DerivedStopChecks, HoldIfARunHadBeenGivenUp) {
     (void)store.commit({&late, 1});
   }
   EXPECT_THAT(failing_after(""), IsEmpty()) << "finished";
+}
+
+using Verification = test::VerificationTest;
+
+TEST_F(Verification, SaysWhatItCannotCheckWhileTheFileIsServed) {
+  Store store = test::store_of(file(), campaign_, {results_.begin(), results_.begin() + 2});
+  EXPECT_TRUE(verify_all());
+  EXPECT_EQ(check("digest").finding, "none is stored: a coordinator has the file, or was killed");
+  update_statistics(store, campaign_);
+  EXPECT_TRUE(verify_all());
+  EXPECT_EQ(check("digest").verdict, CheckOutcome::holds);
+  const Delivery third{.result = results_[2], .worker = test::session_1, .attempt = {1}};
+  (void)store.commit({&third, 1});
+  EXPECT_TRUE(verify_all());
+  EXPECT_EQ(check("digest").finding,
+            "it is of 2 runs and 3 are finished: a coordinator has the file, or was killed");
+  EXPECT_EQ(check("simulation").finding, "3 of 3 runs simulated again: every bit is the same");
+}
+
+TEST_F(Verification, OfAFileWithoutResultsSimulatesNone) {
+  (void)test::store_of(file(), campaign_, {});
+  EXPECT_TRUE(verify_all());
+  EXPECT_EQ(check("simulation").verdict, CheckOutcome::not_checked);
+  EXPECT_EQ(check("simulation").finding, "no run is finished");
+}
+
+TEST(CheckText, BreaksLinesBetweenWords) {
+  std::string finding;
+  for (int i = 0; i < 40; ++i) finding += "seven77 ";
+  std::istringstream lines(check_text(
+      {.name = "digest", .verdict = CheckOutcome::not_checked, .finding = finding, .details = {}}));
+  std::size_t num_lines = 0, num_words = 0;
+  for (std::string line; std::getline(lines, line); ++num_lines) {
+    EXPECT_LE(display_width(line), 80U);
+    for (std::size_t at = 0; (at = line.find("seven77", at)) != std::string::npos; ++at) {
+      ++num_words;
+    }
+  }
+  EXPECT_EQ(num_words, 40U);
+  EXPECT_EQ(num_lines, 6U);  // Seven words and six spaces are 55.
 }
 
 }  // namespace

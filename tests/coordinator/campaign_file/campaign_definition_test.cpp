@@ -1,16 +1,9 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <string>
-
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "tests/coordinator/campaign_file/scratch_folder.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -19,11 +12,6 @@ MicroscopeCampaign read_microscope(const std::filesystem::path& file,
                                    const Overrides& overrides = {}) {
   return test::microscope(*read_campaign(file, overrides));
 }
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 // A campaign whose every part differs from the nominal one.
 MicroscopeCampaign unusual_campaign() {
@@ -106,8 +94,9 @@ TEST(CanonicalDefinition, StatesEveryField) {
 
 TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
   for (const MicroscopeCampaign& campaign : {MicroscopeCampaign{}, hardy2013_campaign()}) {
-    const test::ScratchFolder folder;
-    expect_same(read_microscope(folder.write("c.toml", commented_campaign(campaign))), campaign);
+    const test::ScratchDirectory folder;
+    test::write_text(folder / "c.toml", commented_campaign(campaign));
+    expect_same(read_microscope(folder / "c.toml"), campaign);
   }
   const MicroscopeCampaign unusual = unusual_campaign();
   expect_same(parse_campaign("stored definition", commented_campaign(unusual),
@@ -116,10 +105,10 @@ TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
 }
 
 TEST(CommentedCampaign, LeavesThePresetInCharge) {
-  const test::ScratchFolder folder;
-  const auto file = folder.write("c.toml", commented_campaign(MicroscopeCampaign{}));
+  const test::ScratchDirectory folder;
+  test::write_text(folder / "c.toml", commented_campaign(MicroscopeCampaign{}));
   const MicroscopeCampaign campaign =
-      read_microscope(file, {.assignments = {"noise.preset=flight_suref"}});
+      read_microscope(folder / "c.toml", {.assignments = {"noise.preset=flight_suref"}});
   EXPECT_EQ(campaign.scenario.noise.linear_x.white_asd, 4.49e-12);
 }
 

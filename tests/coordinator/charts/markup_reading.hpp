@@ -1,10 +1,8 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <regex>
-#include <string>
-#include <vector>
+
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 

@@ -1,13 +1,6 @@
 // `proofmass factory` against a coordinator that the test plays.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <future>
-#include <string>
-#include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
@@ -15,11 +8,10 @@
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/played_coordinator.hpp"
 #include "tests/proto/wire/requests.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using testing::HasSubstr;
 
 /// Runs the command against the endpoint; its exit code.
 int exit_code_of_factory(const std::string& endpoint) {

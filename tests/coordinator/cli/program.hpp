@@ -1,12 +1,9 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <CLI/CLI.hpp>
-#include <string>
-#include <vector>
 
 #include "coordinator/cli/program.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 

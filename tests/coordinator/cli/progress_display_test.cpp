@@ -1,10 +1,7 @@
 #include "coordinator/cli/progress_display.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-
 #include "tests/coordinator/cli/display_output.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

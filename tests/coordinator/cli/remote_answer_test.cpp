@@ -20,15 +20,13 @@
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using proto::AnswerReply;
 using test::question;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 // Of "hello\n", by sha256sum.
 constexpr const char* sha256_of_hello =

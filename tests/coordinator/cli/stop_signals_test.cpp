@@ -1,17 +1,76 @@
 #include "coordinator/cli/stop_signals.hpp"
 
-#include <gtest/gtest.h>
 #include <poll.h>
 #include <signal.h>
+#include <stdlib.h>
 #include <unistd.h>
 
-#include <atomic>
+#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
-#include <thread>
+
+#include "coordinator/cli/program.hpp"
+#include "coordinator/cli/worker_processes.hpp"
+#include "core/error.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+// How the programs take the signals that the kernel sends them.
+
+using ProgramMain = int (*)(int argc, char** argv);
+
+int run_with(ProgramMain program, std::vector<std::string> arguments) {
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  return program(static_cast<int>(argv.size()), argv.data());
+}
+
+/// Ends this process as a program does whose messages go into a pipe that nobody reads.
+[[noreturn]] void exit_without_reader(ProgramMain program,
+                                      const std::vector<std::string>& arguments) {
+  int ends[2];
+  if (pipe(ends) != 0) _exit(99);
+  close(ends[0]);
+  dup2(ends[1], STDERR_FILENO);
+  (void)std::signal(SIGPIPE, SIG_DFL);
+  _exit(run_with(program, arguments));
+}
+
+/// Ends this process with 0 if a program that is started with SIGCHLD ignored does not ignore it.
+[[noreturn]] void exit_with_children_ignored(ProgramMain program, const std::string& name) {
+  (void)std::signal(SIGCHLD, SIG_IGN);
+  (void)run_with(program, {name, "--version"});
+  _exit(std::signal(SIGCHLD, SIG_DFL) == SIG_DFL ? 0 : 1);
+}
+
+// Otherwise it would never learn how the programs ended that it starts.
+TEST(ProgramSignalsDeathTest, AProgramDoesNotIgnoreItsChildrenWhoeverStartsIt) {
+  EXPECT_EXIT(exit_with_children_ignored(run_proofmass, "proofmass"), testing::ExitedWithCode(0),
+              "");
+  EXPECT_EXIT(exit_with_children_ignored(run_proofmass_coordinator, "proofmass-coordinator"),
+              testing::ExitedWithCode(0), "");
+}
+
+// Each of them says what is wrong, and would go on likewise if it were only progress.
+TEST(ProgramSignalsDeathTest, ABrokenPipeDoesNotEndWhatComputesACampaign) {
+  EXPECT_EXIT(exit_without_reader(run_proofmass_coordinator,
+                                  {"proofmass-coordinator", "--bind", "ipc:///tmp/none",
+                                   "--directory", "/dev/null/served"}),
+              testing::ExitedWithCode(exit_cannot_be_done), "");
+  EXPECT_EXIT(exit_without_reader(run_proofmass, {"proofmass", "run", "/dev/null/a.toml"}),
+              testing::ExitedWithCode(exit_wrong_usage), "");
+  EXPECT_EXIT(exit_without_reader(run_proofmass, {"proofmass", "sweep", "/dev/null/a.toml",
+                                                  "--vary", "simulation.orbits=1,2"}),
+              testing::ExitedWithCode(exit_wrong_usage), "");
+  EXPECT_EXIT(
+      exit_without_reader(run_proofmass, {"proofmass", "factory", "--batch-system", "slurm",
+                                          "--connect", "tcp://127.0.0.1:1", "--worker-connect",
+                                          "tcp://head:2", "--name", "no name"}),
+      testing::ExitedWithCode(exit_wrong_usage), "");
+}
 
 constexpr int timeout_ms = 100;
 
@@ -86,6 +145,68 @@ TEST(StopSignalsDeathTest, LeaveTheWorkersOnAHangUp) {
 // As `nohup` does.
 TEST(StopSignalsDeathTest, LeaveAHangUpIgnoredThatWasIgnoredBefore) {
   EXPECT_EXIT(exit_with_request_after(SIGHUP, SIG_IGN), ends_with(StopRequest::none), "");
+}
+
+/// A program in the place of the worker's.
+std::filesystem::path script(const test::ScratchDirectory& directory, const std::string& text) {
+  const auto file = directory / "worker";
+  std::ofstream(file) << "#!/bin/sh\n" << text << '\n';
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  return file;
+}
+
+WorkerProcesses::Exit exit_of(const std::string& text) {
+  const test::ScratchDirectory directory;
+  WorkerProcesses processes(script(directory, text), "ipc:///nowhere");
+  processes.start("local-1");
+  while (true) {
+    const auto exits = processes.take_exits();
+    if (!exits.empty()) return exits.front();
+  }
+}
+
+TEST(WorkerProcesses, SayHowAWorkerEnded) {
+  const auto failed = exit_of("exit 3");
+  EXPECT_EQ(failed.name, "local-1");
+  EXPECT_EQ(failed.text, "exit code 3");
+  EXPECT_EQ(failed.reason, wire::LossReason::failed);
+  const auto crashed = exit_of("kill -SEGV $$");
+  EXPECT_EQ(crashed.text, "killed by signal 11 (Segmentation fault)");
+  EXPECT_EQ(crashed.reason, wire::LossReason::crashed);
+  EXPECT_EQ(exit_of("kill -KILL $$").reason, wire::LossReason::preempted);
+}
+
+TEST(WorkerProcesses, GiveAWorkerItsNameItsCoordinatorAndItsParent) {
+  const auto exit = exit_of(
+      "[ \"$1 $2 $3 $4 $5 $6 $7\" = \"--connect ipc:///nowhere --name local-1 --threads 1 "
+      "--parent\" ]");
+  EXPECT_EQ(exit.text, "exit code 0");
+}
+
+// A user may have set it for workers of a cluster, with whose coordinator this has nothing to do.
+TEST(WorkerProcesses, KeepSettingsOfOtherWorkersFromAWorker) {
+  const std::map<std::string, std::string> settings{{"PROOFMASS_GIVE_UP_AFTER", "1s"},
+                                                    {"PROOFMASS_DRAIN_TIME", "xx"},
+                                                    {"SLURM_JOB_END_TIME", "1"}};
+  for (const auto& [name, value] : settings) setenv(name.c_str(), value.c_str(), 1);
+  EXPECT_EQ(exit_of("! env | grep -E '^(PROOFMASS_|SLURM_JOB_END_TIME=)'").text, "exit code 0");
+  EXPECT_EQ(exit_of("env | grep -q ^PATH=").text, "exit code 0");
+  for (const auto& [name, value] : settings) unsetenv(name.c_str());
+}
+
+TEST(WorkerProcesses, AWorkerIsEndedBySignalsThatAreBlockedHere) {
+  const SignalThread signals;
+  EXPECT_EQ(exit_of("kill -TERM $$").text, "killed by signal 15 (Terminated)");
+}
+
+TEST(WorkerProcesses, SayThatAProgramCannotBeStarted) {
+  WorkerProcesses processes("/nowhere/worker", "ipc:///nowhere");
+  try {
+    processes.start("local-1");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "/nowhere/worker: cannot be started: No such file or directory");
+  }
 }
 
 }  // namespace

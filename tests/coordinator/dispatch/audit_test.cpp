@@ -1,11 +1,9 @@
-// Runs that are computed a second time, by another worker, and compared.
-
-#include <cmath>
-
 #include "tests/coordinator/dispatch/dispatch_fixture.hpp"
 
 namespace proofmass::test {
 namespace {
+
+// Runs that are computed a second time, by another worker, and compared.
 
 using coordinator::is_audited;
 
@@ -158,6 +156,144 @@ TEST_F(AuditTest, OfAFinishedCampaignIsNotDoneAgain) {
   on_campaign(state, two, stored, now, outbox);
   EXPECT_TRUE(is_finished(campaign(two)));
 }
+
+// Results that come late, after the pattern of nasa/trick: #569, a result that arrives after its
+// time-out puts the master into an endless loop; #1192, time-out and reassignment, and then both
+// results arrive; #1369, after a late result the slave is never used again. Here, in every order.
+
+/// What happens to run 0, which the first worker was lent.
+enum class Step : std::uint8_t {
+  expire,         ///< The first worker has been silent for too long.
+  reassign,       ///< The second worker asks for runs.
+  late_result,    ///< The first worker delivers.
+  second_result,  ///< The second worker delivers, if it has been lent the run by then.
+};
+constexpr std::array steps{Step::expire, Step::reassign, Step::late_result, Step::second_result};
+
+using Order = std::array<Step, 4>;
+
+std::vector<std::pair<Order, bool>> all_orders() {
+  std::vector<std::pair<Order, bool>> orders;
+  Order order = steps;
+  do {
+    orders.emplace_back(order, false);
+    orders.emplace_back(order, true);
+  } while (std::next_permutation(order.begin(), order.end()));
+  return orders;
+}
+
+std::string name_of(const testing::TestParamInfo<std::pair<Order, bool>>& info) {
+  constexpr std::array names{"Expire", "Reassign", "LateResult", "SecondResult"};
+  std::string name;
+  for (const Step step : info.param.first) name += names.at(static_cast<std::size_t>(step));
+  return name + (info.param.second ? "CommitAtOnce" : "CommitAtTheEnd");
+}
+
+class LateResult : public DispatchFixture,
+                   public testing::WithParamInterface<std::pair<Order, bool>> {
+ protected:
+  void SetUp() override {
+    add_campaign(one, 3);
+    add_worker(first);
+    outbox.forget();
+  }
+
+  void happen(Step step) {
+    switch (step) {
+      case Step::expire:
+        now += 60s;
+        if (state.workers.contains(second)) heartbeat_of(second, held_by_second());
+        on_tick(state, now, outbox);
+        break;
+      case Step::reassign:
+        say_hello(second, hello());
+        heartbeat_of(second, {});
+        break;
+      case Step::late_result:
+        deliver(first, one, {0});
+        break;
+      case Step::second_result:
+        if (is_lent_to_second()) deliver(second, one, {0}, 2);
+        break;
+    }
+    commit_if_wanted();
+    check_invariants(state);
+    EXPECT_LE(num_stores, 1) << "stored twice";
+  }
+
+  void commit_if_wanted() {
+    const Runs stored = outbox.take_stored();
+    waiting.insert(waiting.end(), stored.begin(), stored.end());
+    num_stores += std::count(stored.begin(), stored.end(), RunIndex{0});
+    num_compared += outbox.take_compared().size();
+    if (GetParam().second) commit_all();
+  }
+
+  void commit_all() {
+    on_committed(state, one, waiting, now, outbox);
+    waiting.clear();
+  }
+
+  bool is_lent_to_second() {
+    const auto lease = campaign(one).lent.find({0});
+    return lease && state.leases.at(*lease).worker == second;
+  }
+
+  std::vector<proto::HeldRuns> held_by_second() {
+    std::vector<proto::HeldRuns> all;
+    for (const LeaseId id : state.workers.at(second).leases) {
+      const auto& lease = state.leases.at(id);
+      all.push_back(make_held(one, lease.attempt, lease.remaining.ranges()));
+    }
+    return all;
+  }
+
+  void heartbeat_of(WorkerId id, const std::vector<proto::HeldRuns>& all) {
+    on_heartbeat(state, id, make_heartbeat(4096, all), ++sequence, now, outbox);
+  }
+
+  Runs waiting;  ///< On their way to the store.
+  std::int64_t num_stores = 0;
+  std::uint64_t num_compared = 0;
+};
+
+TEST_P(LateResult, IsStoredOnceAndBothWorkersGoOn) {
+  for (const Step step : GetParam().first) happen(step);
+  // A worker that has been given up says Hello again, and repeats what was not acknowledged.
+  for (const WorkerId id : {first, second}) {
+    say_hello(id, hello());
+    heartbeat_of(id, {});
+  }
+  deliver(first, one, {0});
+  commit_if_wanted();
+  commit_all();
+  EXPECT_EQ(num_stores, 1);
+  EXPECT_TRUE(campaign(one).committed.contains({0}));
+  EXPECT_EQ(campaign(one).num_duplicates, num_compared);
+
+  // Both are lent work, and finish it.
+  for (int round = 0; round < 4; ++round) {
+    for (const WorkerId id : {first, second}) {
+      const auto leases = state.workers.at(id).leases;
+      for (const LeaseId lease : leases) {
+        if (!state.leases.contains(lease)) continue;
+        const auto runs = state.leases.at(lease).remaining.ranges();
+        for (const RunRange& range : runs) deliver(id, one, {range.first.value});
+        commit_if_wanted();
+        commit_all();
+      }
+    }
+  }
+  for (std::uint64_t i = 0; i < num_compared; ++i) {
+    on_compared(state, one, {0}, first, true, now, outbox);
+  }
+  EXPECT_TRUE(is_finished(campaign(one)));
+  EXPECT_TRUE(state.leases.empty());
+  EXPECT_GT(state.workers.at(first).num_results, 0U);
+  outbox.forget();
+}
+
+INSTANTIATE_TEST_SUITE_P(InEveryOrder, LateResult, testing::ValuesIn(all_orders()), name_of);
 
 }  // namespace
 }  // namespace proofmass::test

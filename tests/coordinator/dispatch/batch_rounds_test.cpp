@@ -1,21 +1,8 @@
 // Whether batches are full, and when the last one ends: workers that compute batches, in a time of
 // their own.
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <chrono>
-#include <cmath>
-#include <cstddef>
 #include <deque>
-#include <functional>
-#include <limits>
-#include <map>
-#include <memory>
 #include <ostream>
-#include <utility>
-#include <vector>
 
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/dispatch/results.hpp"
@@ -24,6 +11,7 @@
 #include "core/runs.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/support/messages.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -5,8 +5,6 @@
 namespace proofmass::test {
 namespace {
 
-using namespace std::chrono_literals;
-
 class BlameTest : public DispatchFixture {
  protected:
   std::vector<RunIndex> suspects() {

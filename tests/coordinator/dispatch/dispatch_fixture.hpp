@@ -1,13 +1,5 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <memory>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/dispatch/results.hpp"
 #include "coordinator/dispatch/workers.hpp"
@@ -16,6 +8,7 @@
 #include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
 #include "tests/support/drawn_result.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 

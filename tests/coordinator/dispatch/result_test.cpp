@@ -5,8 +5,6 @@
 namespace proofmass::test {
 namespace {
 
-using namespace std::chrono_literals;
-
 class ResultTest : public DispatchFixture {
  protected:
   void SetUp() override {

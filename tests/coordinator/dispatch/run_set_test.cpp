@@ -1,10 +1,6 @@
 #include "coordinator/dispatch/run_set.hpp"
 
-#include <gtest/gtest.h>
-
-#include <map>
-#include <random>
-#include <set>
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

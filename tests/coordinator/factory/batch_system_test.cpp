@@ -10,19 +10,10 @@
 
 #include "core/error.hpp"
 #include "proto/link/start_program.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using testing::AllOf;
-using testing::Contains;
-using testing::ElementsAre;
-using testing::EndsWith;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::Not;
-using testing::StartsWith;
 
 const BatchSystem& system_of(std::string_view name) {
   return *std::ranges::find(batch_systems(), name, &BatchSystem::name);

@@ -13,16 +13,13 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
-#include "tests/message_of.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/proto/wire/requests.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using testing::HasSubstr;
-using testing::StartsWith;
 
 /// Questions that a shell script answers in place of `proofmass`, at times that the test chooses.
 class AnswersTest : public testing::Test {
@@ -73,7 +70,7 @@ class AnswersTest : public testing::Test {
     return refusal.ends_with("is not kept any more; ask again");
   }
 
-  test::TemporaryDirectory directory_;
+  test::ScratchDirectory directory_;
   std::vector<proto::ReplyEnvelope> replies_;
   TimePoint now_{};
   ServiceConfig config_;

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "tests/message_of.hpp"
 #include "tests/proto/wire/requests.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

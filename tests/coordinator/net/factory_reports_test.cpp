@@ -1,22 +1,14 @@
 #include "coordinator/net/factory_reports.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <string>
-#include <vector>
-
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using testing::ElementsAre;
 
 constexpr TimePoint begin{};
 

@@ -1,17 +1,12 @@
 #include "coordinator/net/memory_guard.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <chrono>
 #include <condition_variable>
-#include <cstdint>
 #include <cstring>
-#include <mutex>
-#include <string>
-#include <vector>
+
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

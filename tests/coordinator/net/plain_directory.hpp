@@ -15,7 +15,7 @@ namespace proofmass::test {
 /// The *.db of a directory, and no look at the definitions in them.
 class PlainDirectory final : public coordinator::CampaignDirectory {
  public:
-  explicit PlainDirectory(const TemporaryDirectory& directory) : directory_(directory / "") {}
+  explicit PlainDirectory(const ScratchDirectory& directory) : directory_(directory / "") {}
 
   [[nodiscard]] std::vector<std::filesystem::path> list() const override {
     std::vector<std::filesystem::path> files;

@@ -19,8 +19,8 @@
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/coordinator/net/playing_worker.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 
 namespace proofmass::test {
 
@@ -34,7 +34,7 @@ inline MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num
 /// Campaign databases of a test: one NAME.db each, and no look at what is in them.
 class PlainFiles final : public coordinator::CampaignFiles {
  public:
-  explicit PlainFiles(const TemporaryDirectory& directory) : directory_(directory) {}
+  explicit PlainFiles(const ScratchDirectory& directory) : directory_(directory) {}
 
   coordinator::ServedCampaign open(const Campaign& wanted, const coordinator::StopPlan& plan,
                                    const coordinator::Asker& asker) override {
@@ -92,7 +92,7 @@ class PlainFiles final : public coordinator::CampaignFiles {
       [](std::uint64_t) -> std::optional<std::uint64_t> { return std::nullopt; };
 
  private:
-  const TemporaryDirectory& directory_;
+  const ScratchDirectory& directory_;
 };
 
 /// A service in a thread of its own, while the test plays its workers and clients.
@@ -177,7 +177,7 @@ class ServiceTest : public testing::Test {
     return count;
   }
 
-  TemporaryDirectory directory;
+  ScratchDirectory directory;
   coordinator::PrivateEndpoint endpoint;
   PlainFiles files{directory};
   coordinator::StopPlan plan;  ///< Of the campaigns that are there from the start.

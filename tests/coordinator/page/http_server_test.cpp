@@ -13,16 +13,12 @@
 
 #include "core/error.hpp"
 #include "tests/coordinator/page/raw_client.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using namespace std::chrono_literals;
 using test::RawClient;
-using ::testing::HasSubstr;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 /// A server that repeats the target of each request.
 class HttpServerTest : public ::testing::Test {

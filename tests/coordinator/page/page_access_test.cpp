@@ -7,16 +7,14 @@
 #include <string>
 
 #include "core/error.hpp"
-#include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
-#include "tests/message_of.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using test::page_secret;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 std::string header_of(const HttpAnswer& answer, const std::string& name) {
   for (const auto& [key, value] : answer.headers) {
@@ -132,7 +130,7 @@ class TokenFileTest : public ::testing::Test {
       std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
 
  private:
-  test::TemporaryDirectory directory_;
+  test::ScratchDirectory directory_;
 };
 
 TEST_F(TokenFileTest, HoldsTheToken) {

@@ -8,14 +8,10 @@
 #include "tests/coordinator/net/service_fixture.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 #include "tests/coordinator/page/raw_client.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 const wire::Log no_log = [](const wire::Event&) {};
 
@@ -68,7 +64,7 @@ TEST_F(PageOfServiceTest, ForbidsTheBrowserWhatItDoesNotNeed) {
 }
 
 TEST(PageBeyondLoopback, WarnsThatNothingIsEncryptedWithoutTellingTheToken) {
-  const test::TemporaryDirectory directory;
+  const test::ScratchDirectory directory;
   const auto file = directory / "token";
   std::ofstream(file) << test::page_secret;
   std::filesystem::permissions(file, std::filesystem::perms::owner_read);

@@ -1,20 +1,9 @@
 #include "coordinator/query/aggregates.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <bit>
-#include <cmath>
-#include <cstdint>
 #include <initializer_list>
-#include <limits>
-#include <random>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -52,68 +41,30 @@ std::string error_of(std::string_view name, const std::vector<Row>& rows) {
   return {};
 }
 
-// Σ(x − 5)² = 32 over 8 values, and Σ(x − 5)³ = 42.
 const std::vector<Row> eight = rows_of({2, 4, 4, 4, 5, 5, 7, 9});
 
-/// 1 to n.
-std::vector<Row> ladder(int n) {
-  std::vector<Row> rows;
-  for (int i = 1; i <= n; ++i) rows.push_back({double(i)});
-  return rows;
-}
-
-// y first: (1, 1), (2, 2), (4, 4.5) have x̄ = 7/3, ȳ = 5/2, Σdx² = 14/3, Σdx dy = 5.5, both exact.
-// x = 1..4 and y = 1, 3, 2, 4 have Σxy about the means 4, Σx² and Σy² 5; the ranks are the values.
-// Of 1 to n Σd² = n(n² − 1)/12 and Σd⁴ = n(n² − 1)(3n² − 7)/240, so that G2 is −6/5, exactly.
-// Values 0 (n − 1 times) and 1 have g2 = 1/(p q) − 6 with p = 1/n, here 25/4 − 6; G2 = 4/6 (6 g2 +
-// 6).
-TEST(Aggregates, AreThoseOfPaperAndPencil) {
-  const std::vector<Row> three{{1.0, 1.0}, {2.0, 2.0}, {4.5, 4.0}};
-  const std::vector<Row> two{{5.0, 1.0}, {11.0, 3.0}};
-  const std::vector<Row> four{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
-  std::vector<Row> rising;
-  for (double x = -5.0; x < 5.0; x += 0.5) rising.push_back({x, std::exp(x)});
-  const double slope = 5.5 / (14.0 / 3.0);
+// Their numbers are confirmed by aggregates_oracle.py.
+TEST(Aggregates, AreNullOfTooFewRowsOrRowsThatDoNotVary) {
   struct Case {
     std::string_view name;
     std::vector<Row> rows;
-    std::optional<double> expected;  ///< Empty: NULL.
+    std::optional<double> expected = std::nullopt;
   };
-  for (const Case& of : std::vector<Case>{
-           {"stdev", eight, std::sqrt(32.0 / 7.0)},
-           {"stdev", rows_of({3.0, 3.0}), 0.0},
-           {"stdev", rows_of({3.0}), {}},
-           {"skewness", eight, std::sqrt(8.0 * 7.0) / 6.0 * (42.0 / 8.0) / std::pow(4.0, 1.5)},
-           {"skewness", rows_of({1.0, 2.0}), {}},
-           {"skewness", rows_of({1.0, 1.0, 1.0}), {}},
-           {"median", eight, 4.5},
-           {"median", rows_of({9, 1, 2}), 2.0},
-           {"median", rows_of({7}), 7.0},
-           {"kurtosis", ladder(4), -1.2},
-           {"kurtosis", ladder(5), -1.2},
-           {"kurtosis", ladder(1000), -1.2},
-           {"kurtosis", rows_of({0, 0, 0, 0, 1}), 4.0 / 6.0 * (6.0 * 0.25 + 6.0)},
-           {"kurtosis", rows_of({1, 2, 4}), {}},
-           {"kurtosis", rows_of({0.1, 0.1, 0.1, 0.1, 0.1}), {}},
-           {"regr_slope", three, slope},
-           {"regr_intercept", three, 2.5 - slope * (7.0 / 3.0)},
-           {"regr_slope", two, 3.0},
-           {"regr_intercept", two, 2.0},
-           {"regr_slope", {{5.0, 1.0}}, {}},
-           {"regr_slope", {{5.0, 0.1}, {6.0, 0.1}, {7.0, 0.1}}, {}},  // x does not vary.
-           {"regr_slope", {{5.0, 1.0}, {5.0, 2.0}}, 0.0},
-           {"correlation", four, 0.8},
-           {"rank_correlation", four, 0.8},
-           {"rank_correlation", rising, 1.0},
-           {"correlation", {{1.0, 1.0}, {2.0, 2.0}, {3.0, 3.0}}, {}},
-           {"correlation", {{1.0, 1.0}, {2.0, 1.0}, {3.0, 1.0}, {4.0, 1.0}}, {}}}) {
-    const std::optional<double> found = value_of(of.name, of.rows);
-    ASSERT_EQ(found.has_value(), of.expected.has_value()) << of.name;
-    if (found) {
-      EXPECT_NEAR(*found, *of.expected, 1e-13) << of.name;
-    }
+  for (const Case& of :
+       std::vector<Case>{{"stdev", rows_of({3.0, 3.0}), 0.0},
+                         {"stdev", rows_of({3.0})},
+                         {"skewness", rows_of({1.0, 2.0})},
+                         {"skewness", rows_of({1.0, 1.0, 1.0})},
+                         {"median", rows_of({7}), 7.0},
+                         {"kurtosis", rows_of({1, 2, 4})},
+                         {"kurtosis", rows_of({0.1, 0.1, 0.1, 0.1, 0.1})},
+                         {"regr_slope", {{5.0, 1.0}}},
+                         {"regr_slope", {{5.0, 0.1}, {6.0, 0.1}, {7.0, 0.1}}},  // x does not vary.
+                         {"regr_slope", {{5.0, 1.0}, {5.0, 2.0}}, 0.0},
+                         {"correlation", {{1.0, 1.0}, {2.0, 2.0}, {3.0, 3.0}}},
+                         {"correlation", {{1.0, 1.0}, {2.0, 1.0}, {3.0, 1.0}, {4.0, 1.0}}}}) {
+    EXPECT_EQ(value_of(of.name, of.rows), of.expected) << of.name;
   }
-  EXPECT_LT(*value_of("correlation", rising), 0.8);
 }
 
 // Multiples of 2⁻²⁰ around 1e8 are doubles, so that only the statistics could round. y = x/3 + 2 in
@@ -203,16 +154,6 @@ TEST(Aggregates, AreEmptyAgainWhenAllRowsLeft) {
   }
 }
 
-TEST(Aggregates, WilksUpperIsTheLargestOf59For95PercentWith95Percent) {
-  std::vector<Row> rows;
-  for (int i = 1; i <= 58; ++i) rows.push_back({double(i), 95.0, 95.0});
-  EXPECT_FALSE(value_of("wilks_upper", rows));
-  for (int i = 59; i <= 92; ++i) rows.push_back({double(i), 95.0, 95.0});
-  EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
-  rows.push_back({93.0, 95.0, 95.0});  // From 93 on it is the second largest [Wilks1941].
-  EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
-}
-
 TEST(Aggregates, WilksUpperCountsANullAsLargerThanAnyValue) {
   std::vector<Row> rows;
   for (int i = 1; i <= 92; ++i) rows.push_back({double(i), 95.0, 95.0});
@@ -220,17 +161,6 @@ TEST(Aggregates, WilksUpperCountsANullAsLargerThanAnyValue) {
   EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
   rows.push_back({std::nullopt, 95.0, 95.0});
   EXPECT_FALSE(value_of("wilks_upper", rows));
-}
-
-TEST(Aggregates, OthersLeaveOutRowsWithANull) {
-  std::vector<Row> rows = eight;
-  rows.insert(rows.begin() + 3, Row{std::nullopt});
-  EXPECT_EQ(value_of("stdev", rows), value_of("stdev", eight));
-  const std::vector<Row> pairs{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
-  std::vector<Row> more = pairs;
-  more.push_back({9.0, std::nullopt});
-  more.push_back({std::nullopt, 9.0});
-  EXPECT_EQ(value_of("correlation", more), value_of("correlation", pairs));
 }
 
 TEST(Aggregates, AreEmptyWithoutAnyValue) {

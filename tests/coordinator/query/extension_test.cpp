@@ -1,16 +1,10 @@
 #include <fmt/format.h>
-#include <gmock/gmock.h>
-
-#include <cstdlib>
-#include <sstream>
 
 #include "tests/coordinator/query/query_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 namespace {
-
-using testing::EndsWith;
-using testing::HasSubstr;
 
 /// The extension in processes of other programs.
 class Extension : public QueryTest {

@@ -1,17 +1,9 @@
 #include "coordinator/query/row_writer.hpp"
 
-#include <gtest/gtest.h>
-
-#include <bit>
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -1,16 +1,10 @@
 // The results of the paper's campaign to the last bit, seed 1: whoever changes one of them changes
 // the model, and with it model_version.
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/digest.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

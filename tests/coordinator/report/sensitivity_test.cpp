@@ -1,34 +1,16 @@
 #include "coordinator/report/sensitivity.hpp"
 
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <limits>
-#include <nlohmann/json.hpp>
-#include <random>
-#include <span>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/table/terminal_table.hpp"
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "tests/coordinator/report/text_lines.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using ::testing::Each;
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
-
-/// Every quantity uniform in [-1, 1]; the error of K2c is that with index 7, and that of a_c12 the
-/// square of that with index 20.
+/// Every quantity uniform in [-1, 1]; the error of K2c is that with index 7.
 DrawnRuns made_up_runs() {
   std::mt19937_64 bits(5);
   DrawnRuns drawn;
@@ -42,76 +24,16 @@ DrawnRuns made_up_runs() {
     }
     for (auto& errors : drawn.errors) errors.push_back(1.0);
     drawn.errors[index(Parameter::k2c)].back() = drawn.columns[7].back();
-    drawn.errors[index(Parameter::a_c12)].back() =
-        drawn.columns[20].back() * drawn.columns[20].back();
   }
   drawn.num_with_estimate = drawn.num_first = drawn.runs.size();
   drawn.last_with_estimate = drawn.runs.back();
   return drawn;
 }
 
-TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
-  const auto lines = test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), 2));
-  ASSERT_EQ(lines.size(), 21U);
-  EXPECT_EQ(lines[0], "K2c/K1c²: 1000 runs");
-  EXPECT_THAT(lines[2], StartsWith("drives |error|"));
-  EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
-  EXPECT_THAT(lines[7], StartsWith("drives error"));
-  EXPECT_THAT(lines[9], StartsWith(drawn_names()[7]));
-  EXPECT_THAT(lines[9], HasSubstr(" 100.0 (100.0, 100.0)    +1.00     <1e-09"));
-}
-
-// Of 59 quantities without influence none is called significant.
-TEST(SensitivityText, CorrectsForAllQuantitiesTried) {
-  const auto lines =
-      test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), num_drawn));
-  const auto table = std::span(lines).subspan(4, num_drawn);
-  EXPECT_THAT(table[0], EndsWith("  <1e-09"));
-  for (const std::string& line : table.subspan(1)) {
-    EXPECT_GT(std::stod(line.substr(line.rfind(' '))), 0.05) << line;
-  }
-}
-
-// The error is that of other runs, so that no quantity has to do with it.
-TEST(SensitivityText, SaysThatNoInputIsFoundAndListsSomeOnlyIfAsked) {
-  DrawnRuns drawn = made_up_runs();
-  std::vector<double>& errors = drawn.errors[index(Parameter::k2c)];
-  std::ranges::rotate(errors, errors.begin() + 7);
-  const std::string text = sensitivity_text(drawn, index(Parameter::k2c));
-  EXPECT_THAT(text, HasSubstr("\n|error|: no input found "));
-  EXPECT_THAT(text, HasSubstr("\nerror: no input found "));
-  EXPECT_THAT(text, Not(HasSubstr("drives")));
-  for (const std::string& name : drawn_names()) EXPECT_THAT(text, Not(HasSubstr("\n" + name)));
-  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 2), HasSubstr("\ndrives |error| "));
-  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {42}),
-              HasSubstr("|error|: no input found "));
-  EXPECT_THAT(sensitivity_text(made_up_runs(), index(Parameter::k2c)), HasSubstr("drives |error|"));
-}
-
-// Quantities 7 and 20 make no difference to the mean of the error, only together.
-TEST(SensitivityText, NamesTheProductThatMakesAnError) {
-  DrawnRuns drawn = made_up_runs();
-  for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
-    drawn.errors[index(Parameter::k2c)][i] = -3.03 * drawn.columns[7][i] * drawn.columns[40][i];
-  }
-  const auto lines = test::lines_of(sensitivity_text(drawn, index(Parameter::k2c), 1));
-  EXPECT_THAT(lines[12], StartsWith("error as a sum of "));
-  EXPECT_EQ(lines[14], drawn_names()[7] + " × " + drawn_names()[40]);
-  EXPECT_EQ(lines[15], std::string(51, ' ').append("-3.03      100.0 %     <1e-09"));
-}
-
-TEST(SensitivityText, NamesASquareAndSaysWhenNothingExplainsTheError) {
-  const auto lines = test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
-  EXPECT_THAT(lines[14], StartsWith("(" + drawn_names()[20] + ")²  "));
-  EXPECT_THAT(lines[14], EndsWith(" 1      100.0 %     <1e-09"));
-  EXPECT_THAT(sensitivity_text(made_up_runs(), index(Parameter::k2d), 1),
-              HasSubstr("\n\nNo quantity and no product of two explains the error.\n"));
-}
-
 TEST(SensitivityText, SaysHowManyRunsItIsComputedFrom) {
   DrawnRuns drawn = made_up_runs();
   const std::string none = sensitivity_text(drawn, index(Parameter::k2c), 1);
-  EXPECT_THAT(none, ::testing::Not(HasSubstr("Computed from")));
+  EXPECT_THAT(none, Not(HasSubstr("Computed from")));
   drawn.num_with_estimate = 5000;
   EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 1),
               StartsWith("K2c/K1c²: 1000 runs\nComputed from 1000 of 5000 runs with an estimate: "
@@ -123,64 +45,6 @@ TEST(SensitivityText, SaysHowManyRunsItIsComputedFrom) {
       << "rank";
 }
 
-TEST(SensitivityText, CountsTheRunsThatItLeavesOut) {
-  DrawnRuns drawn = made_up_runs();
-  drawn.missing = {.num_not_finite = 2, .num_no_draw = 11, .num_given_up = 1};
-  const std::string left_out =
-      "\nLeft out, without an estimate: 2 not finite, 11 without draw, 1 given up\n\n";
-  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 1),
-              StartsWith("K2c/K1c²: 1000 runs" + left_out));
-  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {42}, 1),
-              HasSubstr(" of 1000" + left_out));
-}
-
-TEST(SensitivityText, FitsATerminal) {
-  const DrawnRuns drawn = made_up_runs();
-  EXPECT_THAT(test::lines_of(sensitivity_text(drawn, index(Parameter::k2c), num_drawn)),
-              Each(test::FitsATerminal()));
-  EXPECT_THAT(test::lines_of(explanation_text(drawn, index(Parameter::k2c), {3}, num_drawn)),
-              Each(test::FitsATerminal()));
-}
-
-TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
-  DrawnRuns drawn = made_up_runs();
-  drawn.columns[7][42] = 1.5;
-  drawn.errors[index(Parameter::k2c)][42] = 1.5;
-  const auto lines = test::lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
-  EXPECT_EQ(lines[0], "Run 42: error of K2c/K1c² 1.5 s²/m, rank 1 of 1000");
-  EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
-  EXPECT_THAT(lines[4], HasSubstr("      1.5      99.9"));
-}
-
-// An error whose sign is that of one quantity and whose magnitude grows with another.
-TEST(ExplanationText, ShowsWhatDrivesTheMagnitudeBeforeWhatDrivesTheError) {
-  DrawnRuns drawn = made_up_runs();
-  for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
-    drawn.errors[index(Parameter::k2c)][i] =
-        std::copysign(2.0 + drawn.columns[20][i], drawn.columns[7][i]);
-  }
-  const auto lines = test::lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
-  EXPECT_THAT(lines[2], StartsWith("drives |error|"));
-  EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
-  EXPECT_THAT(lines[6], StartsWith("drives error"));
-  EXPECT_THAT(lines[8], StartsWith(drawn_names()[7]));
-}
-
-// k2c has the largest error and the highest rank; a_d12 the largest share of its objective.
-TEST(ExplanationText, IsOfTheParameterThatIsWorstBesideItsObjective) {
-  DrawnRuns drawn = made_up_runs();
-  std::vector<double> objectives(num_parameters, 1.0);
-  for (auto& errors : drawn.errors) errors[42] = 0.0;
-  drawn.errors[index(Parameter::k2c)][42] = -9.0;
-  objectives[index(Parameter::k2c)] = 90.0;
-  drawn.errors[index(Parameter::a_d12)][42] = -0.25;
-  objectives[index(Parameter::a_d12)] = 0.125;
-  EXPECT_EQ(worst_quantity_of(drawn, {42}, objectives), index(Parameter::a_d12));
-  EXPECT_EQ(choice_text(drawn, {42}, objectives),
-            "Of a_d12, as its error is the largest beside its objective: 2 times that\n"
-            "(another parameter: --parameter NAME)\n");
-}
-
 TEST(ExplanationText, IsOfTheHighestRankIfNothingHasAnObjective) {
   DrawnRuns drawn = made_up_runs();
   const std::vector<double> objectives(num_parameters, std::numeric_limits<double>::infinity());
@@ -189,30 +53,6 @@ TEST(ExplanationText, IsOfTheHighestRankIfNothingHasAnObjective) {
   EXPECT_EQ(worst_quantity_of(drawn, {42}, objectives), index(Parameter::k2c));
   EXPECT_EQ(choice_text(drawn, {42}, objectives),
             "Of k2c, no parameter having an objective: that of the highest rank\n");
-}
-
-TEST(SensitivityJson, HoldsWhatTheTablesHold) {
-  DrawnRuns drawn = made_up_runs();
-  drawn.columns[7][42] = 1.5;
-  drawn.errors[index(Parameter::k2c)][42] = 1.5;
-  const std::vector<std::size_t> quantities{index(Parameter::k2c)};
-  const auto json = nlohmann::json::parse(sensitivity_json(drawn, quantities, RunIndex{42}, 2));
-  EXPECT_EQ(json["run"], 42);
-  EXPECT_EQ(json["num_runs"], 1000);
-  ASSERT_EQ(json["parameters"].size(), 1U);
-  const auto& parameter = json["parameters"][0];
-  EXPECT_EQ(parameter["parameter"], "k2c");
-  EXPECT_EQ(parameter["worst_run"], 42);
-  EXPECT_EQ(parameter["run_error"], 1.5);
-  EXPECT_EQ(parameter["run_rank"], 1);
-  ASSERT_EQ(parameter["drives_error"].size(), 2U);
-  const auto& driver = parameter["drives_error"][0];
-  EXPECT_EQ(driver["quantity"], drawn_names()[7]);
-  EXPECT_NEAR(driver["fraction_of_variance"], 1.0, 1e-3);
-  EXPECT_EQ(driver["run_value"], 1.5);
-  EXPECT_EQ(driver["run_percentile"], 99.9);  // 999 of 1000 runs are below.
-  EXPECT_EQ(parameter["terms"][0]["quantity"], drawn_names()[7]);
-  EXPECT_TRUE(parameter["terms"][0]["times"].is_null());
 }
 
 TEST(ExplanationText, RefusesARunBetweenThoseThatAreThere) {

@@ -1,12 +1,17 @@
 #include "coordinator/report/summarise.hpp"
 
-#include <gtest/gtest.h>
-
-#include <optional>
-#include <vector>
-
+#include "coordinator/report/digest.hpp"
+#include "coordinator/report/error_figures.hpp"
+#include "coordinator/report/live_results.hpp"
+#include "coordinator/report/report_tables.hpp"
+#include "core/model.hpp"
+#include "core/statistics/moments.hpp"
+#include "proto/text/visible_text.hpp"
+#include "tests/coordinator/charts/markup_reading.hpp"
+#include "tests/coordinator/report/review_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -157,6 +162,247 @@ TEST_F(Summarise, WithoutARuleStoresStatisticsAlone) {
   EXPECT_EQ(store.summary()->num_estimated, 9U);
   EXPECT_FALSE(lacks_stop_check(store));
   EXPECT_FALSE(is_rule_missed(store));
+}
+
+// Digests of the documented bytes, made with Python's struct and hashlib.
+constexpr const char* digest_of_nothing =
+    "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+constexpr const char* digest_of_first =
+    "1c67be44c7551128152e0805d20a1b8dfd788b49043e0db4763ad2a348fb1a01";
+constexpr const char* digest_of_both =
+    "d5f80df1d4e2a241fce93f8e659cbee48dd74c1d43ddd97d80854098cfedd596";
+constexpr const char* health_of_first =
+    "00e4d422c3e49483ec1334fd153b0c663b97d722ed65b8628b80958fdf708ae1";
+constexpr const char* health_with_lost =
+    "662fe94c7831e505adef1b9b28de61e22a86d931d155a97445bdb6716a4ea92c";
+
+RunResult first_result() {
+  RunResult result = test::zero_result(
+      {.run = {7}, .status = RunStatus::not_converged, .num_draws = 3, .num_rounds = 5});
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    result.truth[i] = 0.5 + static_cast<double>(i);
+    result.estimate[i] = -1.25 * static_cast<double>(i);  // The first one is a negative zero.
+  }
+  return result;
+}
+
+/// A result without a draw, with numbers that mean nothing.
+RunResult second_result() {
+  RunResult result = test::zero_result(
+      {.run = {8}, .status = RunStatus::no_draw, .num_draws = 1000, .num_rounds = 0});
+  result.truth.assign(num_parameters, 1.0);
+  result.estimate.assign(num_parameters, 2.0);
+  return result;
+}
+
+TEST(Digest, OfNothingIsThatOfNoBytes) {
+  EXPECT_EQ(Digest().finish(), (ResultDigests{.results = digest_of_nothing, .health = ""}));
+}
+
+TEST(Digest, IsThatOfTheDocumentedBytes) {
+  Digest digest;
+  digest.add(first_result());
+  EXPECT_EQ(digest.finish().results, digest_of_first);
+}
+
+TEST(Digest, LeavesOutWhatMeansNothing) {
+  Digest digest;
+  digest.add(first_result());
+  digest.add(second_result());
+  EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = ""}));
+}
+
+TEST(Digest, OfHealthIsThatOfTheDocumentedBytesAndStandsAlone) {
+  RunResult first = first_result();
+  first.health = test::values_of({1e-7, 2e-5, -0.0, 0.25, 3e-4});
+  first.loss.session = 9;  // Means nothing: the run is not lost.
+
+  Digest digest;
+  digest.add(first);
+  digest.add(second_result());
+  EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = health_of_first}));
+
+  RunResult lost = test::zero_result({.run = {9}, .status = RunStatus::lost});
+  lost.health = test::values_of({1e-5, 2e-5, 1e-12, 0.25, 3e-4});
+  lost.loss = test::loss_of(LossCause::saturation, SessionTarget::a_d11_prime);
+  Digest with_lost;
+  with_lost.add(first);
+  with_lost.add(lost);
+  EXPECT_EQ(with_lost.finish().health, health_with_lost);
+}
+
+/// A run with one quantity, whose error is this.
+RunResult run_with(std::uint64_t run, double error) {
+  return {.run = {run}, .truth = {2.0}, .estimate = {2.0 + error}};
+}
+
+double error_at(std::uint64_t run) { return std::ldexp(std::sin(static_cast<double>(run)), -3); }
+
+TEST(ConvergenceCounts, AscendFromFiveToAllRuns) {
+  EXPECT_TRUE(convergence_counts(0).empty());
+  EXPECT_THAT(convergence_counts(3), ElementsAre(3));
+  EXPECT_THAT(convergence_counts(7), ElementsAre(5, 6, 7));
+  const std::vector<std::uint64_t> counts = convergence_counts(1'000'000);
+  EXPECT_EQ(counts.size(), 41U);
+  EXPECT_EQ(counts.front(), 5U);
+  EXPECT_EQ(counts.back(), 1'000'000U);
+  // Equal steps of a logarithmic axis: each number is 200,000^(1/40) = 1.357 times the one before.
+  EXPECT_NEAR(static_cast<double>(counts[30]) / static_cast<double>(counts[29]), 1.357, 0.001);
+}
+
+TEST(ErrorFigures, HaveTheMomentsOfTheFirstRuns) {
+  ErrorFigures collected(1, 300);
+  std::vector<double> magnitudes;
+  for (std::uint64_t run = 0; run < 300; ++run) {
+    collected.add(run_with(run, error_at(run)));
+    magnitudes.push_back(std::abs((2.0 + error_at(run)) - 2.0));
+  }
+  const std::vector<QuantityFigures> figures = collected.figures();
+  ASSERT_EQ(figures.size(), 1U);
+  ASSERT_EQ(figures[0].convergence.back().num_runs, 300U);
+  for (const ConvergencePoint& point : figures[0].convergence) {
+    const std::span<const double> first = std::span(magnitudes).first(point.num_runs);
+    const Moments expected = moments(first);
+    EXPECT_NEAR(point.mean, expected.mean, 1e-13 * expected.mean);
+    EXPECT_NEAR(point.standard_deviation, expected.standard_deviation,
+                1e-12 * expected.standard_deviation);
+    EXPECT_EQ(point.worst, *std::ranges::max_element(first));
+    EXPECT_NEAR(point.deviation_interval->upper, deviation_interval(expected, 0.95)->upper,
+                1e-9 * point.standard_deviation);
+  }
+}
+
+TEST(ErrorFigures, NameTheFiveWorstRuns) {
+  ErrorFigures collected(1, 8);
+  const std::vector<double> errors{0.25, -0.5, 0.125, 0.5, -1.0, 0.0, 0.75, 0.0625};
+  for (std::uint64_t run = 0; run < errors.size(); ++run) collected.add(run_with(run, errors[run]));
+  const std::vector<QuantityFigures> figures = collected.figures();
+  std::vector<std::uint64_t> runs;
+  for (const RunValue& worst : figures[0].worst) runs.push_back(worst.run.value);
+  EXPECT_THAT(runs, ElementsAre(4, 6, 1, 3, 0));  // Of the equal ones 1 and 3 the first.
+}
+
+TEST(ErrorFigures, LeaveOutRunsWithoutAnEstimate) {
+  ErrorFigures collected(1, 10);
+  for (std::uint64_t run = 0; run < 10; ++run) {
+    RunResult result = run_with(run, 0.5);
+    if (run >= 7) result = {.run = {run}, .status = RunStatus::not_finite, .truth = {2.0}};
+    collected.add(result);
+  }
+  EXPECT_EQ(collected.figures()[0].convergence.back().num_runs, 7U);
+}
+
+std::uint64_t sum_of(const std::vector<std::uint64_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+}
+
+/// How many values are in [lower, upper), counted one by one.
+std::uint64_t count_between(const std::vector<double>& values, double lower, double upper) {
+  return static_cast<std::uint64_t>(
+      std::ranges::count_if(values, [&](double value) { return value >= lower && value < upper; }));
+}
+
+std::vector<double> normal_values(std::size_t count, double sigma) {
+  std::mt19937_64 bits(7);
+  std::vector<double> values;
+  for (std::size_t i = 0; i < count; ++i) {
+    double sum = -6.0;  // Of twelve uniform ones: nearly normal, the same on every machine.
+    for (int term = 0; term < 12; ++term) sum += static_cast<double>(bits() >> 11) * 0x1p-53;
+    values.push_back(sigma * sum);
+  }
+  return values;
+}
+
+TEST(ErrorBins, CountEachValueBetweenItsEdges) {
+  const std::vector<double> values = normal_values(5000, 3e-4);
+  ErrorBins bins;
+  for (const double value : values) bins.add(value);
+  const Histogram histogram = bins.histogram();
+  ASSERT_EQ(histogram.edges.size(), histogram.counts.size() + 1);
+  EXPECT_LE(histogram.counts.size(), 64U);
+  EXPECT_GE(histogram.counts.size(), 20U);
+  for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
+    EXPECT_EQ(histogram.counts[i],
+              count_between(values, histogram.edges[i], histogram.edges[i + 1]));
+  }
+  EXPECT_EQ(sum_of(histogram.counts), values.size());
+}
+
+TEST(ErrorBins, DoNotDependOnTheOrder) {
+  std::vector<double> values = normal_values(1000, 1.0);
+  ErrorBins forwards, backwards;
+  for (const double value : values) forwards.add(value);
+  std::ranges::reverse(values);
+  for (const double value : values) backwards.add(value);
+  EXPECT_EQ(forwards.histogram().edges, backwards.histogram().edges);
+  EXPECT_EQ(forwards.histogram().counts, backwards.histogram().counts);
+}
+
+TEST(ErrorBins, HoldZerosAndTheLargestValues) {
+  ErrorBins bins;
+  EXPECT_TRUE(bins.histogram().counts.empty());
+  bins.add(0.0);
+  bins.add(-1e90);
+  bins.add(1e90);
+  EXPECT_EQ(sum_of(bins.histogram().counts), 3U);
+}
+
+// Ten bins a power of ten: 1, 2 and 5 are in the bins from 10^0, 10^0.3 and 10^0.6 on.
+TEST(MagnitudeBins, AreTenAPowerOfTen) {
+  MagnitudeBins bins;
+  for (const double value : {1.0001, 2.1, 5.1, 5.2}) bins.add(value);
+  const Histogram histogram = bins.histogram();
+  EXPECT_THAT(histogram.counts, ElementsAre(1, 0, 0, 1, 0, 0, 0, 2));
+  EXPECT_NEAR(histogram.edges.front(), 1.0, 1e-12);
+  EXPECT_NEAR(histogram.edges.back(), std::pow(10.0, 0.8), 1e-9);
+}
+
+TEST(MagnitudeBins, LeaveOutOnePercentAtMost) {
+  MagnitudeBins bins;
+  bins.add(0.0);
+  for (int i = 0; i < 199; ++i) bins.add(1.5);
+  const Histogram histogram = bins.histogram();
+  EXPECT_EQ(histogram.num_below, 1U);
+  EXPECT_THAT(histogram.counts, ElementsAre(199));
+}
+
+TEST(MagnitudeBins, ShowTenPercent) {
+  MagnitudeBins bins;
+  for (int i = 0; i < 90; ++i) bins.add(1.5);
+  for (int i = 0; i < 10; ++i) bins.add(0.75);
+  EXPECT_THAT(bins.histogram().counts, ElementsAre(10, 0, 0, 90));
+}
+
+/// Results of a database, one after the other.
+class LiveResultsTest : public test::ReviewTest {
+ protected:
+  static LiveResults results_in(const Store& store) {
+    LiveResults results(test::campaign_of(1));
+    store.for_each_result([&](const RunResult& result) { results.add(result); });
+    return results;
+  }
+};
+
+// A review reads the same results in passes, and its statistics are of another method.
+TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
+  const Store store = store_with(150);
+  const std::string html = results_in(store).html();
+  EXPECT_EQ(test::malformed_part(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
+                          Not(HasSubstr("<html"))));
+  const Review review = review_of(store, 150);
+  for (const Row& row : accuracy_table(review.objectives, review.results.statistics).rows) {
+    for (const Cell& cell : row) {
+      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
+    }
+  }
+  EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
+}
+
+TEST(LiveResults, AreEmptyAtFirst) {
+  const LiveResults results(test::campaign_of(1));
+  EXPECT_EQ(test::malformed_part(results.html()), "");
+  EXPECT_THAT(results.html(), HasSubstr("no data"));
 }
 
 }  // namespace

@@ -1,25 +1,16 @@
 // What a campaign database keeps for the next coordinator, and of workers, losses and second
 // results.
 
-#include <gmock/gmock.h>
-
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using test::campaign_of;
-using test::deliveries_of;
-using test::delivery_of;
 using test::session_1;
-using test::store_error_of;
 using test::worker_1;
 using test::write;
-using test::wrong_delivery_of;
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
 
 using StoreDispatch = test::StoreTest;
 

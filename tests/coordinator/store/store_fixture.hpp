@@ -1,27 +1,16 @@
 #pragma once
 
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmath>
-#include <cstdint>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "tests/message_of.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::test {
 
@@ -46,19 +35,12 @@ inline std::string text_in(const std::filesystem::path& file, const std::string&
 /// A test with a directory of its own, removed afterwards.
 class StoreTest : public ::testing::Test {
  protected:
-  StoreTest() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "proofmass_XXXXXX").string();
-    if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary directory");
-    directory_ = pattern;
-  }
-  ~StoreTest() override { std::filesystem::remove_all(directory_); }
-
-  [[nodiscard]] std::filesystem::path directory() const { return directory_; }
+  [[nodiscard]] std::filesystem::path directory() const { return directory_.path(); }
   [[nodiscard]] std::filesystem::path file() const { return directory_ / "campaign.db"; }
 
   [[nodiscard]] std::set<std::string> file_names() const {
     std::set<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
+    for (const auto& entry : std::filesystem::directory_iterator(directory())) {
       names.insert(entry.path().filename());
     }
     return names;
@@ -79,7 +61,7 @@ class StoreTest : public ::testing::Test {
   }
 
  private:
-  std::filesystem::path directory_;
+  ScratchDirectory directory_;
 };
 
 inline void write_file(const std::filesystem::path& path, const std::string& content) {
@@ -212,3 +194,12 @@ class FileSizeLimit {
 };
 
 }  // namespace proofmass::test
+
+namespace proofmass::coordinator {
+using test::campaign_of;
+using test::deliveries_of;
+using test::delivery_of;
+using test::results_in;
+using test::store_error_of;
+using test::wrong_delivery_of;
+}  // namespace proofmass::coordinator

@@ -1,23 +1,15 @@
 // Databases of parts of one campaign become one: what it then holds is what one coordinator that
 // had seen all deliveries would hold.
 
-#include <gmock/gmock.h>
-
-#include <stdexcept>
-
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using test::campaign_of;
-using test::delivery_of;
-using test::store_error_of;
 using test::text_in;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 constexpr std::uint64_t num_runs = 10;
 constexpr wire::SessionId session_2{2};
@@ -68,23 +60,6 @@ ReturnedRuns crashed(std::uint64_t run, wire::SessionId worker) {
           .worker = worker,
           .reason = wire::LossReason::crashed,
           .is_blamed = true};
-}
-
-TEST_F(StoreMerge, HoldsTheResultsOfAllPartsInAnyOrder) {
-  const auto a = part("a.db", entries_of({test::worker_1()}, {0, 7, 1}, delivery_of));
-  const auto b = part("b.db", entries_of({worker_2()}, {9, 2, 3, 4, 5, 6, 8}, second_delivery_of));
-  EXPECT_THAT(merge({b, a}), ElementsAre(MergedPart{.num_new = 7}, MergedPart{.num_new = 3}));
-  const Store store = Store::open_read_only(whole());
-  const std::vector<RunResult> results = test::results_in(store);
-  ASSERT_EQ(results.size(), num_runs);
-  for (std::uint64_t run = 0; run < num_runs; ++run) {
-    EXPECT_EQ(results[run].run.value, run);
-    EXPECT_EQ(results[run].truth, test::result_of(run).truth);
-    EXPECT_EQ(results[run].estimate, test::result_of(run).estimate);
-  }
-  EXPECT_EQ(store.control().phase, wire::CampaignPhase::finished);
-  EXPECT_EQ(store.definition(), "as text");
-  EXPECT_NO_THROW(store.check_integrity());
 }
 
 TEST_F(StoreMerge, KeepsWhoComputedWhatAndWhen) {

@@ -1,29 +1,13 @@
 // Files that lose their name while they are open: removed, renamed, replaced, without their log.
 // Nothing more is stored, and a copy beside the name has all that was stored before.
 
-#include <gmock/gmock.h>
-
-#include <functional>
-#include <utility>
-
 #include "coordinator/store/detail/file_place.hpp"
 #include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using test::campaign_of;
-using test::deliveries_of;
-using test::delivery_of;
-using test::results_in;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
-using ::testing::SizeIs;
-using ::testing::StartsWith;
 
 class StorePlace : public test::WriterTest {
  protected:

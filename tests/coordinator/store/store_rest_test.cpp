@@ -1,27 +1,18 @@
 // When a campaign database is whole without its write-ahead log, and what is made of one that is
 // not.
 
-#include <gmock/gmock.h>
-
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using detail::Access;
 using detail::Database;
-using test::campaign_of;
-using test::deliveries_of;
-using test::delivery_of;
 using test::patient_config;
-using test::results_in;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class StoreRest : public test::WriterTest {
  protected:

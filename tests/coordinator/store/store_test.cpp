@@ -1,18 +1,11 @@
 #include "coordinator/store/store.hpp"
 
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <limits>
-#include <string>
-
 #include "coordinator/store/detail/database.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -20,15 +13,8 @@ namespace {
 using detail::Access;
 using detail::Database;
 using detail::Statement;
-using test::campaign_of;
-using test::deliveries_of;
-using test::delivery_of;
 using test::result_of;
-using test::results_in;
 using test::session_1;
-using test::store_error_of;
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
 
 using StoreTest = test::StoreTest;
 
@@ -319,15 +305,6 @@ TEST_F(StoreTest, HasTheKnownDigestOfADefinition) {
       " campaign_uid = 7");
   EXPECT_EQ(Store::open_read_only(file()).computed_table_digest(),
             "5509dd21e1bb692b627bf7def27c168579a5c119cfad179f1eb1afac15402055");
-}
-
-TEST_F(StoreTest, KeepsItsOwner) {
-  {
-    Store store = create(3);
-    EXPECT_EQ(store.owner(), "");
-    store.set_owner("anna");
-  }
-  EXPECT_EQ(Store::open_read_only(file()).owner(), "anna");
 }
 
 TEST_F(StoreTest, IsReadableInADirectoryThatIsNotWritable) {

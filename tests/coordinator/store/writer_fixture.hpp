@@ -1,15 +1,6 @@
 #pragma once
 
-#include <algorithm>
-#include <chrono>
 #include <condition_variable>
-#include <functional>
-#include <memory>
-#include <mutex>
-#include <sstream>
-#include <string>
-#include <variant>
-#include <vector>
 
 #include "coordinator/store/store_writer.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"

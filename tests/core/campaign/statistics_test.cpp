@@ -1,19 +1,8 @@
 #include "core/campaign/statistics.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <numeric>
-#include <optional>
-#include <random>
-#include <vector>
-
 #include "tests/support/microscope_results.hpp"
 #include "tests/support/statistics_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -97,25 +86,6 @@ TEST(Statistics, TakeTheErrorAgainstTheTruth) {
   const CampaignStatistics statistics = statistics_of({result});
   EXPECT_EQ(statistics.accuracy[index(k2d)].worst, 25.0);
   EXPECT_EQ(statistics.accuracy[index(k2c)].worst, 0.0);
-}
-
-TEST(Statistics, OfASingleRunHaveNoSpread) {
-  const AccuracyStatistic accuracy = statistics_of_errors({-3.0}).accuracy[index(a_c12)];
-  EXPECT_EQ(accuracy.worst, 3.0);
-  EXPECT_EQ(accuracy.mean, 3.0);
-  EXPECT_EQ(accuracy.standard_deviation, 0.0);
-}
-
-TEST(Statistics, OfNoRunAreZero) {
-  const CampaignStatistics statistics = statistics_of_errors({});
-  EXPECT_EQ(statistics.num_runs, 0u);
-  EXPECT_EQ(statistics.accuracy[index(a_c12)].worst, 0.0);
-  EXPECT_EQ(statistics.accuracy[index(a_c12)].mean, 0.0);
-}
-
-TEST(Statistics, CountRunsBeyondTheObjectiveButNotThoseOnIt) {
-  EXPECT_EQ(
-      statistics_of_errors({0.5, -1.0, 1.5, -2.5}).accuracy[index(a_d12)].num_beyond_objective, 2u);
 }
 
 TEST(Statistics, NameTheFirstOfSeveralWorstRuns) {

@@ -1,11 +1,7 @@
 #include "core/definition/definition_text.hpp"
 
-#include <gtest/gtest.h>
-
-#include <string>
-#include <vector>
-
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::detail {
 namespace {

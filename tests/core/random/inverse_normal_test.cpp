@@ -1,13 +1,5 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <vector>
-
 #include "core/random/normal.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

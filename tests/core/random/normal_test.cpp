@@ -1,14 +1,7 @@
 #include "core/random/normal_deviates.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <vector>
-
 #include "core/random/stream.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,9 +1,6 @@
 #include "core/random/stream.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdint>
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,17 +1,12 @@
 #include "core/statistics/error_change.hpp"
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <iostream>
-#include <utility>
-#include <vector>
 
 #include "core/statistics/distribution.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,15 +1,8 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <optional>
-#include <vector>
-
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,39 +1,14 @@
 #include "core/statistics/moments.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <vector>
-
 #include "core/error.hpp"
+#include "core/statistics/correlation.hpp"
+#include "core/statistics/distribution.hpp"
+#include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-// 2, 4, 4, 4, 5, 5, 7, 9: mean 5, squares of differences 32 over n − 1 = 7; raw squares 232 over 8;
-// cubes −27 − 3 + 8 + 64 = 42, so g1 = (42/8)/2³ and G1 = g1 √56/6; fourth powers
-// 81 + 3 + 16 + 256 = 356, so g2 = (356/8)/2⁴ − 3 and G2 = (9 g2 + 6) 7/30.
-TEST(Moments, OfEightNumbersAreThoseOfPaperAndPencil) {
-  const Moments about = moments(std::vector<double>{2, 4, 4, 4, 5, 5, 7, 9});
-  EXPECT_EQ(about.count, 8u);
-  EXPECT_EQ(about.mean, 5.0);
-  EXPECT_DOUBLE_EQ(about.standard_deviation, std::sqrt(32.0 / 7.0));
-  EXPECT_DOUBLE_EQ(about.rms, std::sqrt(29.0));
-  EXPECT_DOUBLE_EQ(about.skewness, 42.0 / 8.0 / 8.0 * std::sqrt(56.0) / 6.0);
-  EXPECT_DOUBLE_EQ(about.excess_kurtosis, (9.0 * (356.0 / 8.0 / 16.0 - 3.0) + 6.0) * 7.0 / 30.0);
-}
-
-TEST(Moments, OfASingleValueHaveNoSpread) {
-  const Moments about = moments(std::vector<double>{-3.0});
-  EXPECT_EQ(about.mean, -3.0);
-  EXPECT_EQ(about.standard_deviation, 0.0);
-  EXPECT_EQ(about.rms, 3.0);
-  EXPECT_EQ(about.skewness, 0.0);
-}
 
 TEST(Moments, OfEqualValuesHaveNoSpread) {
   const Moments about = moments(std::vector<double>(1000, 0.1));
@@ -59,24 +34,6 @@ TEST(Moments, DoNotFeelAnOffsetOf1e8) {
   EXPECT_NEAR(far.skewness / plain.skewness, 1.0, 1e-14);
   EXPECT_NEAR(far.excess_kurtosis / plain.excess_kurtosis, 1.0, 1e-14);
   EXPECT_EQ(far.mean, 1e8 + plain.mean);
-}
-
-TEST(Moments, DoNotFeelAScale) {
-  std::vector<double> values = test::normal_column(1000, {.seed = 9});
-  const Moments plain = moments(values);
-  std::ranges::for_each(values, [](double& value) { value *= 0x1p-60; });
-  const Moments scaled = moments(values);
-  EXPECT_EQ(scaled.standard_deviation, plain.standard_deviation * 0x1p-60);
-  EXPECT_EQ(scaled.skewness, plain.skewness);
-  EXPECT_EQ(scaled.excess_kurtosis, plain.excess_kurtosis);
-}
-
-TEST(Moments, ChangeSignWithTheValues) {
-  std::vector<double> values = test::half_normal_column(1000, {.seed = 10});
-  const Moments plain = moments(values);
-  std::ranges::for_each(values, [](double& value) { value = -value; });
-  EXPECT_EQ(moments(values).mean, -plain.mean);
-  EXPECT_EQ(moments(values).skewness, -plain.skewness);
 }
 
 TEST(Moments, HaveNoSkewnessOfTwoValuesAndNoKurtosisOfThree) {
@@ -113,7 +70,79 @@ TEST(CompensatedSum, KeepsWhatAPlainSumLoses) {
   EXPECT_EQ(plain, 0.0);
 }
 
-TEST(CompensatedSum, OfNothingIsZero) { EXPECT_EQ(compensated_sum({}), 0.0); }
+TEST(Percentile, RefusesALevelOutsideItsRange) {
+  const std::vector<double> values{1.0, 2.0};
+  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)percentile(values, 1.5); }),
+            "level = 1.5 (must be in [0, 1])");
+}
+
+TEST(Percentile, RefusesNoValues) {
+  EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)percentile({}, 0.5); }),
+            "values = 0 values (must be at least 1)");
+}
+
+TEST(AscendingOrder, KeepsTheOrderOfEqualValues) {
+  EXPECT_THAT(ascending_order(std::vector<double>{3.0, 1.0, 3.0, 1.0}), ElementsAre(1, 3, 0, 2));
+}
+
+TEST(Sorted, LeavesNothingOut) {
+  EXPECT_THAT(sorted(std::vector<double>{3.0, 1.0, 3.0}), ElementsAre(1.0, 3.0, 3.0));
+}
+
+TEST(Binomial, TailsAreTheSumsOfItsTerms) {
+  constexpr int n = 12;
+  constexpr double p = 0.3;
+  double at_most = 0.0;
+  double term = std::pow(1.0 - p, n);
+  for (int k = 0; k <= n; ++k) {
+    EXPECT_NEAR(binomial_at_least(k, n, p), 1.0 - at_most, 1e-14) << k;
+    at_most += term;
+    EXPECT_NEAR(binomial_at_most(k, n, p), at_most, 1e-14) << k;
+    term *= p / (1.0 - p) * (n - k) / (k + 1.0);
+  }
+  EXPECT_EQ(binomial_at_most(-1.0, n, p), 0.0);
+  EXPECT_EQ(binomial_at_least(13.0, n, p), 0.0);
+}
+
+// Both series hold for every x; they meet at 1. Quantiles of any table.
+TEST(KolmogorovUpper, HasThePublishedPoints) {
+  EXPECT_NEAR(kolmogorov_upper(1.36), 0.0495, 5e-5);
+  EXPECT_NEAR(kolmogorov_upper(1.63), 0.0098, 5e-5);
+  EXPECT_NEAR(kolmogorov_upper(0.82757), 0.5, 2e-5);  // The median.
+  EXPECT_NEAR(kolmogorov_upper(std::nextafter(1.0, 0.0)), kolmogorov_upper(1.0), 1e-15);
+  EXPECT_EQ(kolmogorov_upper(0.0), 1.0);
+  EXPECT_GE(kolmogorov_upper(40.0), 0.0);
+}
+
+using Values = std::vector<double>;
+
+// Around 2⁵³ only even numbers are doubles: the mean, M + 1, is rounded to M.
+TEST(LinearCorrelation, IsZeroOfPatternsWhoseMeanIsNoDouble) {
+  constexpr double m = 0x1p53;
+  const Values x{m, m, m + 2, m + 2};
+  const Values y{m, m + 2, m, m + 2};
+  EXPECT_EQ(linear_correlation(x, y), 0.0);
+}
+
+TEST(Correlations, AreEmptyWithoutVariationOrValues) {
+  const Values constant(5, 2.0);
+  const Values x{1, 2, 3, 4, 5};
+  EXPECT_FALSE(linear_correlation(x, constant).has_value());
+  EXPECT_FALSE(rank_correlation(constant, x).has_value());
+  EXPECT_FALSE(linear_correlation(Values{1, 2, 3}, Values{3, 1, 2}).has_value());
+  EXPECT_FALSE(rank_correlation(Values{1, 2, 3}, Values{3, 1, 2}).has_value());
+}
+
+TEST(Correlations, RefuseWhatTheyCannotWorkWith) {
+  const Values x{1, 2, 3, 4};
+  EXPECT_EQ(test::message_of<InvalidArgument>([&] {
+              (void)linear_correlation(x, Values{1, 2});
+            }),
+            "y = 2 values (must be as many as the others, 4)");
+  const Values broken{1, 2, std::numeric_limits<double>::quiet_NaN(), 4};
+  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)rank_correlation(x, broken); }),
+            "y[2] = nan (must be finite)");
+}
 
 }  // namespace
 }  // namespace proofmass

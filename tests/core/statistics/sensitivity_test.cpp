@@ -1,16 +1,9 @@
 #include "core/statistics/sensitivity.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <vector>
-
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"
 #include "tests/core/statistics/columns.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,21 +1,8 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <map>
-#include <memory>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "core/error.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/requirement.hpp"
 #include "core/statistics/stop_rule.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,29 +1,21 @@
 #include "proto/link/connection_monitor.hpp"
 
 #include <arpa/inet.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <functional>
-#include <optional>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
 #include <zmq.hpp>
 
 #include "core/error.hpp"
 #include "proto/link/socket.hpp"
+#include "tests/proto/link/raw_peer.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::wire {
 namespace {
 
-using ::testing::AnyOf;
 using Clock = std::chrono::steady_clock;
 
 // Someone who connects. Its clock runs as fast as the test wants.
@@ -233,6 +225,175 @@ TEST(ConnectionMonitor, TellsThatThePeerIsNoCoordinator) {
 TEST(ConnectionMonitor, AddressThatCanNeverBeConnectedIsAnError) {
   EXPECT_EQ(test::refusal_of([] { Peer peer("carrier-pigeon://home", {}); }),
             "connect = carrier-pigeon://home (Protocol not supported)");
+}
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::int64_t mebibyte = 1 << 20;
+
+TEST(Router, LimitsTheSizeOfAMessage) {
+  zmq::context_t context;
+  const auto router = [&](Domain domain) {
+    return make_router(context, "bind", "tcp://127.0.0.1:*", {.domain = domain, .keys = {}});
+  };
+  EXPECT_EQ(router(Domain::workers).get(zmq::sockopt::maxmsgsize), mebibyte);
+  EXPECT_EQ(router(Domain::clients).get(zmq::sockopt::maxmsgsize), mebibyte);
+  EXPECT_EQ(make_dealer(context, {}).get(zmq::sockopt::maxmsgsize), 4 * mebibyte);
+}
+
+TEST(Router, BindsAllKindsOfAddresses) {
+  zmq::context_t context;
+  const auto bound = [&](const std::string& endpoint) {
+    return make_router(context, "bind", endpoint, {}).get(zmq::sockopt::last_endpoint);
+  };
+  EXPECT_EQ(bound("tcp://127.0.0.1:*").rfind("tcp://127.0.0.1:", 0), 0u);
+  EXPECT_EQ(bound("tcp://lo:*").rfind("tcp://127.0.0.1:", 0), 0u);
+  const std::string any = bound("tcp://*:*");
+  EXPECT_TRUE(any.starts_with("tcp://[::]:") || any.starts_with("tcp://0.0.0.0:")) << any;
+}
+
+// A coordinator may be back for a few seconds only, and a client waits 10 s by default.
+TEST(Dealer, OfAClientTriesAgainEachSecond) {
+  zmq::context_t context;
+  const auto interval_max = [&](KeyRole role) {
+    const zmq::socket_t dealer = make_dealer(context, {}, role);
+    EXPECT_EQ(dealer.get(zmq::sockopt::reconnect_ivl), 100);
+    return dealer.get(zmq::sockopt::reconnect_ivl_max);
+  };
+  EXPECT_EQ(interval_max(KeyRole::client), 1000);
+  EXPECT_EQ(interval_max(KeyRole::worker), 5000);
+}
+
+// A limit that is set but not obeyed is none.
+TEST(Router, ClosesTheConnectionOfWhoSendsTooMuch) {
+  zmq::context_t context;
+  zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
+  zmq::socket_t dealer = make_dealer(context, {});
+  ConnectionMonitor monitor(context, dealer, router.get(zmq::sockopt::last_endpoint), {},
+                            Clock::now());
+  bool is_sent = false;
+  bool is_closed = false;
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  while (!is_closed && Clock::now() < deadline) {
+    zmq::pollitem_t item{monitor.handle(), 0, ZMQ_POLLIN, 0};
+    zmq::poll(&item, 1, std::chrono::milliseconds(100));
+    monitor.update(Clock::now());
+    if (is_sent && !monitor.is_connected()) is_closed = true;
+    if (!is_sent && monitor.is_connected()) {
+      is_sent = dealer.send(zmq::message_t(mebibyte + 1), zmq::send_flags::dontwait).has_value();
+    }
+  }
+  EXPECT_TRUE(is_closed);
+  zmq::message_t frame;
+  EXPECT_FALSE(router.recv(frame, zmq::recv_flags::dontwait));
+}
+
+// The socket must not fall back to admitting every key when the authenticator is missing.
+TEST(Router, WithKeysAndWithoutAuthenticatorAdmitsNobody) {
+  zmq::context_t context;
+  zmq::context_t other_context;
+  const KeyPair server = make_key_pair();
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
+                                           {.domain = Domain::workers, .keys = server});
+  const ClientSecurity security{.identity = CurveIdentity{.role = KeyRole::worker,
+                                                          .keys = make_key_pair(),
+                                                          .coordinator = server.public_key}};
+  zmq::socket_t dealer = make_dealer(other_context, security);
+  ConnectionMonitor monitor(other_context, dealer, router.get(zmq::sockopt::last_endpoint),
+                            security, Clock::now());
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  std::optional<std::string> refusal;
+  while (!refusal && !monitor.is_connected() && Clock::now() < deadline) {
+    zmq::pollitem_t item{monitor.handle(), 0, ZMQ_POLLIN, 0};
+    zmq::poll(&item, 1, std::chrono::milliseconds(100));
+    monitor.update(Clock::now());
+    refusal = monitor.take_refusal();
+  }
+  EXPECT_FALSE(monitor.is_connected());
+  EXPECT_TRUE(refusal.has_value());
+}
+
+// Peers that hang up while nobody reads what they sent. ZeroMQ 4.3.4 aborts the process if it has
+// stopped to read from such a connection and then handles a ZMTP heartbeat, so each test is a
+// process of its own.
+
+using Clock = std::chrono::steady_clock;
+using test::RawPeer;
+
+// More than any limit in messages that a connection had.
+constexpr int num_sent = 20000;
+
+/// Messages, some of them interspersed with PINGs if the peer sends any.
+std::string many_messages(bool has_pings) {
+  std::string bytes;
+  for (int i = 0; i < num_sent; ++i) {
+    bytes += RawPeer::frame(0, "x");
+    if (has_pings && i % 10 == 9) bytes += RawPeer::ping();
+  }
+  return bytes;
+}
+
+/// A router whose reader is busy, and a peer that sends and hangs up.
+/// @return True if the router noticed and then gave all complete messages that it had taken.
+bool survives(bool has_pings) {
+  zmq::context_t context;
+  zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
+  SocketEvents events(context, router.handle(), ZMQ_EVENT_DISCONNECTED);
+  RawPeer peer(router.get(zmq::sockopt::last_endpoint));
+  peer.introduce();
+  peer.send(many_messages(has_pings));
+  // Once one message can be received the first have arrived; the others follow.
+  zmq::pollitem_t item{router.handle(), 0, ZMQ_POLLIN, 0};
+  zmq::poll(&item, 1, std::chrono::seconds(20));
+  peer.reset();
+  // Without an end of the connection the program ends here, after the interval of a heartbeat.
+  zmq::pollitem_t disconnected{events.handle(), 0, ZMQ_POLLIN, 0};
+  zmq::poll(&disconnected, 1, std::chrono::seconds(10));
+  const bool is_noticed = events.take().has_value();
+  int num_received = 0;
+  zmq::message_t frame;
+  // Reading makes room, which makes the library go on with the connection.
+  const auto deadline = Clock::now() + std::chrono::seconds(1);
+  while (Clock::now() < deadline) {
+    while (router.recv(frame, zmq::recv_flags::dontwait)) ++num_received;
+    if (is_noticed) break;
+  }
+  return is_noticed && num_received > 0;
+}
+
+void expect_survival(bool has_pings) {
+  EXPECT_EXIT(_exit(survives(has_pings) ? 0 : 1), testing::ExitedWithCode(0), "");
+}
+
+TEST(RouterDeathTest, SurvivesAPeerThatHangsUpWhileNobodyReads) { expect_survival(false); }
+
+// The peer's own heartbeats make the library write, too.
+TEST(RouterDeathTest, SurvivesAPeerThatPingsAndHangsUpWhileNobodyReads) { expect_survival(true); }
+
+// What makes the two above possible: no queue of a connection can be full.
+TEST(Router, HasNoQueueThatCanBeFullAndNoHeartbeats) {
+  zmq::context_t context;
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
+  const zmq::socket_t dealer = make_dealer(context, {});
+  for (const zmq::socket_t* const socket : {&router, &dealer}) {
+    EXPECT_EQ(socket->get(zmq::sockopt::rcvhwm), 0);
+    EXPECT_EQ(socket->get(zmq::sockopt::heartbeat_ivl), 0);
+    EXPECT_EQ(socket->get(zmq::sockopt::sndhwm), 1000);
+  }
+}
+
+// A host that is gone says nothing any more: probes and missing confirmations show it.
+TEST(Router, NoticesADeadHostIn20Seconds) {
+  zmq::context_t context;
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
+  const zmq::socket_t dealer = make_dealer(context, {});
+  for (const zmq::socket_t* const socket : {&router, &dealer}) {
+    EXPECT_EQ(socket->get(zmq::sockopt::tcp_keepalive), 1);
+    const int probes_s = socket->get(zmq::sockopt::tcp_keepalive_intvl) *
+                         socket->get(zmq::sockopt::tcp_keepalive_cnt);
+    EXPECT_LE(socket->get(zmq::sockopt::tcp_keepalive_idle) + probes_s, 20);
+    EXPECT_EQ(socket->get(zmq::sockopt::tcp_maxrt), 20000);
+  }
 }
 
 }  // namespace

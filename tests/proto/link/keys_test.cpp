@@ -1,20 +1,16 @@
-
 #include "proto/link/keys.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/types.h>
 #include <unistd.h>
 #include <zmq.h>
 
-#include <array>
 #include <cstring>
-#include <string>
 #include <type_traits>
 
 #include "core/error.hpp"
 #include "proto/link/whole_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
-#include "tests/skip_for_want.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::wire {
 namespace {

@@ -35,7 +35,8 @@ inline std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-inline void write_text(const std::filesystem::path& file, const std::string& text, mode_t mode) {
+inline void write_text(const std::filesystem::path& file, const std::string& text,
+                       mode_t mode = 0644) {
   std::ofstream(file, std::ios::binary | std::ios::trunc) << text;
   ::chmod(file.c_str(), mode);
 }

@@ -1,8 +1,8 @@
 #include "proto/wire/endpoint.hpp"
 
-#include <gtest/gtest.h>
-
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -76,13 +76,6 @@ TEST(Endpoint, HasAHostThatIsOne) {
       "accepted");
 }
 
-TEST(Endpoint, OfAnotherTransportIsRefused) {
-  for (const std::string endpoint : {"udp://127.0.0.1:1", "inproc://x", "127.0.0.1:5555", ""}) {
-    EXPECT_EQ(refusal_to_bind(endpoint),
-              "bind = " + endpoint + " (must be ipc://PATH or tcp://HOST:PORT)");
-  }
-}
-
 TEST(Endpoint, NeedsAPort) {
   for (const std::string port : {"", "0", "65536", "12x", "-1"}) {
     EXPECT_EQ(refusal_to_bind("tcp://127.0.0.1:" + port),
@@ -109,6 +102,30 @@ TEST(Endpoint, IsOfIpv6WhereItCanBe) {
   EXPECT_TRUE(may_be_ipv6("tcp://*:1", EndpointUse::bind));
   EXPECT_TRUE(may_be_ipv6("tcp://node-1:1", EndpointUse::connect));
   EXPECT_FALSE(may_be_ipv6("tcp://eth0:1", EndpointUse::bind));
+}
+
+TEST(Name, IsOfLettersDigitsAndThreeSigns) {
+  EXPECT_TRUE(is_name("host-1.example_A"));
+  EXPECT_FALSE(is_name("two words"));
+  for (const char* name : {"..", ".answers", "-rf", "--help", "_a", "/a"}) {
+    EXPECT_FALSE(is_name(name)) << name;
+  }
+  EXPECT_FALSE(is_name("line\nbreak"));
+  EXPECT_FALSE(is_name("é"));
+}
+
+TEST(Name, HasOneTo128Characters) {
+  EXPECT_FALSE(is_name(""));
+  EXPECT_TRUE(is_name(std::string(128, 'a')));
+  EXPECT_FALSE(is_name(std::string(129, 'a')));
+}
+
+TEST(Name, IsMadeFromAnyText) {
+  EXPECT_EQ(name_from("my host"), "my-host");
+  EXPECT_EQ(name_from("-rf"), "xrf");
+  EXPECT_EQ(name_from("éa"), "x-a");
+  EXPECT_EQ(name_from(""), "unnamed");
+  EXPECT_EQ(name_from(std::string(500, 'x')), std::string(128, 'x'));
 }
 
 }  // namespace

@@ -24,8 +24,6 @@ std::atomic<std::uint64_t> num_passages_left = 0;
 
 }  // namespace
 
-std::string_view to_text(KillPoint point) { return names.at(static_cast<std::size_t>(point)); }
-
 std::optional<KillPoint> kill_point_from(std::string_view name) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == name) return static_cast<KillPoint>(i);

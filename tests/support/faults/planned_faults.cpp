@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
-#include <set>
 #include <utility>
 
 #include "core/error.hpp"
@@ -22,7 +21,6 @@ constexpr std::uint32_t stream_reorder = 3;
 constexpr std::uint32_t stream_delay = 4;
 constexpr std::uint32_t stream_delay_duration = 6;
 
-constexpr double duration_s_max = 3600.0;
 /// A message that waits to be overtaken goes alone if no other comes.
 constexpr std::chrono::milliseconds held_duration_max(500);
 
@@ -30,70 +28,57 @@ LinkTime::duration seconds(double duration_s) {
   return std::chrono::duration_cast<LinkTime::duration>(std::chrono::duration<double>(duration_s));
 }
 
-/// A value of a plan's text.
+/// `key=first` or `key=first:second` of a plan's text.
 struct Item {
-  std::string_view key;
-  std::string_view value;
+  explicit Item(std::string_view text)
+      : key(text.substr(0, text.find('='))),
+        first(text.substr(std::min(key.size() + 1, text.size()))) {
+    const std::size_t colon = std::min(first.find(':'), first.size());
+    second = first.substr(std::min(colon + 1, first.size()));
+    first = first.substr(0, colon);
+  }
 
-  [[noreturn]] void refuse(std::string_view rule) const {
-    throw InvalidArgument(fmt::format("faults.{} = {} ({})", key, value, rule));
+  [[noreturn]] void refuse() const {
+    throw InvalidArgument(
+        fmt::format("faults.{} = {}:{} (see tests/support/faults)", key, first, second));
   }
 
   template <typename Number>
-  [[nodiscard]] Number number(std::string_view text, Number min, Number max,
-                              std::string_view rule) const {
+  [[nodiscard]] Number number(std::string_view text, Number min, Number max) const {
     Number parsed{};
     const char* const end = text.data() + text.size();
     const auto [stop, error] = std::from_chars(text.data(), end, parsed);
     // Written so that a value that is not a number is refused.
     if (error == std::errc() && stop == end && parsed >= min && parsed <= max) return parsed;
-    refuse(rule);
+    refuse();
   }
 
-  /// The parts before and after the colon.
-  [[nodiscard]] std::pair<std::string_view, std::string_view> halves(std::string_view rule) const {
-    const std::size_t colon = value.find(':');
-    if (colon == std::string_view::npos) refuse(rule);
-    return {value.substr(0, colon), value.substr(colon + 1)};
-  }
+  std::string_view key;
+  std::string_view first;
+  std::string_view second;
 };
 
-double probability(const Item& item) {
-  return item.number(item.value, 0.0, 1.0, "must be in [0, 1]");
-}
-
-FaultPlan::Timed timed(const Item& item) {
-  constexpr std::string_view rule = "must be PROBABILITY:SECONDS, in [0, 1] and in [0.001, 3600]";
-  const auto [probability_text, duration_text] = item.halves(rule);
-  return {.probability = item.number(probability_text, 0.0, 1.0, rule),
-          .duration_s = item.number(duration_text, 0.001, duration_s_max, rule)};
-}
-
-FaultPlan::Kill kill(const Item& item) {
-  constexpr std::string_view rule = "must be POINT:PASSAGE, the passage from 1";
-  const auto [name, passage] = item.halves(rule);
-  const auto point = kill_point_from(name);
-  if (!point) item.refuse("the point is unknown");
-  return {.point = *point, .passage = item.number(passage, std::uint64_t{1}, UINT64_MAX, rule)};
-}
-
 void set(FaultPlan& plan, const Item& item) {
+  const std::map<std::string_view, double*> probabilities{{"drop", &plan.drop},
+                                                          {"duplicate", &plan.duplicate},
+                                                          {"reorder", &plan.reorder},
+                                                          {"delay", &plan.delay.probability},
+                                                          {"cut", &plan.cut.probability}};
   if (item.key == "seed") {
-    plan.seed = item.number(item.value, std::uint64_t{0}, UINT64_MAX, "must be in [0, 2^64)");
-  } else if (item.key == "drop") {
-    plan.drop = probability(item);
-  } else if (item.key == "duplicate") {
-    plan.duplicate = probability(item);
-  } else if (item.key == "reorder") {
-    plan.reorder = probability(item);
-  } else if (item.key == "delay") {
-    plan.delay = timed(item);
-  } else if (item.key == "cut") {
-    plan.cut = timed(item);
+    plan.seed = item.number(item.first, std::uint64_t{0}, UINT64_MAX);
   } else if (item.key == "kill") {
-    plan.kill = kill(item);
+    const auto point = kill_point_from(item.first);
+    if (!point) item.refuse();
+    plan.kill = {.point = *point,
+                 .passage = item.number(item.second, std::uint64_t{1}, UINT64_MAX)};
+  } else if (const auto found = probabilities.find(item.key); found != probabilities.end()) {
+    *found->second = item.number(item.first, 0.0, 1.0);
+    if (item.key == "delay" || item.key == "cut") {
+      (item.key == "cut" ? plan.cut : plan.delay).duration_s =
+          item.number(item.second, 0.001, 3600.0);
+    }
   } else {
-    item.refuse("must be seed, drop, duplicate, reorder, delay, cut or kill");
+    item.refuse();
   }
 }
 
@@ -101,17 +86,9 @@ void set(FaultPlan& plan, const Item& item) {
 
 FaultPlan FaultPlan::parse(std::string_view text) {
   FaultPlan plan;
-  std::set<std::string_view> keys;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string_view entry = text.substr(begin, end - begin);
-    const std::size_t equals = entry.find('=');
-    if (equals == std::string_view::npos) {
-      throw InvalidArgument(fmt::format("faults = {} (must be KEY=VALUE,...)", text));
-    }
-    const Item item{.key = entry.substr(0, equals), .value = entry.substr(equals + 1)};
-    if (!keys.insert(item.key).second) item.refuse("given twice");
-    set(plan, item);
+    set(plan, Item(text.substr(begin, end - begin)));
     begin = end + 1;
   }
   return plan;

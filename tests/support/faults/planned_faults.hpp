@@ -13,7 +13,7 @@ namespace proofmass::wire {
 
 inline constexpr int num_kill_points = 11;
 
-[[nodiscard]] std::string_view to_text(KillPoint point);  ///< `after_commit`.
+/// That of this name, as `after_commit`.
 [[nodiscard]] std::optional<KillPoint> kill_point_from(std::string_view name);
 
 /// Makes the process die when it passes a place for the n-th time.
@@ -43,7 +43,7 @@ struct FaultPlan {
 
   /// Reads `seed=7,drop=0.1,delay=0.2:2.0,duplicate=0.05,reorder=0.1,cut=0.01:3.0,
   /// kill=after_commit:3` in any order; what is left out does not happen.
-  /// @throws InvalidArgument reading `faults.drop = 2 (must be in [0, 1])`.
+  /// @throws InvalidArgument
   [[nodiscard]] static FaultPlan parse(std::string_view text);
 };
 

@@ -1,16 +1,11 @@
 #include "worker/execution/executor.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <atomic>
 #include <semaphore>
-#include <stdexcept>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -1,10 +1,7 @@
 #include "worker/execution/run_queue.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-
 #include "tests/support/messages.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -6,8 +6,6 @@
 namespace proofmass::worker {
 namespace {
 
-using namespace std::chrono_literals;
-
 TEST_F(ConversationTest, AsksForACampaignUntilItComes) {
   start();
   register_here();

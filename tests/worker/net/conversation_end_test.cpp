@@ -1,13 +1,9 @@
-#include <array>
-
 #include "tests/worker/net/conversation_fixture.hpp"
 
 // How a conversation ends.
 
 namespace proofmass::worker {
 namespace {
-
-using namespace std::chrono_literals;
 
 TEST_F(ConversationTest, EndsIfNothingCanBeComputed) {
   register_with_campaign();

@@ -1,20 +1,12 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <deque>
-#include <optional>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/runs.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 #include "worker/net/conversation.hpp"
 
 namespace proofmass::worker {

@@ -6,8 +6,6 @@
 namespace proofmass::worker {
 namespace {
 
-using namespace std::chrono_literals;
-
 // Registration.
 
 TEST_F(ConversationTest, SaysHelloUntilItIsWelcome) {

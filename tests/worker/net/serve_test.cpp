@@ -1,11 +1,9 @@
 #include "worker/net/serve.hpp"
 
-#include <gtest/gtest.h>
+#include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 
-#include <future>
-#include <thread>
 #include <zmq.hpp>
 
 #include "core/error.hpp"
@@ -16,8 +14,11 @@
 #include "tests/support/faults/planned_faults.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 #include "worker/execution/executor.hpp"
-#include "worker/spool/spool.hpp"
+#include "worker/net/held_runs.hpp"
+#include "worker/net/stop_signals.hpp"
+#include "worker/supervision/supervisor.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -102,13 +103,10 @@ class ServeTest : public testing::Test {
     config.hello = test::make_hello("w", "h", 1, "m");
   }
 
-  /// Serves in a thread of its own, which gets its signals.
+  /// Serves in a thread of its own.
   std::future<Ending> start_worker() {
-    std::promise<pthread_t> thread;
-    worker_thread = thread.get_future();
-    return std::async(std::launch::async, [this, promise = std::move(thread)]() mutable {
+    return std::async(std::launch::async, [this] {
       StopSignals signals(config.signals);
-      promise.set_value(pthread_self());
       const wire::Wake progress;
       Executor executor(prepare, [&] { progress.notify(); },
                         {.num_threads = 1, .batch_size_max = 2});
@@ -118,31 +116,7 @@ class ServeTest : public testing::Test {
 
   test::ScratchDirectory directory;
   ServeConfig config;
-  std::future<pthread_t> worker_thread;
 };
-
-TEST_F(ServeTest, ComputesForACoordinatorUntilItIsDrained) {
-  Coordinator coordinator(config.endpoint);
-  std::future<Ending> ending = start_worker();
-  EXPECT_EQ(coordinator.have_two_runs_computed().results_size(), 2);
-  coordinator.send(test::make_ack(campaign, {{0}, {1}}));
-  coordinator.send(proto::Drain());
-  EXPECT_EQ(coordinator.receive<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
-  const Ending end = ending.get();
-  EXPECT_EQ(end.kind, Ending::Kind::done);
-  EXPECT_EQ(end.reason, "drained");
-}
-
-TEST_F(ServeTest, DrainsAtASignal) {
-  Coordinator coordinator(config.endpoint);
-  std::future<Ending> ending = start_worker();
-  (void)coordinator.have_two_runs_computed();
-  pthread_kill(worker_thread.get(), SIGTERM);
-  EXPECT_EQ(coordinator.receive<proto::Heartbeat>().held().size(), 1U) << "not acknowledged yet";
-  coordinator.send(test::make_ack(campaign, {{0}, {1}}));
-  EXPECT_EQ(coordinator.receive<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  EXPECT_EQ(ending.get().reason, "nothing left to do");
-}
 
 TEST_F(ServeTest, IsNotDisturbedByRubbish) {
   Coordinator coordinator(config.endpoint);
@@ -168,58 +142,6 @@ TEST_F(ServeTest, ComesAgainOnAnotherConnectionIfItIsClosedOut) {
   EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 2);
   coordinator.send(proto::Stop());
   EXPECT_EQ(ending.get().reason, "told to stop");
-}
-
-// 160 results of a campaign that was not served for a moment were once deleted without a word.
-TEST_F(ServeTest, KeepsItsSpoolWhileACampaignIsNotServed) {
-  config.spool = directory / "spool";
-  Coordinator coordinator(config.endpoint);
-  std::future<Ending> first = start_worker();
-  (void)coordinator.have_two_runs_computed();
-  coordinator.send(proto::Stop());
-  EXPECT_EQ(first.get().reason, "told to stop");
-
-  std::future<Ending> second = start_worker();
-  (void)coordinator.receive<proto::Hello>();
-  coordinator.send(test::make_welcome({2}, 0.05));
-  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 2);
-  coordinator.send(test::make_not_served(campaign));
-  while (coordinator.receive<proto::Heartbeat>().set_aside().empty()) {
-  }
-  coordinator.send(proto::Stop());
-  EXPECT_EQ(second.get().reason, "told to stop");
-  EXPECT_EQ(Spool(*config.spool, "m").former_results().size(), 2U);
-
-  std::future<Ending> third = start_worker();
-  (void)coordinator.receive<proto::Hello>();
-  coordinator.send(test::make_welcome({3}, 1.0));
-  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 2);
-  coordinator.send(test::make_forget(campaign, 2));
-  coordinator.send(proto::Drain());
-  EXPECT_EQ(third.get().reason, "drained");
-  EXPECT_FALSE(std::filesystem::exists(*config.spool));
-}
-
-TEST_F(ServeTest, KeepsResultsForTheNextWorkerInItsSpool) {
-  config.spool = directory / "spool";
-  Coordinator coordinator(config.endpoint);
-  std::future<Ending> first = start_worker();
-  (void)coordinator.have_two_runs_computed();
-  coordinator.send(test::make_ack(campaign, {{0}}));
-  coordinator.send(proto::Stop());
-  EXPECT_EQ(first.get().reason, "told to stop");
-  EXPECT_TRUE(std::filesystem::exists(*config.spool));
-
-  std::future<Ending> second = start_worker();
-  (void)coordinator.receive<proto::Hello>();
-  coordinator.send(test::make_welcome({2}, 1.0));
-  const auto batch = coordinator.receive<proto::ResultBatch>();
-  ASSERT_EQ(batch.results_size(), 1);
-  EXPECT_EQ(batch.results(0).run(), 1U);
-  coordinator.send(test::make_ack(campaign, {{1}}));
-  coordinator.send(proto::Drain());
-  EXPECT_EQ(second.get().reason, "drained");
-  EXPECT_FALSE(std::filesystem::exists(*config.spool));
 }
 
 TEST_F(ServeTest, SaysWhyTheSpoolCannotBeUsed) {
@@ -257,6 +179,71 @@ TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
   for (int i = 0; i < 20; ++i) coordinator.send(proto::Stop());
   EXPECT_EQ(ending.get().reason, "told to stop");
   wire::plan_faults({});
+}
+
+TEST(HeldRuns, AreGroupedByCampaignAndAttempt) {
+  const std::vector<HeldRun> runs{{{2}, {1}, {5}}, {{1}, {2}, {7}}, {{1}, {1}, {8}},
+                                  {{1}, {1}, {6}}, {{1}, {1}, {7}}, {{1}, {1}, {3}}};
+  const std::vector expected{test::make_held({1}, {1}, {{{3}, 1}, {{6}, 3}}),
+                             test::make_held({1}, {2}, {{{7}, 1}}),
+                             test::make_held({2}, {1}, {{{5}, 1}})};
+  EXPECT_EQ(test::vector_of(grouped(runs, 10)), expected);
+  EXPECT_TRUE(grouped({}, 10).empty());
+}
+
+TEST(HeldRuns, AreCutToTheRangesThatAMessageMayHave) {
+  const std::vector<HeldRun> runs{
+      {{1}, {1}, {0}}, {{1}, {1}, {1}}, {{1}, {1}, {5}}, {{1}, {2}, {7}}, {{1}, {2}, {8}}};
+  std::vector expected{test::make_held({1}, {1}, {{{0}, 2}, {{5}, 1}})};
+  EXPECT_EQ(test::vector_of(grouped(runs, 2)), expected);
+  expected.push_back(test::make_held({1}, {2}, {{{7}, 2}}));
+  EXPECT_EQ(test::vector_of(grouped(runs, 3)), expected);
+}
+
+bool is_readable(const StopSignals& signals) {
+  pollfd item{.fd = signals.descriptor(), .events = POLLIN, .revents = 0};
+  return poll(&item, 1, 0) == 1;
+}
+
+/// As the supervisor does.
+void hand_on(int num_requests) {
+  pthread_sigqueue(pthread_self(), handed_on_signal(), {.sival_int = num_requests});
+}
+
+TEST(StopSignals, DrainAtFirstAndEndAtOnceThen) {
+  StopSignals signals(SignalSource::anyone);
+  EXPECT_EQ(signals.request(), StopRequest::none);
+  EXPECT_FALSE(is_readable(signals));
+  raise(SIGTERM);
+  EXPECT_TRUE(is_readable(signals));
+  EXPECT_EQ(signals.request(), StopRequest::drain);
+  EXPECT_FALSE(is_readable(signals));
+  EXPECT_EQ(signals.request(), StopRequest::drain);
+  raise(SIGINT);
+  EXPECT_EQ(signals.request(), StopRequest::abandon);
+}
+
+// SIGTERM to both processes, once or twice, is one request as long as the supervisor has one.
+TEST(StopSignals, AreCountedByTheSupervisor) {
+  StopSignals signals(SignalSource::supervisor);
+  raise(SIGTERM);
+  EXPECT_EQ(signals.request(), StopRequest::drain);
+  hand_on(1);
+  EXPECT_EQ(signals.request(), StopRequest::drain);
+  raise(SIGINT);
+  EXPECT_EQ(signals.request(), StopRequest::drain);
+  hand_on(2);
+  EXPECT_EQ(signals.request(), StopRequest::abandon);
+  raise(SIGTERM);
+  EXPECT_EQ(signals.request(), StopRequest::abandon);
+}
+
+TEST(StopSignals, EndAtOnceIfTheyComeFromTheCampaign) {
+  StopSignals signals(SignalSource::campaign);
+  raise(SIGINT);
+  EXPECT_EQ(signals.request(), StopRequest::none);
+  raise(SIGTERM);
+  EXPECT_EQ(signals.request(), StopRequest::abandon);
 }
 
 }  // namespace

@@ -1,17 +1,13 @@
 #include "worker/spool/spool.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <bit>
 #include <csignal>
-#include <fstream>
-#include <limits>
-#include <sstream>
 
 #include "core/error.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -160,11 +156,6 @@ TEST_F(SpoolTest, LeavesOtherFilesAlone) {
   EXPECT_EQ(error_of_opening(),
             "spool = " + path.string() + " (must be a spool of the same model, or not exist)");
   EXPECT_TRUE(content().starts_with("something"));
-}
-
-TEST_F(SpoolTest, SaysWhyItCannotBeOpened) {
-  path = directory / "missing" / "spool";
-  EXPECT_EQ(error_of_opening(), "spool = " + path.string() + " (No such file or directory)");
 }
 
 TEST_F(SpoolTest, RefusesAFileThatIsTooLarge) {

@@ -1,16 +1,14 @@
 #include "coordinator/net/authentication/allow_list.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <chrono>
-#include <optional>
-#include <string>
-
+#include "coordinator/net/authentication/refusal_log.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "core/error.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/whole_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -214,6 +212,77 @@ TEST_F(AllowListFile, ThatCannotBeTrustedIsRefused) {
   ::chmod(file_.c_str(), 0644);
   std::filesystem::resize_file(file_, (std::uintmax_t{16} << 20) + 1);
   EXPECT_EQ(opening(file_), "allow-list = " + file_.string() + " (is too large)");
+}
+
+class RefusalLogTest : public ::testing::Test {
+ protected:
+  void refuse(const std::string& key, std::chrono::seconds at, const std::string& address = "") {
+    log_.refused(
+        {.domain = "workers", .address = address, .public_key = key, .reason = "unknown key"},
+        RefusalLog::TimePoint{} + at);
+  }
+
+  std::vector<Event> events_;
+  RefusalLog log_{[this](Event event) { events_.push_back(std::move(event)); }};
+};
+
+using std::chrono::seconds;
+
+TEST_F(RefusalLogTest, WritesAddressesPlainly) {
+  refuse("KEY", seconds(0), "::ffff:10.0.0.7");
+  refuse("KEY", seconds(0), "::ffff:1");
+  refuse("", seconds(0));
+  ASSERT_EQ(events_.size(), 3u);
+  EXPECT_EQ(events_[0].kind, "peer_refused");
+  EXPECT_EQ(events_[0].severity, Severity::warning);
+  EXPECT_EQ(to_text(events_[0].fields),
+            "domain=workers address=10.0.0.7 key=KEY reason=\"unknown key\"");
+  EXPECT_EQ(to_text(events_[1].fields),
+            "domain=workers address=::ffff:1 key=KEY reason=\"unknown key\"");
+  EXPECT_EQ(to_text(events_[2].fields),
+            "domain=workers address=unknown key=none reason=\"unknown key\"");
+}
+
+TEST_F(RefusalLogTest, SaysTheSameOnceAMinute) {
+  refuse("KEY", seconds(1));
+  refuse("KEY", seconds(60));
+  EXPECT_EQ(events_.size(), 1u);
+  refuse("KEY", seconds(61));
+  EXPECT_EQ(events_.size(), 2u);
+}
+
+TEST_F(RefusalLogTest, CountsAFlood) {
+  for (int i = 0; i < 1000; ++i) refuse("KEY" + std::to_string(i), seconds(1));
+  EXPECT_EQ(events_.size(), 20u);
+  refuse("KEY", seconds(100));
+  ASSERT_EQ(events_.size(), 22u);
+  EXPECT_EQ(events_[20].kind, "peers_refused");
+  EXPECT_EQ(to_text(events_[20].fields), "count=980 without a line each");
+}
+
+Asker asker(const std::string& name, const std::string& rights) {
+  return {.name = name, .rights = Rights::parse(rights).value()};
+}
+
+TEST(RightsOfAKey, AreAListOfWords) {
+  EXPECT_EQ(Rights::parse("observe,submit,control"), Rights::all());
+  EXPECT_EQ(Rights::parse("submit,observe"), Rights::usual());
+  EXPECT_FALSE(Rights::parse("observe")->has(Right::submit));
+  for (const std::string text : {"", "observe,", ",", "Observe", "observe, submit", "root"}) {
+    EXPECT_EQ(Rights::parse(text), std::nullopt) << text;
+  }
+}
+
+TEST(RightsOfAKey, ReachToItsOwnCampaignsAndThoseOfNobody) {
+  const Asker anna = asker("anna", "observe,submit");
+  EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", "anna"); }), "accepted");
+  EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", ""); }), "accepted");
+  EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", "ben"); }),
+            "campaign = c (belongs to ben; the key anna must have the right `control`)");
+  EXPECT_EQ(test::refusal_of([&] { require_control(asker("boss", "control"), "c", "ben"); }),
+            "accepted");
+  EXPECT_EQ(test::refusal_of([&] { require_control(asker("eve", "observe"), "c", ""); }),
+            "key = eve (must have the right `submit` in authorized_clients of the coordinator)");
 }
 
 }  // namespace

@@ -1,13 +1,5 @@
 #include "coordinator/net/authentication/authenticator.hpp"
 
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <functional>
-#include <map>
-#include <string>
-#include <utility>
-#include <vector>
 #include <zmq.hpp>
 
 #include "core/error.hpp"
@@ -16,6 +8,7 @@
 #include "proto/link/socket.hpp"
 #include "proto/link/whole_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -219,15 +212,6 @@ TEST_F(AuthenticatorTest, RefusesThatWhichIsNoQuestion) {
   EXPECT_EQ(ask({"1.0", "7", "workers", "a", "", "PLAIN", "user", "password"}), refused);
   EXPECT_EQ(ask({"1.0", "7", "kitchen", "a", "", "CURVE", std::string(32, 'k')}), refused);
   EXPECT_EQ(ask(Frames(100, "1.0")), (Frames{"1.0", "1.0", "400", "key not authorized", "", ""}));
-}
-
-TEST(Authenticator, NeedsBothLists) {
-  const test::ScratchDirectory directory;
-  zmq::context_t context;
-  EXPECT_EQ(
-      test::refusal_of([&] { const Authenticator x(context, directory.path(), [](Event) {}); }),
-      "allow-list = " + (directory / "authorized_workers").string() +
-          " (No such file or directory)");
 }
 
 TEST(Authenticator, IsOneInAContext) {

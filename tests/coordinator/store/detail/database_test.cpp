@@ -1,15 +1,17 @@
 #include "coordinator/store/detail/database.hpp"
 
-#include <gmock/gmock.h>
+#include <cerrno>
 
-#include <limits>
-
+#include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/detail/open_file.hpp"
+#include "coordinator/store/detail/schema.hpp"
+#include "core/microscope/results/health.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
-
-using test::store_error_of;
 
 class DatabaseTest : public test::StoreTest {
  protected:
@@ -123,6 +125,228 @@ TEST_F(DatabaseDeathTest, RefusesANumberThatSqliteCannotHold) {
   EXPECT_THROW(select.bind(1, std::numeric_limits<double>::quiet_NaN()), StoreError);
   EXPECT_THROW(select.bind(1, std::numeric_limits<double>::infinity()), StoreError);
   EXPECT_THROW(select.bind(1, std::uint64_t{1} << 63), StoreError);
+}
+
+using SchemaTest = test::StoreTest;
+
+TEST_F(SchemaTest, MarksTheFileAsACampaign) {
+  Database database(file(), Access::create);
+  database.execute(migrations()[0]);
+  EXPECT_EQ(database.integer("PRAGMA application_id"), application_id);
+  database.execute(
+      "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
+      " VALUES (1, 'a', '1', 1, '', 'm', '')");
+  check_campaign_file(database);
+}
+
+// What is asked of the file by others: each parameter with its unit.
+TEST_F(SchemaTest, HasThreeColumnsForEachParameterAndThoseOfHealth) {
+  Database database(file(), Access::create);
+  database.execute(migrations()[0]);
+  std::string expected = "run_index,status,num_draws,num_rounds";
+  for (const std::string kind : {"truth", "estimate", "error"}) {
+    for (const test::ParameterInfo& info : test::parameter_infos()) {
+      expected += "," + kind + "_" + std::string(info.name) + std::string(info.unit_suffix);
+    }
+  }
+  for (const HealthValue& value : health_values()) {
+    expected +=
+        ",health_" + std::string(value.quantity.name) + std::string(value.quantity.unit_suffix);
+  }
+  expected += ",loss_cause,loss_session";
+  EXPECT_EQ(database.text("SELECT group_concat(name) FROM pragma_table_xinfo('run_result')"),
+            expected);
+}
+
+TEST_F(SchemaTest, HasStrictTablesOnly) {
+  Database database(file(), Access::create);
+  database.execute(migrations()[0]);
+  EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_table_list WHERE type = 'table' AND NOT "
+                             "strict AND name NOT LIKE 'sqlite%'"),
+            0);
+}
+
+// Each row is refused by one rule: a result must have what its status says, and no more.
+TEST_F(SchemaTest, TiesEveryNumberToTheStatus) {
+  Store::create(file(), test::campaign_of(10), "").commit(test::deliveries_of(0, 1));
+  Database database(file(), Access::read_write);
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
+    const std::string name = std::string(info.name) + std::string(info.unit_suffix);
+    for (const std::string kind : {"truth_", "estimate_"}) {
+      const std::string column = kind + name;
+      EXPECT_EQ(test::store_error_of(
+                    [&] { database.execute("UPDATE run_result SET " + column + " = NULL"); }),
+                "campaign database = " + file().string() + " (CHECK constraint failed: (" + column +
+                    " IS NULL) = (status " + (kind == "truth_" ? "= 4))" : "> 2))"));
+    }
+  }
+  EXPECT_NE(test::store_error_of([&] { database.execute("UPDATE run_result SET status = 3"); }),
+            "");
+  EXPECT_NE(test::store_error_of([&] { database.execute("UPDATE run_result SET status = 5"); }),
+            "");
+}
+
+using std::chrono::seconds;
+
+constexpr TimePoint start{};
+
+EventEntry event(const std::string& kind) { return {.kind = kind, .text = ""}; }
+
+ReturnedRuns loss() {
+  return {.runs = {RunIndex{0}, 1}, .attempt = {1}, .worker = test::session_1};
+}
+
+std::vector<std::string> kinds_of(const std::vector<Entry>& entries) {
+  std::vector<std::string> kinds;
+  for (const Entry& entry : entries) {
+    const auto* found = std::get_if<EventEntry>(&entry);
+    kinds.push_back(found == nullptr ? "other" : found->kind);
+  }
+  return kinds;
+}
+
+TEST(WaitingEntries, AreTakenInTheOrderInWhichTheyCame) {
+  WaitingEntries waiting(10);
+  for (const std::string kind : {"a", "b", "c"}) waiting.add(event(kind), start);
+  std::vector<Entry> taken;
+  waiting.take(2, taken, start);
+  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("a", "b"));
+  waiting.take(2, taken, start);
+  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("a", "b", "c"));
+  EXPECT_EQ(waiting.size(), 0u);
+}
+
+TEST(WaitingEntries, KnowHowManyResultsWaitAndSinceWhen) {
+  WaitingEntries waiting(10);
+  EXPECT_EQ(waiting.waiting_since(), std::nullopt);
+  waiting.add(event("a"), start + seconds(1));
+  waiting.add(delivery_of(0), start + seconds(2));
+  waiting.add(SecondDelivery{delivery_of(0)}, start + seconds(3));
+  waiting.add(GivenUpRun{RunIndex{1}}, start + seconds(3));
+  EXPECT_EQ(waiting.num_results(), 2u);
+  EXPECT_EQ(waiting.waiting_since(), start + seconds(1));
+
+  std::vector<Entry> taken;
+  waiting.take(2, taken, start + seconds(5));
+  EXPECT_EQ(waiting.num_results(), 1u);
+  EXPECT_EQ(waiting.waiting_since(), start + seconds(5));
+  waiting.take(2, taken, start + seconds(6));
+  EXPECT_EQ(waiting.num_results(), 0u);
+  EXPECT_EQ(waiting.waiting_since(), std::nullopt);
+}
+
+TEST(WaitingEntries, KnowSinceWhenSomethingUrgentWaits) {
+  WaitingEntries waiting(10);
+  waiting.add(event("a"), start + seconds(1));
+  EXPECT_EQ(waiting.urgent_since(), std::nullopt);
+  waiting.add(CampaignControl{}, start + seconds(2));
+  waiting.add(delivery_of(0), start + seconds(3));
+  EXPECT_EQ(waiting.urgent_since(), start + seconds(2));
+  std::vector<Entry> taken;
+  waiting.take(2, taken, start + seconds(5));
+  EXPECT_EQ(waiting.urgent_since(), start + seconds(5));
+  waiting.add(event("b"), start + seconds(6));
+  waiting.take(1, taken, start + seconds(7));
+  EXPECT_EQ(waiting.urgent_since(), std::nullopt);
+  EXPECT_EQ(waiting.waiting_since(), start + seconds(7));
+}
+
+TEST(WaitingEntries, DropLossesAndEventsBeyondTheLimitAndSaySo) {
+  WaitingEntries waiting(2);
+  waiting.add(event("a"), start);
+  waiting.add(loss(), start);
+  waiting.add(event("dropped"), start);
+  waiting.add(loss(), start);
+  waiting.add(delivery_of(0), start);  // Never dropped, like all that somebody waits for.
+  waiting.add(GivenUpRun{RunIndex{1}}, start);
+  waiting.add(test::worker_1(), start);
+  waiting.add(CampaignControl{}, start);
+
+  std::vector<Entry> taken;
+  waiting.take(100, taken, start);
+  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("a", "other", "other", "other", "other",
+                                                      "other", "records_dropped"));
+  EXPECT_EQ(std::get<EventEntry>(taken.back()).text,
+            "losses_and_events=2 (the disk did not take them for too long)");
+
+  waiting.add(event("b"), start);
+  taken.clear();
+  waiting.take(100, taken, start);
+  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("b"));
+}
+
+using FileSystemTest = test::StoreTest;
+
+// Types from statfs(2).
+TEST(NetworkFileSystemName, KnowsThoseThatClustersUse) {
+  EXPECT_EQ(network_file_system_name(0x6969), "NFS");
+  EXPECT_EQ(network_file_system_name(0x517b), "SMB");
+  EXPECT_EQ(network_file_system_name(0xfe534d42), "SMB2");
+  EXPECT_EQ(network_file_system_name(0xff534d42), "CIFS");
+  EXPECT_EQ(network_file_system_name(0x0bd00bd0), "Lustre");
+  EXPECT_EQ(network_file_system_name(0x47504653), "GPFS");
+  EXPECT_EQ(network_file_system_name(0x00c36400), "Ceph");
+}
+
+TEST(NetworkFileSystemName, IsEmptyForLocalOnes) {
+  EXPECT_EQ(network_file_system_name(0xef53), "");      // ext2, ext3, ext4
+  EXPECT_EQ(network_file_system_name(0x58465342), "");  // XFS
+  EXPECT_EQ(network_file_system_name(0x9123683e), "");  // Btrfs
+  EXPECT_EQ(network_file_system_name(0x01021994), "");  // tmpfs
+  EXPECT_EQ(network_file_system_name(0x794c7630), "");  // overlayfs, as in containers
+}
+
+// Lines from proc(5), as the kernel writes them.
+TEST(NetworkFuseName, IsReadFromTheMountTable) {
+  const std::string_view table =
+      "22 27 0:20 / /sys rw,nosuid - sysfs sysfs rw\n"
+      "27 1 254:1 / / rw,relatime shared:1 - ext4 /dev/vda1 rw\n"
+      "95 27 0:45 / /mnt/a\\040b rw,nosuid shared:7 master:2 - fuse.sshfs me@host:/data "
+      "rw,user_id=0\n"
+      "96 27 0:46 / /mnt/c rw - fuse.fuse-overlayfs fuse-overlayfs rw\n"
+      "97 27 0:47 / /mnt/d rw - fuse.glusterfs host:/vol rw\n";
+  EXPECT_EQ(network_fuse_name(table, "0:45"), "fuse.sshfs");
+  EXPECT_EQ(network_fuse_name(table, "0:47"), "fuse.glusterfs");
+  EXPECT_EQ(network_fuse_name(table, "0:46"), "");
+  EXPECT_EQ(network_fuse_name(table, "0:4"), "");
+  EXPECT_EQ(network_fuse_name(table, "254:1"), "");
+  EXPECT_EQ(network_fuse_name("", "0:45"), "");
+  EXPECT_EQ(network_fuse_name("95 27 0:45 / /mnt rw", "0:45"), "");
+}
+
+TEST_F(FileSystemTest, CheckPassesALocalDirectory) {
+  check_directory_of(file());
+  EXPECT_EQ(wire::synchronise_directory_of(file()), 0);
+}
+
+using StoreLockTest = test::StoreTest;
+
+TEST_F(StoreLockTest, IsFreeAfterItsHolderAndLeavesNoFile) {
+  { const StoreLock lock(file()); }
+  EXPECT_TRUE(file_names().empty());
+  const StoreLock lock(file());
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db.lock"));
+}
+
+TEST_F(StoreLockTest, IgnoresAFileThatACrashLeftBehind) {
+  test::write_file(file().concat(".lock"), "process 1 on nowhere\n");
+  const StoreLock lock(file());
+  EXPECT_THAT(store_error_of([&] { const StoreLock second(file()); }),
+              HasSubstr("held by process " + std::to_string(::getpid()) + " on "));
+}
+
+TEST_F(StoreLockTest, IsOneForAllNamesOfAFile) {
+  test::write_file(file(), "");
+  std::filesystem::create_symlink(file(), directory() / "alias.db");
+  const StoreLock lock(file());
+  EXPECT_NE(store_error_of([&] { const StoreLock second(directory() / "alias.db"); }), "");
+}
+
+TEST_F(StoreLockTest, NamesNobodyIfTheHolderLeftNoName) {
+  const StoreLock lock(file());
+  test::write_file(file().concat(".lock"), "");
+  EXPECT_THAT(store_error_of([&] { const StoreLock second(file()); }),
+              HasSubstr("(held by another process; "));
 }
 
 }  // namespace

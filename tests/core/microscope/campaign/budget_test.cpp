@@ -1,19 +1,10 @@
 #include "core/microscope/campaign/budget.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <complex>
-#include <cstddef>
-#include <functional>
-#include <numbers>
-
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/instrument/drawn_quantities.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -120,10 +111,6 @@ TEST(BudgetAfterCalibration, IsLinearInTheErrors) {
     EXPECT_EQ(twice.entries[i], 2.0 * once.entries[i]);
   }
   EXPECT_EQ(twice.total, 2.0 * once.total);
-}
-
-TEST(BudgetAfterCalibration, OfNoErrorIsZero) {
-  EXPECT_EQ(budget_after(Scenario{}, ParameterArray{}).total, 0.0);
 }
 
 TEST(BudgetBeforeCalibration, IsThePapersTable) {

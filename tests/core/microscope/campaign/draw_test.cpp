@@ -1,17 +1,8 @@
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <numbers>
-#include <random>
-#include <vector>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/instrument/instrument.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,20 +1,11 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <functional>
-#include <limits>
-#include <string>
-
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
 
 std::string refusal_after(const std::function<void(MicroscopeCampaign&)>& change) {
   MicroscopeCampaign campaign;
@@ -83,20 +74,6 @@ TEST(MicroscopeCampaign, RefusesASeedThatNoFileCanHold) {
             "campaign.seed = 9223372036854775808 (must be in [0, 9223372036854775807])");
 }
 
-TEST(MicroscopeCampaign, RefusesTooFewOrTooManyRuns) {
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.num_runs = 0; }),
-            "campaign.runs = 0 (must be in [1, 1000000000])");
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.num_runs = num_runs_max + 1; }),
-            "campaign.runs = 1000000001 (must be in [1, 1000000000])");
-}
-
-TEST(MicroscopeCampaign, ChecksScenarioAndDispersions) {
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.scenario.noise.scale = -1.0; }),
-            "noise.scale = -1 (must be >= 0)");
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.dispersions[24].minimum = 1.0; }),
-            "dispersion.offcentring_m.x.maximum = 2e-05 (must be > minimum, 1)");
-}
-
 TEST(MicroscopeCampaign, WantsAnEnvironmentFileIfAndOnlyIfTheKindIsFile) {
   EXPECT_EQ(refusal_after(
                 [](MicroscopeCampaign& c) { c.scenario.environment.kind = EnvironmentKind::file; }),
@@ -107,29 +84,6 @@ TEST(MicroscopeCampaign, WantsAnEnvironmentFileIfAndOnlyIfTheKindIsFile) {
             "environment.file = \"\" (only with environment.kind = \"file\")");
   const EnvironmentRow start{0.0, {}, {}}, end{5950.0, {}, {}};
   EXPECT_EQ(refusal_after([&](MicroscopeCampaign& c) { use_environment(c, {start, end}); }), "");
-}
-
-TEST(MicroscopeCampaign, WantsEnvironmentRowsThatAscendOverAnOrbit) {
-  const auto refusal = [](EnvironmentTable table) {
-    return refusal_after([&](MicroscopeCampaign& c) { use_environment(c, table); });
-  };
-  const EnvironmentRow start{0.0, {}, {}}, end{5950.0, {}, {}};
-  EXPECT_EQ(refusal({start}), "environment.file = 1 rows (must have 2 to 200000)");
-  EXPECT_EQ(refusal(EnvironmentTable(environment_rows_max + 1)),
-            "environment.file = 200001 rows (must have 2 to 200000)");
-  EXPECT_EQ(refusal({EnvironmentRow{1.0, {}, {}}, end}),
-            "environment.file row 1 = 1 (the first time_s must be <= 0)");
-  EXPECT_EQ(refusal({start, start, end}),
-            "environment.file row 2 = 0 (time_s must be > 0, that of the row before)");
-  EXPECT_EQ(refusal({start, EnvironmentRow{5949.0, {}, {}}}),
-            "environment.file row 2 = 5949 (the last time_s must be >= one orbit, 5950 s)");
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refusal({start, EnvironmentRow{nan, {}, {}}}),
-            "environment.file row 2 = nan (must be finite)");
-  EXPECT_EQ(refusal({start, EnvironmentRow{5950.0, {0, 0, nan}, {}}}),
-            "environment.file row 2 = nan (must be finite)");
-  EXPECT_EQ(refusal({EnvironmentRow{0.0, {}, {nan, 0, 0}}, end}),
-            "environment.file row 1 = nan (must be finite)");
 }
 
 TEST(MicroscopeCampaign, WantsAValueOfEachTableForEachRun) {

@@ -138,12 +138,6 @@ TEST(Scenario, WantsANoiseThatAFilterOfFiniteNumbersCanYield) {
             "noise.angular.white_asd_rad_s2 = 1e+101 (must be in [1e-100, 1e+100])");
 }
 
-TEST(Scenario, WantsATransientThatLeavesHalfOfEachSession) {
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.estimation.transient_s = 29751.0; }),
-            "estimation.transient_s = 29751 (must leave half of session[0], 59500 s)");
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.estimation.transient_s = 29750.0; }), "");
-}
-
 TEST(Scenario, WantsBandsBelowTheNyquistFrequency) {
   EXPECT_EQ(refusal_after([](Scenario& s) {
               s.sessions[9].excitations[0].frequency_hz = 0.4;

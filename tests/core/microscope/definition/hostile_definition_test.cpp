@@ -2,14 +2,9 @@
 // size: the sizes here are such that another cost would show as a crash or as minutes.
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <functional>
-#include <limits>
-#include <string>
 
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "tests/message_of.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

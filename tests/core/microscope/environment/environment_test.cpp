@@ -1,15 +1,7 @@
 #include "core/microscope/environment/environment.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <limits>
-#include <numbers>
-#include <string>
-
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -214,11 +206,6 @@ TEST(EnvironmentTable, MayStartBeforeTheSession) {
   EXPECT_EQ(refusal(table), "accepted");
 }
 
-TEST(EnvironmentTable, NeedsTwoRows) {
-  EXPECT_EQ(refusal({}), "environment.file = 0 rows (must have 2 to 200000)");
-  EXPECT_EQ(refusal({{0.0, {}, {}}}), "environment.file = 1 rows (must have 2 to 200000)");
-}
-
 TEST(EnvironmentTable, HasALimitOfRows) {
   EnvironmentTable table(environment_rows_max + 1);
   for (std::size_t i = 0; i < table.size(); ++i) table[i].time_s = static_cast<double>(i);
@@ -239,26 +226,6 @@ TEST(EnvironmentTable, RefusesWhatIsNotFinite) {
   table = valid_table();
   table[2].angular_rad_s2[1] = -infinity;
   EXPECT_EQ(refusal(table), "environment.file row 3 = -inf (must be finite)");
-}
-
-TEST(EnvironmentTable, RefusesAFirstTimeAfterTheStart) {
-  EnvironmentTable table = valid_table();
-  table.front().time_s = 0.25;
-  EXPECT_EQ(refusal(table), "environment.file row 1 = 0.25 (the first time_s must be <= 0)");
-}
-
-TEST(EnvironmentTable, RefusesTimesThatDoNotAscend) {
-  EnvironmentTable table = valid_table();
-  table.insert(table.begin() + 1, {3000.0, {}, {}});
-  EXPECT_EQ(refusal(table),
-            "environment.file row 3 = 3000 (time_s must be > 3000, that of the row before)");
-}
-
-TEST(EnvironmentTable, RefusesLessThanAnOrbit) {
-  EnvironmentTable table = valid_table();
-  table.back().time_s = 5949.0;
-  EXPECT_EQ(refusal(table),
-            "environment.file row 3 = 5949 (the last time_s must be >= one orbit, 5950 s)");
 }
 
 }  // namespace

@@ -13,8 +13,8 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/random/stream.hpp"
-#include "tests/message_of.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,18 +1,10 @@
 #include "core/microscope/instrument/drawn_quantities.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <set>
-#include <string>
-
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-using ::testing::ElementsAre;
 
 Dispersion law(Law kind, double minimum = 0.0, double maximum = 0.0, double mean = 0.0,
                double standard_deviation = 0.0) {

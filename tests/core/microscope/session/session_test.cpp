@@ -1,16 +1,7 @@
 #include "core/microscope/session/session.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <functional>
-#include <limits>
-#include <numbers>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,13 +1,42 @@
+#include "core/campaign/field.hpp"
 #include "core/campaign/run_result.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cstddef>
-#include <string>
-#include <vector>
+#include "core/error.hpp"
+#include "core/runs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+TEST(Range, ContainsItsClosedEndsAndNotItsOpenOnes) {
+  EXPECT_TRUE(range::between(1.0, 2.0).contains(1.0));
+  EXPECT_TRUE(range::between(1.0, 2.0).contains(2.0));
+  EXPECT_FALSE(range::between(1.0, 2.0).contains(std::nextafter(2.0, 3.0)));
+  EXPECT_FALSE(range::between(1.0, 2.0).contains(std::nextafter(1.0, 0.0)));
+  EXPECT_FALSE(range::positive.contains(0.0));
+  EXPECT_TRUE(range::positive.contains(std::numeric_limits<double>::denorm_min()));
+  EXPECT_TRUE(range::not_negative.contains(0.0));
+  constexpr Range open_above{.maximum = 1.0, .maximum_open = true};
+  EXPECT_FALSE(open_above.contains(1.0));
+  EXPECT_TRUE(open_above.contains(-1e300));
+}
+
+TEST(Range, NeverContainsWhatIsNotFinite) {
+  for (const double value : {infinity, -infinity, std::nan("")}) {
+    EXPECT_FALSE(range::any.contains(value));
+  }
+}
+
+TEST(Range, SaysItsRuleForPeople) {
+  EXPECT_EQ(range::any.rule(), "must be finite");
+  EXPECT_EQ(range::positive.rule(), "must be > 0");
+  EXPECT_EQ(range::not_negative.rule(), "must be >= 0");
+  EXPECT_EQ(range::between(0.1, 2.0).rule(), "must be in [0.1, 2]");
+  EXPECT_EQ((Range{0.0, 1.0, true, true}.rule()), "must be in (0, 1)");
+  EXPECT_EQ((Range{.maximum = 3.0}.rule()), "must be <= 3");
+  EXPECT_EQ((Range{.maximum = 3.0, .maximum_open = true}.rule()), "must be < 3");
+}
 
 constexpr std::uint32_t draws_max = 1000;
 constexpr std::int64_t rounds_max = 10;
@@ -52,6 +81,14 @@ TEST(RunResult, OfImpossibleCountsBreaksARuleThatIsNamed) {
                 draws_max, rounds_max)
                 .size(),
             2U);
+}
+
+TEST(RunRanges, AreTheFewestThatHoldTheRuns) {
+  const std::vector<RunIndex> runs{{0}, {1}, {2}, {5}, {9}, {10}};
+  const std::vector<RunRange> ranges{{{0}, 3}, {{5}, 1}, {{9}, 2}};
+  EXPECT_EQ(ranges_of(runs), ranges);
+  EXPECT_EQ(indices_of(ranges), runs);
+  EXPECT_TRUE(ranges_of(std::vector<RunIndex>{}).empty());
 }
 
 }  // namespace

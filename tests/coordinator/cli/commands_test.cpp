@@ -1,16 +1,15 @@
 #include "coordinator/cli/campaign_databases.hpp"
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <fstream>
-
+#include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/program.hpp"
+#include "coordinator/cli/sweep_plan.hpp"
 #include "coordinator/net/directory_look.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
-#include "tests/coordinator/cli/temporary_directory.hpp"
+#include "core/model.hpp"
+#include "proto/link/machine.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -23,16 +22,13 @@ MicroscopeCampaign campaign_of(std::uint64_t num_runs) {
 
 // Both say how many runs there are.
 TEST(CampaignStart, DefinesAsManyRunsAsTheFileHasUntilAStopRuleIsChecked) {
-  const test::TemporaryDirectory directory;
+  const test::ScratchDirectory directory;
   const StopPlan plan{.stop_rule = "mean(k2c) within 5%", .num_runs_max = 1000, .failures_max = {}};
   const ServedCampaign served = open_or_create(campaign_of(1000), plan, directory / "a.db");
   EXPECT_EQ(served.store.num_runs(), 128U);
   EXPECT_EQ(served.store.definition(), canonical_definition(campaign_of(128)));
 }
 
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
 
 MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
@@ -67,7 +63,7 @@ class CampaignFolderTest : public testing::Test {
     (void)store.write(entries);
   }
 
-  test::TemporaryDirectory directory;
+  test::ScratchDirectory directory;
   std::vector<std::string> warnings;
 };
 
@@ -124,6 +120,56 @@ TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
                      action(campaign.store);
                    });
   EXPECT_EQ(num_writes, 1);
+}
+
+TEST(CostEstimate, CountsAnIncompleteBatchAsAWhole) {
+  const std::uint64_t batch_size = model().batch_size();
+  const std::uint64_t num_at_once = batch_size * wire::num_processors();
+  EXPECT_EQ(estimated_cost(1, 2.5).one_core_s, 2.5);
+  EXPECT_EQ(estimated_cost(batch_size, 2.5).one_core_s, 2.5);
+  EXPECT_EQ(estimated_cost(batch_size + 1, 2.5).one_core_s, 5.0);
+  EXPECT_EQ(estimated_cost(100 * batch_size, 2.5).one_core_s, 250.0);
+  EXPECT_EQ(estimated_cost(num_at_once, 2.5).all_cores_s, 2.5);
+  EXPECT_EQ(estimated_cost(num_at_once + 1, 2.5).all_cores_s, 5.0);
+}
+
+TEST(CostEstimate, FitsATerminalOf80Columns) {
+  constexpr double long_s = 99 * 86400.0 + 23 * 3600.0;
+  std::istringstream lines(
+      cost_text({.one_core_s = long_s, .all_cores_s = long_s, .disk_mb = 290000.5}));
+  for (std::string line; std::getline(lines, line);) EXPECT_LT(line.size(), 80U) << line;
+}
+
+using Values = std::vector<std::string>;
+
+TEST(SweepPlan, CutsValuesAtCommasOutsideOfBracketsAndQuotes) {
+  EXPECT_EQ(parse_varied("noise.scale=0.5,1,2").key, "noise.scale");
+  EXPECT_EQ(parse_varied("noise.scale=0.5, 1 ,2").values, (Values{"0.5", "1", "2"}));
+  EXPECT_EQ(parse_varied("a=[1,2],[3,[4,5]]").values, (Values{"[1,2]", "[3,[4,5]]"}));
+  EXPECT_EQ(parse_varied("a={x=1,y=2},3").values, (Values{"{x=1,y=2}", "3"}));
+  EXPECT_EQ(parse_varied("a=\"b,\\\",c\",'d,e'").values, (Values{"\"b,\\\",c\"", "'d,e'"}));
+}
+
+// No value leaves the directory, and none takes the file of another.
+TEST(SweepPlan, NamesNoFileOutsideOrTwice) {
+  std::set<std::string> names;
+  const Values values{
+      "\"../x\"", "\".._x\"", "[1, 2]", "[1,2]", std::string(5000, '1'), std::string(5001, '1')};
+  for (const std::string& value : values) {
+    const std::string name = sweep_file_name("mine", {{"a", value}});
+    EXPECT_EQ(name.find_first_of("/ []\""), std::string::npos) << name;
+    EXPECT_LT(name.size(), 250U);
+    EXPECT_TRUE(names.insert(name).second) << name;
+  }
+}
+
+TEST(SweepPlan, CallsCampaignsByTheirValuesIfThatIsShort) {
+  const std::vector<SweptValues> few{{{"noise.scale", "0.5"}}, {{"noise.scale", "1"}}};
+  EXPECT_EQ(sweep_names(few).title, "noise.scale");
+  EXPECT_EQ(sweep_names(few).names, (Values{"0.5", "1"}));
+  const std::vector<SweptValues> wide{{{"environment.drag", "0.5"}}, {{"environment.drag", "1"}}};
+  EXPECT_EQ(sweep_names(wide).names, (Values{"A", "B"}));
+  EXPECT_EQ(sweep_names(wide).notes[1], "environment.drag=1: ");
 }
 
 }  // namespace

@@ -1,16 +1,60 @@
-#include "coordinator/table/terminal_table.hpp"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <string>
-
 #include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
+#include "coordinator/table/terminal_table.hpp"
+#include "tests/coordinator/charts/markup_reading.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+const std::string hostile = "<script>alert(\"1\")</script> & 'x'";
+
+/// The table of a report with this text wherever a text is shown.
+Table review_table(const std::string& text) {
+  return {.id = "table",
+          .caption = text,
+          .columns = {{text, true}, {"lower", false, 0, text}, {"upper", false, 0, text}},
+          .rows = {{text, {"1.23e-4", 1.2345e-4}, {text, Tone::bad}}},
+          .remarks = {{text}},
+          .notes = {text}};
+}
+
+TEST(HtmlTables, EscapeWhateverTheTextsAre) {
+  const std::string html = html_table(review_table(hostile));
+  EXPECT_EQ(test::malformed_part(html), "");
+  EXPECT_THAT(html, Not(HasSubstr("<script")));
+}
+
+TEST(HtmlTables, HoldValuesInFullPrecisionForPrograms) {
+  EXPECT_THAT(html_table(review_table("a")), HasSubstr("data-value=\"0.00012345\">1.23e-4</td>"));
+}
+
+TEST(HtmlTables, HaveHeadingsOverTheirColumnsAndRows) {
+  const std::string html = html_table(review_table("a"));
+  EXPECT_THAT(html, AllOf(HasSubstr("<th scope=\"colgroup\" colspan=\"2\">a</th>"),
+                          HasSubstr("<th scope=\"row\" class=\"words\">a</th>"),
+                          HasSubstr("aria-labelledby=\"table-caption\""),
+                          HasSubstr("<caption id=\"table-caption\">a</caption>")));
+}
+
+TEST(HtmlTables, TellTonesByAClassBesideTheWords) {
+  EXPECT_THAT(html_table(review_table("a")), HasSubstr("<strong class=\"unmet\">a</strong>"));
+}
+
+TEST(HtmlTables, SayHowTheyAreSorted) {
+  Table table{.caption = "Workers",
+              .columns = {{"name", true}, {.title = "results", .sort = "descending"}},
+              .rows = {{"w", "7"}}};
+  table.rows[0][1].markup = "<b>7</b>";
+  const std::string html = html_table(table);
+  EXPECT_EQ(test::malformed_part(html), "");
+  EXPECT_THAT(test::tags_of(html, "<th [^>]*>"),
+              ElementsAre("<th scope=\"col\" class=\"words\">",
+                          "<th scope=\"col\" aria-sort=\"descending\">",
+                          "<th scope=\"row\" class=\"words\">"));
+  EXPECT_THAT(html, AllOf(HasSubstr("aria-label=\"Workers\""), HasSubstr("<td><b>7</b></td>"),
+                          Not(HasSubstr("<caption"))));
+}
 
 const std::string bad = "\033[1;38;5;130m";
 const std::string bold = "\033[1m";
@@ -18,13 +62,6 @@ const std::string plain = "\033[0m";
 
 Table named_runs(std::vector<Row> rows) {
   return {.columns = {{"name", true, 6}, {"runs", false, 6}}, .rows = std::move(rows)};
-}
-
-TEST(Alignment, FillsUpWithSpaces) {
-  EXPECT_EQ(left_aligned("Δx", 4), "Δx  ");
-  EXPECT_EQ(right_aligned("Δx", 4), "  Δx");
-  EXPECT_EQ(left_aligned("Δxyz", 2), "Δxyz") << "cuts nothing";
-  EXPECT_EQ(horizontal_rule(3), "───");
 }
 
 TEST(TerminalTable, KeepsASpaceBetweenColumns) {
@@ -137,16 +174,6 @@ TEST(LineOf, BreaksWhatATerminalHasNoRoomFor) {
             first + "\n    " + std::string(40, 'b') + "\n");
 }
 
-TEST(MeasuredFigure, HasThreeSignificantDigits) {
-  EXPECT_EQ(measured_figure(0.0), "0");
-  EXPECT_EQ(measured_figure(0.0012345), "0.00123");
-  EXPECT_EQ(measured_figure(0.36), "0.360");
-  EXPECT_EQ(measured_figure(7.526), "7.53");
-  EXPECT_EQ(measured_figure(49.24), "49.2");
-  EXPECT_EQ(measured_figure(124.4), "124");
-  EXPECT_EQ(measured_figure(1239.6), "1240");
-}
-
 TEST(MeasuredFigure, CarriesIntoTheNextDecade) {
   EXPECT_EQ(measured_figure(9.996), "10.0");
   EXPECT_EQ(measured_figure(99.96), "100");
@@ -166,15 +193,6 @@ TEST(SignedFigure, HasASignIfItIsBelowZero) {
   EXPECT_EQ(signed_figure(-7.526), "-7.53");
   EXPECT_EQ(signed_figure(7.526), "7.53");
   EXPECT_EQ(signed_figure(-0.0), "0");
-}
-
-TEST(GivenFigure, HasNoZerosThatSayNothing) {
-  EXPECT_EQ(given_figure(2000.0), "2000");
-  EXPECT_EQ(given_figure(7.3), "7.3");
-  EXPECT_EQ(given_figure(5.0), "5");
-  EXPECT_EQ(given_figure(0.83), "0.83");
-  EXPECT_EQ(given_figure(0.04e-6 / 1e-9), "40");
-  EXPECT_EQ(given_figure(1e7), "1.0e+07");
 }
 
 }  // namespace
