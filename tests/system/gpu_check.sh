@@ -43,10 +43,10 @@ nvidia-smi --query-gpu=name,driver_version --format=csv,noheader
 nproc | sed 's/$/ processors/'
 card=(--gpu all --workers 1)
 run card-1000 --runs 1000 "${card[@]}"
-run processors-1000 --runs 1000
-same card-1000 processors-1000 0 1000
+run processors-1000 --runs 1000 --range 744:1000
+same card-1000 processors-1000 744 1000
 run card-and-processors-100 --runs 100 --gpu all
-same card-and-processors-100 processors-1000 0 100
+same card-and-processors-100 card-1000 0 100
 run card-40000 --runs 40000 "${card[@]}"
 run processors-last --runs 40000 --range 39872:40000
 same card-40000 processors-last 39872 40000
