@@ -6,7 +6,7 @@
 set -euo pipefail
 
 packages=(
-  g++ cmake ninja-build pkg-config git
+  g++ clang cmake ninja-build pkg-config git
   libeigen3-dev libhwy-dev librandom123-dev
   libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev protobuf-compiler
   libsqlite3-dev sqlite3 libhdf5-dev
@@ -26,7 +26,7 @@ test_packages=(
 # Node.js of other origin brings npm and excludes Debian's package of that name.
 command -v npm >/dev/null || test_packages+=(npm)
 # The fuzzer, the systems that the dispatch is measured beside, and what builds images.
-more_packages=(clang libclang-rt-14-dev parallel python3-ipyparallel buildah)
+more_packages=(libclang-rt-14-dev parallel python3-ipyparallel buildah)
 
 case "${1:-}" in
   '') packages+=("${test_packages[@]}") ;;

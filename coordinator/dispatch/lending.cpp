@@ -171,6 +171,10 @@ struct Borrower {
   Outbox& outbox;
 
   [[nodiscard]] std::uint64_t missing() const { return wanted - std::min(wanted, worker.num_lent); }
+  /// Of the missing runs, those that one lease can have.
+  [[nodiscard]] std::uint64_t missing_of_lease() const {
+    return std::min<std::uint64_t>(missing(), wire::runs_per_lease_max);
+  }
   [[nodiscard]] Lease lease_of(RunSet runs, Attempt attempt) const {
     return {.campaign = campaign_id,
             .worker = id,
@@ -193,7 +197,7 @@ void lend_pending(const Borrower& borrower) {
   while (borrower.missing() > 0 && !pending.empty()) {
     const auto newest = std::prev(pending.end());
     const Attempt attempt = newest->first;
-    RunSet runs = take_first(newest->second, borrower.missing());
+    RunSet runs = take_first(newest->second, borrower.missing_of_lease());
     if (newest->second.empty()) pending.erase(newest);
     borrower.open(borrower.lease_of(std::move(runs), attempt));
   }
@@ -218,7 +222,7 @@ void lend_audits(const Borrower& borrower) {
       next = to_audit.begin();
     }
     const AuditKey key = next->first;
-    RunSet runs = take_first(next->second, borrower.missing());
+    RunSet runs = take_first(next->second, borrower.missing_of_lease());
     borrower.campaign.num_to_audit -= runs.size();
     if (next->second.empty()) to_audit.erase(next);
     Lease lease = borrower.lease_of(std::move(runs), key.attempt);

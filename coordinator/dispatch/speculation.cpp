@@ -25,7 +25,9 @@ std::vector<WorkerId> idle_workers(const State& state, TimePoint now) {
   return idle;
 }
 
-std::uint64_t room(const Worker& worker) { return std::min(worker.num_slots, worker.num_runs_max); }
+std::uint64_t room(const Worker& worker) {
+  return std::min({worker.num_slots, worker.num_runs_max, wire::runs_per_lease_max});
+}
 
 /// What the worker does not compute yet, as far as is known.
 RunsByCampaign waiting_runs(const State& state, const Worker& worker) {

@@ -143,7 +143,8 @@ void Executor::compute_on(Device& device, std::shared_ptr<Batch> first) {
   std::shared_ptr<Batch> latest = std::move(first);
   const auto add = [&](std::shared_ptr<Batch> batch) {
     simulation->add(batch->number, batch->assignment.requests);
-    in_flight[batch->number] = latest = std::move(batch);
+    in_flight[batch->number] = batch;
+    latest = std::move(batch);
   };
   add(latest);
   while (std::ranges::any_of(in_flight, [](const auto& b) { return !b.second->is_dropped; })) {

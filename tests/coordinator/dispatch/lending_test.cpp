@@ -40,6 +40,18 @@ TEST_F(LendingTest, GivesASecondAndAHalfOfWorkWithinItsLimits) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..99") << "half of the room, after one result";
 }
 
+// A card computes more runs at a time than a lease may have.
+TEST_F(LendingTest, GivesManySlotsSeveralLeases) {
+  add_campaign(one, 100'000);
+  say_hello(first, hello(10'000));
+  outbox.drop_sent<proto::Welcome>(first);
+  heartbeat(first, {}, {}, 20'000);
+  for (const RunRange& runs : {RunRange{{0}, 4096}, {{4096}, 4096}, {{8192}, 1808}}) {
+    EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), runs);
+  }
+  check_invariants(state);
+}
+
 TEST_F(LendingTest, GivesNothingWhileTooManyResultsWaitForTheStore) {
   state.config.uncommitted_max = 4;
   add_campaign(one, 100);

@@ -5,10 +5,17 @@
 
 #include <bit>
 #include <cstdint>
+#include <memory>
+#include <regex>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/device.hpp"
+#include "core/microscope/simulation/gpu/device_simulation.hpp"
+#include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "tests/support/cuda_driver/test_device.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
@@ -70,8 +77,18 @@ std::vector<RunRequest> first_of(const std::vector<RunRequest>& requests, std::s
   return {requests.begin(), requests.begin() + static_cast<std::ptrdiff_t>(count)};
 }
 
+std::vector<RunResult> on_device(const RunPlan& plan, std::span<const RunRequest> requests) {
+  const std::unique_ptr<DeviceSimulation> simulation = plan.simulation_on(test::device());
+  simulation->add(7, requests);
+  while (true) {
+    std::vector<DeviceSimulation::Ended> ended = simulation->advance();
+    if (!ended.empty()) return std::move(ended.front().results);
+  }
+}
+
 /// Compares every run of a batch on every instruction set with the same run alone: in that batch,
-/// in a full one, and in those of one and two runs, whose sessions are computed side by side.
+/// in a full one, and in those of one and two runs, whose sessions are computed side by side; and
+/// the runs on a device.
 void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
                                 const std::vector<RunRequest>& requests) {
   campaign.validate();
@@ -91,6 +108,11 @@ void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
                          fmt::format("{} lane {} of {}", name_of(set), i, results.size()));
       }
     }
+  }
+  const std::vector<RunResult> results = on_device(plan, requests);
+  ASSERT_EQ(results.size(), alone.size());
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    expect_same_bits(results[i], alone[i], fmt::format("device, lane {}", i));
   }
 }
 
@@ -215,6 +237,9 @@ void expect_carries_a_bad_run(double range_m_s2) {
       }
     }
   }
+  const std::vector<RunResult> results = on_device(plan, requests);
+  EXPECT_EQ(results[1].status, RunStatus::lost);
+  for (const std::size_t i : {0U, 1U, 2U}) expect_same_bits(results[i], alone[i], "device");
 }
 
 // Without a range that ends it, the run grows beyond all numbers.
@@ -230,6 +255,56 @@ TEST(Batch, SaysWhichRunsHaveNoDraw) {
     for (const RunResult& result : plan.simulate_batch(requests_from(0, 2), set)) {
       EXPECT_EQ(result.status, RunStatus::no_draw) << name_of(set);
     }
+  }
+  for (const RunResult& result : on_device(plan, requests_from(0, 2))) {
+    EXPECT_EQ(result.status, RunStatus::no_draw);
+  }
+}
+
+// More sessions than the card has blocks: some wait, and slots are used again.
+TEST(Device, EqualsTheScalarReferenceForSeveralGroups) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.simulation.sample_period_s = 1.0;
+  const RunPlan plan(campaign);
+  const std::unique_ptr<DeviceSimulation> simulation = plan.simulation_on(test::device());
+  for (std::uint64_t group = 0; group < 3; ++group) {
+    simulation->add(group, requests_from(10 * group, 1 + group));
+  }
+  EXPECT_EQ(simulation->num_in_flight(), 6U);
+  std::size_t num_ended = 0;
+  while (simulation->num_in_flight() > 0) {
+    for (const DeviceSimulation::Ended& ended : simulation->advance()) {
+      ASSERT_EQ(ended.results.size(), 1 + ended.group);
+      for (const RunResult& result : ended.results) {
+        expect_same_bits(result, plan.simulate(result.run, {}),
+                         fmt::format("group {}", ended.group));
+      }
+      ++num_ended;
+    }
+    if (num_ended == 0) EXPECT_LE(simulation->num_steps_done(2), plan.num_steps());
+  }
+  EXPECT_EQ(num_ended, 3U);
+}
+
+TEST(Device, ProvesTheReferenceDigest) {
+  const auto proof = prove_device(test::device());
+  ASSERT_TRUE(proof.has_value());
+  EXPECT_EQ(proof->digest, reference_digest(InstructionSet::scalar));
+  EXPECT_GE(proof->capacity, 1U);
+}
+
+// A driver compiles what is written here, and nothing else may round.
+TEST(Device, HasAProgramThatRoundsAsProcessorsDo) {
+  const std::string program(gpu::program());
+  ASSERT_FALSE(program.empty()) << "built without clang, which deploy/install-deps.sh installs";
+  for (const std::string_view other : {"fma.", "mad.f", "mad.rn", ".approx", ".ftz", ".full",
+                                       "call", "__local_depot", "ld.local", "st.local"}) {
+    EXPECT_EQ(program.find(other), std::string::npos) << other;
+  }
+  const std::regex rounded("\\b(add|sub|mul|div|sqrt)\\.(\\w+\\.)?f(32|64)");
+  for (std::sregex_iterator found(program.begin(), program.end(), rounded), end; found != end;
+       ++found) {
+    ASSERT_EQ(found->str(2), "rn.") << found->str();
   }
 }
 

@@ -1,0 +1,156 @@
+// Stands in for NVIDIA's driver: libcuda.so.1 with the functions that a worker calls, which runs
+// the kernels as they are compiled for the host, at once and on the calling thread. The variable
+// PROOFMASS_TEST_CUDA names what is wrong with it: no_card, two_cards, no_memory, broken_launch,
+// lost_device or wrong_results.
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/microscope/simulation/gpu/sample_kernels-inl.hpp"
+
+namespace proofmass::gpu {
+namespace {
+
+enum class Kernel : std::uintptr_t { none, noise, loop };
+
+// A card with four processors of one block each, and memory for launches of some samples.
+constexpr int num_processors = 4;
+constexpr std::size_t memory_bytes = std::size_t{1} << 30;
+
+void run_block(Kernel kernel, const Shared& shared, const SessionTable* sessions,
+               const GroupMemory& memory, const Task* tasks, std::size_t x, std::size_t y) {
+  const Task& task = tasks[x];
+  constexpr std::size_t words = num_words<LoopConstants<double>> * group_lanes;
+  std::vector<std::uint64_t> constants(memory.constants + task.slot * words,
+                                       memory.constants + (task.slot + 1) * words);
+  Stage stage;
+  for (std::size_t lane = 0; lane < task.num_lanes; ++lane) {
+    if (kernel == Kernel::noise) {
+      make_noise(shared, sessions, memory, task, x, y, lane);
+    } else {
+      advance_lane_of(shared, sessions[task.session], memory, task, x,
+                      {.constants = constants.data(), .stage = &stage}, Threads{}, lane);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace proofmass::gpu
+
+using proofmass::gpu::Kernel;
+
+namespace {
+
+constexpr int failed = 999;
+int num_launches = 0;
+
+bool is_asked_for(std::string_view fault) {
+  const char* const asked = std::getenv("PROOFMASS_TEST_CUDA");
+  return asked != nullptr && asked == fault;
+}
+
+}  // namespace
+
+extern "C" {
+int cuInit(unsigned) { return 0; }
+int cuDriverGetVersion(int* version) {
+  *version = 12040;
+  return 0;
+}
+int cuGetErrorName(int, const char** name) {
+  *name = "CUDA_ERROR_OF_THE_TEST";
+  return 0;
+}
+int cuDeviceGetCount(int* count) {
+  *count = is_asked_for("no_card") ? 0 : (is_asked_for("two_cards") ? 2 : 1);
+  return 0;
+}
+int cuDeviceGet(int* device, int index) {
+  *device = index;
+  return 0;
+}
+int cuDeviceGetName(char* name, int length, int) {
+  std::snprintf(name, static_cast<std::size_t>(length), "a card of the tests");
+  return 0;
+}
+int cuDeviceGetAttribute(int* value, int, int) {
+  *value = proofmass::gpu::num_processors;
+  return 0;
+}
+int cuDevicePrimaryCtxRetain(void**, int) { return 0; }
+int cuDevicePrimaryCtxRelease_v2(int) { return 0; }
+int cuCtxSetCurrent(void*) { return 0; }
+int cuModuleLoadData(void** module, const void* program) {
+  *module = const_cast<void*>(program);
+  return 0;
+}
+int cuModuleUnload(void*) { return 0; }
+int cuModuleGetFunction(void** function, void*, const char* name) {
+  const bool is_noise = std::string_view(name) == "proofmass_noise";
+  *function = reinterpret_cast<void*>(is_noise ? Kernel::noise : Kernel::loop);
+  return 0;
+}
+int cuFuncSetAttribute(void*, int, int) { return 0; }
+int cuOccupancyMaxActiveBlocksPerMultiprocessor(int* num_blocks, void*, int, std::size_t) {
+  *num_blocks = 1;
+  return 0;
+}
+int cuMemGetInfo_v2(std::size_t* num_free, std::size_t* num_total) {
+  *num_free = *num_total = proofmass::gpu::memory_bytes;
+  return 0;
+}
+int cuMemAlloc_v2(std::uint64_t* address, std::size_t size) {
+  if (is_asked_for("no_memory")) return failed;
+  void* const memory = std::aligned_alloc(64, (size + 63) / 64 * 64);
+  std::memset(memory, 0xff, size);  // What is read before it is written shows.
+  *address = reinterpret_cast<std::uint64_t>(memory);
+  return 0;
+}
+int cuMemFree_v2(std::uint64_t address) {
+  std::free(reinterpret_cast<void*>(address));
+  return 0;
+}
+int cuMemcpyHtoDAsync_v2(std::uint64_t to, const void* from, std::size_t size, void*) {
+  std::memcpy(reinterpret_cast<void*>(to), from, size);
+  return 0;
+}
+int cuMemcpyDtoHAsync_v2(void* to, std::uint64_t from, std::size_t size, void*) {
+  std::memcpy(to, reinterpret_cast<const void*>(from), size);
+  // One bit of one sum, in a campaign that is no reference campaign.
+  if (is_asked_for("wrong_results") && num_launches > 200)
+    static_cast<unsigned char*>(to)[40'000] ^= 1;
+  return 0;
+}
+int cuStreamCreateWithPriority(void**, unsigned, int) { return 0; }
+int cuStreamDestroy_v2(void*) { return 0; }
+int cuStreamSynchronize(void*) { return 0; }
+int cuStreamWaitEvent(void*, void*, unsigned) { return 0; }
+int cuEventCreate(void**, unsigned) { return 0; }
+int cuEventDestroy_v2(void*) { return 0; }
+int cuEventRecord(void*, void*) { return 0; }
+int cuEventSynchronize(void*) {
+  return is_asked_for("lost_device") && num_launches > 20 ? failed : 0;
+}
+int cuLaunchKernel(void* function, unsigned num_blocks, unsigned num_blocks_y, unsigned, unsigned,
+                   unsigned, unsigned, unsigned, void*, void** arguments, void**) {
+  using namespace proofmass::gpu;
+  if (is_asked_for("broken_launch")) return failed;
+  ++num_launches;
+  const auto& shared = *static_cast<const Shared*>(arguments[0]);
+  const auto* const sessions = *static_cast<const SessionTable* const*>(arguments[1]);
+  const auto& memory = *static_cast<const GroupMemory*>(arguments[2]);
+  const auto* const tasks = *static_cast<const Task* const*>(arguments[3]);
+  for (std::size_t x = 0; x < num_blocks; ++x) {
+    for (std::size_t y = 0; y < num_blocks_y; ++y) {
+      run_block(static_cast<Kernel>(reinterpret_cast<std::uintptr_t>(function)), shared, sessions,
+                memory, tasks, x, y);
+    }
+  }
+  return 0;
+}
+}
