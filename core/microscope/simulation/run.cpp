@@ -302,9 +302,11 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   const Estimation found = estimation(record);
   result.num_rounds = found.num_rounds;
   const bool has_errors = impl_->method.has_standard_errors;
-  const HealthFinding finding = judge_health(
-      scenario, impl_->bounds, record.health, record.phasors, record.truth,
-      has_errors ? std::span<const double>(found.standard_errors) : std::span<const double>());
+  const bool are_errors_usable = has_errors && are_in_range(found.standard_errors);
+  const HealthFinding finding =
+      judge_health(scenario, impl_->bounds, record.health, record.phasors, record.truth,
+                   are_errors_usable ? std::span<const double>(found.standard_errors)
+                                     : std::span<const double>());
   for (const HealthValue& value : health_values()) {
     result.health.push_back(finding.health.*value.member);
   }
@@ -314,7 +316,7 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
                    .session = static_cast<std::uint32_t>(finding.loss.session)};
     return result;
   }
-  if (!are_in_range(found.values) || (has_errors && !are_in_range(found.standard_errors))) {
+  if (!are_in_range(found.values) || (has_errors && !are_errors_usable)) {
     result.status = RunStatus::not_finite;
     return result;
   }

@@ -111,7 +111,7 @@ TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
 
 Estimation errors_of_three(const RunPhasors& /*records*/, const EstimationInput& input) {
   Estimation estimation{.num_rounds = 1, .converged = true};
-  estimation.standard_errors.fill(3.0);
+  estimation.standard_errors.fill(3e-9);
   if (input.config.convergence > 0.5) estimation.standard_errors.back() = HUGE_VAL;
   return estimation;
 }
@@ -126,7 +126,7 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
   MicroscopeCampaign campaign = short_campaign(1);
   const RunResult result = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(result.status, RunStatus::completed);
-  EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3.0));
+  EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3e-9));
   campaign.scenario.estimation.convergence = 0.7;
   const RunResult unusable = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(unusable.status, RunStatus::not_finite);
