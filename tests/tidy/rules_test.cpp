@@ -60,7 +60,7 @@ TEST(CheckLayers, WantIncludesWrittenFromTheRoot) {
   }
   EXPECT_THAT(layers("coordinator/store/a.cpp", "\"core/runs.hpp\""), IsEmpty());
   EXPECT_THAT(layers("coordinator/store/a.cpp", "<core/microscope/a.hpp>"), SizeIs(1));
-  EXPECT_THAT(layers("tests/store/a.cpp", "\"tests/message_of.hpp\""), IsEmpty());
+  EXPECT_THAT(layers("tests/store/a.cpp", "\"tests/test.hpp\""), IsEmpty());
 }
 
 // The parts in their order: whatever comes later may include what comes earlier, never the other

@@ -1,13 +1,5 @@
 #include "coordinator/factory/batch_system.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
 #include "core/error.hpp"
 #include "proto/link/start_program.hpp"
 #include "tests/test.hpp"

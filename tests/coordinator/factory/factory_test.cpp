@@ -1,20 +1,12 @@
 #include "coordinator/factory/factory.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <string>
-#include <utility>
-#include <vector>
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using std::chrono::minutes;
 using std::chrono::seconds;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
 
 /// A factory whose coordinator and queue a test sets by hand, in a time of its own.
 class FactoryTest : public testing::Test {

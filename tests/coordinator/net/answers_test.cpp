@@ -1,17 +1,5 @@
 #include "coordinator/net/answers.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <cstddef>
-#include <filesystem>
-#include <fstream>
-#include <memory>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "core/error.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
 #include "tests/proto/link/scratch_directory.hpp"

@@ -1,15 +1,6 @@
 #include "coordinator/net/client_gateway.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cstdint>
-#include <functional>
-#include <map>
 #include <new>
-#include <string>
-#include <utility>
-#include <variant>
-#include <vector>
 
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/proto/wire/requests.hpp"

@@ -1,13 +1,6 @@
 // A service and the files of its directory: those that cannot be served, and those that need not.
 
-#include <gmock/gmock.h>
 #include <sqlite3.h>
-
-#include <atomic>
-#include <filesystem>
-#include <fstream>
-#include <future>
-#include <iterator>
 
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
@@ -15,6 +8,7 @@
 #include "tests/coordinator/net/plain_directory.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -22,8 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using test::PlainDirectory;
 using test::PlayingWorker;
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
 
 std::string bytes_of(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -1,9 +1,6 @@
 // What the key of a client may have unfinished, over real sockets.
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
-
-#include <fstream>
 
 #include "coordinator/net/directory_look.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -11,11 +8,11 @@
 #include "tests/coordinator/net/plain_directory.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using ::testing::StartsWith;
 using wire::ControlAction;
 
 /// A campaign with a table of so many values.

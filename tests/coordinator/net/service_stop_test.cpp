@@ -1,14 +1,8 @@
 // Campaigns that end before all of their runs are finished, over real sockets.
 
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <future>
-#include <optional>
-#include <stdexcept>
-
 #include "core/error.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

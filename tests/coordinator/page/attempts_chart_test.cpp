@@ -1,13 +1,9 @@
 #include "coordinator/page/attempts_chart.hpp"
 
-#include <gmock/gmock.h>
-
-#include <random>
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::HasSubstr;
 
 ComputedRuns computed(std::uint64_t run, std::uint64_t worker, double compute_s,
                       std::uint64_t received) {

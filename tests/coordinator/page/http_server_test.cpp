@@ -1,15 +1,6 @@
 #include "coordinator/page/http_server.hpp"
 
 #include <fcntl.h>
-#include <gmock/gmock.h>
-
-#include <atomic>
-#include <chrono>
-#include <filesystem>
-#include <memory>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "core/error.hpp"
 #include "tests/coordinator/page/raw_client.hpp"

@@ -1,11 +1,5 @@
 #include "coordinator/page/page_access.hpp"
 
-#include <gmock/gmock.h>
-
-#include <filesystem>
-#include <fstream>
-#include <string>
-
 #include "core/error.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 #include "tests/proto/link/scratch_directory.hpp"

@@ -1,13 +1,9 @@
 #include "coordinator/page/page_request.hpp"
 
-#include <gmock/gmock.h>
-
-#include <string>
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::ElementsAre;
 
 TEST(PageTarget, IsTakenApart) {
   const auto request = parse_target("/campaigns/a%20b?events=2&fragment&filter=x+y%26z");

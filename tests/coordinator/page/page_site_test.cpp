@@ -1,19 +1,12 @@
 #include "coordinator/page/page_site.hpp"
 
-#include <gmock/gmock.h>
-
-#include <string>
-#include <vector>
-
 #include "tests/coordinator/page/page_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using namespace std::chrono_literals;
 using test::page_secret;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class PageSiteTest : public ::testing::Test {
  protected:
