@@ -281,7 +281,9 @@ TEST(Device, EqualsTheScalarReferenceForSeveralGroups) {
       }
       ++num_ended;
     }
-    if (num_ended == 0) EXPECT_LE(simulation->num_steps_done(2), plan.num_steps());
+    if (num_ended == 0) {
+      EXPECT_LE(simulation->num_steps_done(2), plan.num_steps());
+    }
   }
   EXPECT_EQ(num_ended, 3U);
 }
