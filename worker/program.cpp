@@ -12,8 +12,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/campaign/device.hpp"
 #include "core/campaign/name.hpp"
-#include "core/device.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/campaign/device.hpp"
 #include "core/campaign/name.hpp"
-#include "core/device.hpp"
 #include "core/error.hpp"
 
 namespace proofmass {

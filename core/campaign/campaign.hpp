@@ -17,7 +17,7 @@
 
 namespace proofmass {
 
-class Device;  // Those who simulate on one include core/device.hpp.
+class Device;  // Those who simulate on one include core/campaign/device.hpp.
 class DeviceSimulation;
 struct Recording;  // Those who replay a run include core/campaign/recording.hpp.
 struct RecordedSample;

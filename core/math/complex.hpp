@@ -14,7 +14,8 @@ class ComplexDouble {
  public:
   constexpr ComplexDouble() = default;
   // Not explicit: real numbers are complex numbers.
-  constexpr ComplexDouble(double real, double imaginary = 0.0) : real_(real), imaginary_(imaginary) {}
+  constexpr ComplexDouble(double real, double imaginary = 0.0)
+      : real_(real), imaginary_(imaginary) {}
 
   [[nodiscard]] constexpr double real() const { return real_; }
   [[nodiscard]] constexpr double imag() const { return imaginary_; }

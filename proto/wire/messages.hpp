@@ -21,8 +21,7 @@ inline constexpr std::uint32_t protocol_version = 7;
 
 inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
 inline constexpr std::size_t ranges_per_message_max = 4096;
-inline constexpr std::uint32_t slots_max =
-    65'536;  ///< Of a worker: GPUs have them by the ten thousand.
+inline constexpr std::uint32_t slots_max = 65'536;             ///< Of a worker with cards.
 inline constexpr std::uint32_t runs_held_max = 2 * slots_max;  ///< By a worker, not finished.
 inline constexpr std::size_t reject_text_size_max = 4096;      ///< Bytes.
 inline constexpr std::size_t definition_part_size_max = std::size_t{256} << 10;  ///< Bytes.

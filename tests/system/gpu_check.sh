@@ -21,7 +21,8 @@ run() {  # run NAME ARGUMENTS...: computes a campaign and prints its time.
   local num_runs
   num_runs=$(python3 -c "
 import sqlite3
-print(sqlite3.connect('file:$name.db?mode=ro', uri=True).execute('SELECT count(*) FROM run_result').fetchone()[0])")
+database = sqlite3.connect('file:$name.db?mode=ro', uri=True)
+print(database.execute('SELECT count(*) FROM run_result').fetchone()[0])")
   awk -v n="$num_runs" -v b="$begin" -v e="$end" -v name="$name" \
     'BEGIN { printf "%-28s %7d runs %8.2f s %8.1f runs/s\n", name, n, e - b, n / (e - b) }'
 }
@@ -31,7 +32,8 @@ same() {  # same A B FIRST END: whether the runs of two databases are the same, 
 import sqlite3, sys
 a, b, first, end = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
 rows = [list(sqlite3.connect(f"file:{name}.db?mode=ro", uri=True).execute(
-    "SELECT * FROM run_result WHERE run_index >= ? AND run_index < ? ORDER BY run_index", (first, end)))
+    "SELECT * FROM run_result WHERE run_index >= ? AND run_index < ? ORDER BY run_index",
+    (first, end)))
     for name in (a, b)]
 different = sum(x != y for x, y in zip(*rows)) + abs(len(rows[0]) - len(rows[1]))
 print(f"  {a} and {b}, runs {first} to {end - 1}: {len(rows[0])} compared, {different} differ")
@@ -52,10 +54,12 @@ run processors-last --runs 40000 --range 39872:40000
 same card-40000 processors-last 39872 40000
 run card-and-processors --runs 5000 --gpu all
 same card-and-processors card-40000 0 5000
-run card-flight-noise --runs 512 "${card[@]}" --set 'noise.preset="flight_suref"' --set campaign.seed=7
-run processors-flight-noise --runs 512 --range 384:512 --set 'noise.preset="flight_suref"' --set campaign.seed=7
+flight=(--runs 512 --seed 7 --set 'noise.preset="flight_suref"')
+run card-flight-noise "${flight[@]}" "${card[@]}"
+run processors-flight-noise "${flight[@]}" --range 384:512
 same card-flight-noise processors-flight-noise 384 512
-(proofmass run hardy2013.toml --db stopped.db --quiet --runs 20000 "${card[@]}" >/dev/null 2>stopped.log || true) &
+(proofmass run hardy2013.toml --db stopped.db --quiet --runs 20000 "${card[@]}" \
+  >/dev/null 2>stopped.log || true) &
 sleep 9
 pkill -TERM -f 'proofmass run hardy2013.toml --db stopped.db' || true
 wait

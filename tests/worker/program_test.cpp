@@ -44,7 +44,7 @@ TEST(WorkerOptions, HaveDefaults) {
   EXPECT_FALSE(options.walltime_max.has_value());
   EXPECT_FALSE(options.give_up_after.has_value());
   EXPECT_FALSE(options.keys.has_value());
-  EXPECT_GE(options.num_threads, 1U);
+  EXPECT_GE(num_threads_of(options, 1), 1U);
   EXPECT_EQ(options.log_format, wire::LogFormat::text);
   EXPECT_TRUE(options.is_supervised);
 }

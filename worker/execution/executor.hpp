@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/device.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/device.hpp"
 #include "worker/execution/execution.hpp"
 #include "worker/execution/run_queue.hpp"
 

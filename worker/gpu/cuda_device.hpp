@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/device.hpp"
+#include "core/campaign/device.hpp"
 
 namespace proofmass::worker {
 

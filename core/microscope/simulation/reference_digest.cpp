@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/device.hpp"
+#include "core/campaign/device.hpp"
 #include "core/math/hash.hpp"
 #include "core/microscope/simulation/run.hpp"
 

@@ -275,8 +275,9 @@ inline constexpr std::size_t general_kind = sample_kinds.size() - 1;
                                                     Product product, Monitoring monitoring) {
   if (monitoring == Monitoring::on) return monitored_kind;
   const bool has_product = product != Product::none;
+  constexpr auto kinds = sample_kinds;  // A kernel must refer to no variable of all programs.
   for (std::size_t i = monitored_kind + 1; i < general_kind; ++i) {
-    const SampleKind& kind = sample_kinds[i];
+    const SampleKind& kind = kinds[i];
     if (kind.masses == masses && kind.signals == signals && (kind.has_product || !has_product)) {
       return i;
     }

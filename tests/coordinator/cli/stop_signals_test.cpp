@@ -178,8 +178,8 @@ TEST(WorkerProcesses, SayHowAWorkerEnded) {
 
 TEST(WorkerProcesses, GiveAWorkerItsNameItsCoordinatorAndItsParent) {
   const auto exit = exit_of(
-      "[ \"$1 $2 $3 $4 $5 $6 $7\" = \"--connect ipc:///nowhere --name local-1 --threads 1 "
-      "--parent\" ]");
+      "[ \"$1 $2 $3 $4 $5 $6 $7 $8 $9\" = \"--connect ipc:///nowhere --name local-1 --threads 1 "
+      "--gpu none --parent\" ]");
   EXPECT_EQ(exit.text, "exit code 0");
 }
 

@@ -1,5 +1,4 @@
 #include "core/random/normal_deviates.hpp"
-
 #include "core/random/stream.hpp"
 #include "tests/test.hpp"
 

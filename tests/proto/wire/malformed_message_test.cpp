@@ -117,9 +117,9 @@ TEST(MalformedHello, SaysOnlyOfACrashHowTheFormerProcessEnded) {
 
 TEST(MalformedHello, HasSlots) {
   EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(0); }),
-            "num_slots = 0 (must be in [1, 4096])");
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(4097); }),
-            "num_slots = 4097 (must be in [1, 4096])");
+            "num_slots = 0 (must be in [1, 65536])");
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(65537); }),
+            "num_slots = 65537 (must be in [1, 65536])");
 }
 
 TEST(MalformedReject, HasAKnownReasonAndABoundedText) {
@@ -210,8 +210,8 @@ TEST(MalformedCampaignNumber, IsNotZero) {
 // Heartbeat, GiveBack, Retract, Bye.
 
 TEST(MalformedHeartbeat, HasABoundedCredit) {
-  EXPECT_EQ(refusal(good_heartbeat, [](auto& heartbeat) { heartbeat.set_num_runs_max(4097); }),
-            "num_runs_max = 4097 (must be in [0, 4096])");
+  EXPECT_EQ(refusal(good_heartbeat, [](auto& heartbeat) { heartbeat.set_num_runs_max(131073); }),
+            "num_runs_max = 131073 (must be in [0, 131072])");
 }
 
 TEST(MalformedHeartbeat, HasABoundedNumberOfRanges) {
@@ -222,10 +222,10 @@ TEST(MalformedHeartbeat, HasABoundedNumberOfRanges) {
             "held = 4097 entries (must be in [0, 4096])");
   EXPECT_EQ(refusal(good_heartbeat,
                     [](auto& heartbeat) {
-                      for (int i = 0; i < 4096; ++i)
+                      for (int i = 0; i < 65536; ++i)
                         *heartbeat.add_computing() = heartbeat.computing(0);
                     }),
-            "computing = 4097 entries (must be in [0, 4096])");
+            "computing = 65537 entries (must be in [0, 65536])");
   const auto fill = [](auto& ranges) {
     for (int i = 0; i < 4095; ++i) *ranges.Add() = ranges.Get(0);
   };

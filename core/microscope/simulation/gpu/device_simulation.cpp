@@ -143,7 +143,7 @@ void MicroscopeDeviceSimulation::make_memory() {
   if (memory_.launch_samples == 0) throw DeviceError("too little memory for the noise of a launch");
   for (std::size_t i = 0; i < 2; ++i) {
     noise_[i] = device_.allocate(num_at_once_ * memory_.launch_samples * noise_sample_bytes);
-    tasks_[i] = device_.allocate(num_at_once_ * sizeof(Task));
+    portions_[i] = device_.allocate(num_at_once_ * sizeof(Portion));
   }
   slots_.resize(num_slots);
 }
@@ -212,18 +212,18 @@ bool MicroscopeDeviceSimulation::begin_session(std::uint32_t index) {
 }
 
 void MicroscopeDeviceSimulation::launch() {
-  std::vector<Task> tasks;
+  std::vector<Portion> portions;
   const auto advance = [&](std::uint32_t i) {
     Slot& slot = slots_[i];
     const std::uint64_t left = num_samples_[slot.session] - slot.next;
     if (left == 0) return;  // Its sums are to be fetched.
     const auto count =
         static_cast<std::uint32_t>(std::min<std::uint64_t>(left, memory_.launch_samples));
-    tasks.push_back({.session = static_cast<std::uint32_t>(slot.session),
-                     .slot = i,
-                     .num_lanes = static_cast<std::uint32_t>(slot.group->instruments.size()),
-                     .first = slot.next,
-                     .count = count});
+    portions.push_back({.session = static_cast<std::uint32_t>(slot.session),
+                        .slot = i,
+                        .num_lanes = static_cast<std::uint32_t>(slot.group->instruments.size()),
+                        .first = slot.next,
+                        .count = count});
     slot.next += count;
     slot.group->num_samples_done += count;
     if (count == left) ending_.push_back(i);
@@ -232,26 +232,26 @@ void MicroscopeDeviceSimulation::launch() {
   for (std::uint32_t i = 0; i < num_slots; ++i) {
     if (slots_[i].group != nullptr) advance(i);
   }
-  for (std::uint32_t i = 0; i < num_slots && tasks.size() < num_at_once_; ++i) {
+  for (std::uint32_t i = 0; i < num_slots && portions.size() < num_at_once_; ++i) {
     if (slots_[i].group == nullptr && begin_session(i)) advance(i);
   }
-  if (tasks.empty()) return;
+  if (portions.empty()) return;
   const std::size_t turn = num_launches_++ % 2;
-  device_.copy_in(tasks_[turn], std::as_bytes(std::span(tasks)));
+  device_.copy_in(portions_[turn], std::as_bytes(std::span(portions)));
   memory_.noise = pointer<std::byte>(noise_[turn]);
-  std::array<void*, 4> arguments{&shared_, &tables_, &memory_, &tasks_[turn]};
+  std::array<void*, 4> arguments{&shared_, &tables_, &memory_, &portions_[turn]};
   const Device::Mark noise_made = mark_of(LaunchMark::noise_made, turn);
   const Device::Mark loops_done = mark_of(LaunchMark::loops_done, turn);
   if (num_launches_ > 2) device_.wait_in(Device::Queue::first, loops_done);
   device_.launch(Device::Queue::first, {.kernel = "proofmass_noise",
-                                        .num_blocks = tasks.size(),
+                                        .num_blocks = portions.size(),
                                         .num_blocks_y = num_noise_channels,
                                         .num_threads = group_lanes,
                                         .arguments = arguments});
   device_.set(noise_made, Device::Queue::first);
   device_.wait_in(Device::Queue::second, noise_made);
   device_.launch(Device::Queue::second, {.kernel = "proofmass_loop",
-                                         .num_blocks = tasks.size(),
+                                         .num_blocks = portions.size(),
                                          .num_threads = group_lanes,
                                          .shared_bytes = fast_bytes,
                                          .arguments = arguments});

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/device.hpp"
+#include "core/campaign/device.hpp"
 #include "core/microscope/simulation/gpu/lanes.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/run_parts.hpp"
@@ -69,7 +69,7 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
   std::size_t num_at_once_ = 0;  ///< Slots of a launch.
   GroupMemory memory_{};
   std::array<Device::Address, 2> noise_{};
-  std::array<Device::Address, 2> tasks_{};
+  std::array<Device::Address, 2> portions_{};
 
   std::vector<Slot> slots_;
   /// Groups whose session i waits, at the place of i in sessions_by_length_.

@@ -73,7 +73,7 @@ struct SessionTable {
 };
 
 /// What a launch does with a group of lanes: samples [first, first + count), settling included.
-struct Task {
+struct Portion {
   std::uint32_t session;
   std::uint32_t slot;       ///< Of the group's memory.
   std::uint32_t num_lanes;  ///< Those that have a run.
@@ -100,7 +100,7 @@ struct GroupMemory {
   const std::uint64_t* constants;  ///< [slot]: words of LoopConstants<double>.
   std::uint64_t* noise_states;     ///< [slot][channel]: words of NoiseState<double>.
   std::uint64_t* states;           ///< [slot]: words of LaneState.
-  std::byte* noise;                ///< [task of the launch][sample]: noise_sample_bytes.
+  std::byte* noise;                ///< [portion of the launch][sample]: noise_sample_bytes.
   std::uint32_t launch_samples;
 };
 

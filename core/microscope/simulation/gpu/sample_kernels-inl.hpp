@@ -36,14 +36,14 @@ struct WhiteStream {
 /// Makes the noise of a coloured channel.
 template <std::size_t num_poles, bool pair>
 PROOFMASS_INLINE void make_coloured(const NoiseFilter& by, const WhiteStream& stream,
-                                    const Task& task, std::uint64_t* state_words, std::size_t lane,
-                                    double* out) {
+                                    const Portion& portion, std::uint64_t* state_words,
+                                    std::size_t lane, double* out) {
   const FixedFilter<num_poles, pair> filter{by.gain, by.pole, by.coefficient, by.pair_pole,
                                             by.pair_coefficient};
   auto state = load_words<NoiseState<double>>(state_words, lane);
-  for (std::uint32_t k = 0; k < task.count; k += samples_per_noise_block) {
+  for (std::uint32_t k = 0; k < portion.count; k += samples_per_noise_block) {
     forget_memory();
-    const auto block = static_cast<std::uint32_t>((task.first + k) / samples_per_noise_block);
+    const auto block = static_cast<std::uint32_t>((portion.first + k) / samples_per_noise_block);
     const std::array<float, 4> deviates = stream.deviates(block);
     const OfSamples<double> white{deviates[0], deviates[1], deviates[2], deviates[3]};
     const OfSamples<double> values = state.advance(filter, white);
@@ -56,42 +56,42 @@ PROOFMASS_INLINE void make_coloured(const NoiseFilter& by, const WhiteStream& st
 
 template <std::size_t num_poles>
 PROOFMASS_INLINE void make_coloured_of(const NoiseFilter& filter, const WhiteStream& stream,
-                                       const Task& task, std::uint64_t* state_words,
+                                       const Portion& portion, std::uint64_t* state_words,
                                        std::size_t lane, double* out) {
   if (filter.num_real != num_poles) {
     if constexpr (num_poles > 0) {
-      make_coloured_of<num_poles - 1>(filter, stream, task, state_words, lane, out);
+      make_coloured_of<num_poles - 1>(filter, stream, portion, state_words, lane, out);
     }
     return;
   }
   if (filter.has_pair) {
-    make_coloured<num_poles, true>(filter, stream, task, state_words, lane, out);
+    make_coloured<num_poles, true>(filter, stream, portion, state_words, lane, out);
   } else {
-    make_coloured<num_poles, false>(filter, stream, task, state_words, lane, out);
+    make_coloured<num_poles, false>(filter, stream, portion, state_words, lane, out);
   }
 }
 
-/// Makes one channel's noise for one lane, for the samples of a task and up to three beyond.
+/// Makes one channel's noise for one lane, for the samples of a portion and up to three beyond.
 PROOFMASS_INLINE void make_noise(const Shared& shared, const SessionTable* sessions,
-                                 const GroupMemory& memory, const Task& task, std::size_t position,
-                                 std::size_t channel, std::size_t lane) {
-  const WhiteStream stream{shared.seed, memory.runs[task.slot * group_lanes + lane],
-                           sessions[task.session].streams[channel]};
+                                 const GroupMemory& memory, const Portion& portion,
+                                 std::size_t position, std::size_t channel, std::size_t lane) {
+  const WhiteStream stream{shared.seed, memory.runs[portion.slot * group_lanes + lane],
+                           sessions[portion.session].streams[channel]};
   std::byte* const noise = memory.noise + position * memory.launch_samples * noise_sample_bytes;
   if (channel < num_coloured_channels) {
     const std::size_t shape = channel >= 6 ? 2 : (channel % 3 == 0 ? 0 : 1);
     constexpr std::size_t state_words = num_words<NoiseState<double>> * group_lanes;
     make_coloured_of<num_device_poles_max>(
-        shared.filter[shape], stream, task,
-        memory.noise_states + (task.slot * num_coloured_channels + channel) * state_words, lane,
+        shared.filter[shape], stream, portion,
+        memory.noise_states + (portion.slot * num_coloured_channels + channel) * state_words, lane,
         reinterpret_cast<double*>(noise) + channel * group_lanes + lane);
     return;
   }
   float* const out = reinterpret_cast<float*>(noise) +
                      (2 * num_coloured_channels + channel - num_coloured_channels) * group_lanes +
                      lane;
-  for (std::uint32_t k = 0; k < task.count; k += samples_per_noise_block) {
-    const auto block = static_cast<std::uint32_t>((task.first + k) / samples_per_noise_block);
+  for (std::uint32_t k = 0; k < portion.count; k += samples_per_noise_block) {
+    const auto block = static_cast<std::uint32_t>((portion.first + k) / samples_per_noise_block);
     const std::array<float, 4> deviates = stream.deviates(block);
     for (std::size_t i = 0; i < deviates.size(); ++i) {
       out[(k + i) * (noise_sample_bytes / sizeof(float))] = deviates[i];
@@ -210,14 +210,14 @@ PROOFMASS_INLINE void stage_samples(const SessionTable& session, std::uint64_t f
   threads.meet();
 }
 
-/// Advances one lane by the samples of a task.
+/// Advances one lane by the samples of a portion.
 template <SampleKind kind, std::size_t num_lines>
 PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& session,
-                                   const GroupMemory& memory, const Task& task,
+                                   const GroupMemory& memory, const Portion& portion,
                                    std::size_t position, const FastMemory& fast,
                                    const Threads& threads, std::size_t lane) {
   constexpr std::size_t slot_words = num_words<LaneState> * group_lanes;
-  std::uint64_t* const loop_words = memory.states + task.slot * slot_words;
+  std::uint64_t* const loop_words = memory.states + portion.slot * slot_words;
   std::uint64_t* const sum_words = loop_words + num_words<Loop<double>> * group_lanes;
   std::uint64_t* const monitor_words = sum_words + num_words<SignalSums<double>> * group_lanes;
   auto* const sum_memory = reinterpret_cast<double*>(sum_words) + lane;
@@ -228,7 +228,7 @@ PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& ses
   Loop<double> loop{};
   SignalSums<double> sums{};
   LoopMonitor<double> monitor{};
-  if (task.first == 0) {
+  if (portion.first == 0) {
     for (std::size_t i = 0; i < num_words<LaneState>; ++i) loop_words[i * group_lanes + lane] = 0;
     loop.begin(session.reference);
   } else {
@@ -246,14 +246,14 @@ PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& ses
   const std::uint64_t num_settling = session.num_settling;
   RawNoise next;
   next.load(noise, lane);
-  for (std::uint32_t k = 0; k < task.count; ++k) {
+  for (std::uint32_t k = 0; k < portion.count; ++k) {
     forget_memory();
     const RawNoise raw = next;
     noise += noise_sample_bytes;
-    if (k + 1 < task.count) next.load(noise, lane);
-    const std::uint64_t n = task.first + k;
+    if (k + 1 < portion.count) next.load(noise, lane);
+    const std::uint64_t n = portion.first + k;
     if (k % staged_samples == 0) {
-      stage_samples<kind, num_lines>(session, n, task.count - k, threads, *fast.stage);
+      stage_samples<kind, num_lines>(session, n, portion.count - k, threads, *fast.stage);
     }
     const bool is_recorded = n >= num_settling;
     const std::uint64_t i = is_recorded ? n - num_settling : n;
@@ -284,18 +284,18 @@ PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& ses
 /// advance_lane() of the session's kind.
 template <std::size_t kind = 0>
 PROOFMASS_INLINE void advance_lane_of(const Shared& shared, const SessionTable& session,
-                                      const GroupMemory& memory, const Task& task,
+                                      const GroupMemory& memory, const Portion& portion,
                                       std::size_t position, const FastMemory& fast,
                                       const Threads& threads, std::size_t lane) {
   if (session.kind != kind) {
     if constexpr (kind + 1 < sample_kinds.size()) {
-      advance_lane_of<kind + 1>(shared, session, memory, task, position, fast, threads, lane);
+      advance_lane_of<kind + 1>(shared, session, memory, portion, position, fast, threads, lane);
     }
   } else if (session.num_lines == 1) {
-    advance_lane<sample_kinds[kind], 1>(shared, session, memory, task, position, fast, threads,
+    advance_lane<sample_kinds[kind], 1>(shared, session, memory, portion, position, fast, threads,
                                         lane);
   } else {
-    advance_lane<sample_kinds[kind], 2>(shared, session, memory, task, position, fast, threads,
+    advance_lane<sample_kinds[kind], 2>(shared, session, memory, portion, position, fast, threads,
                                         lane);
   }
 }

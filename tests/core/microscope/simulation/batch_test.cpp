@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/device.hpp"
+#include "core/campaign/device.hpp"
 #include "core/microscope/simulation/gpu/device_simulation.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
