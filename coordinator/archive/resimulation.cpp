@@ -108,6 +108,10 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
     if (!a || !b || have_same_bits(*a, *b)) continue;
     differ(column.name, fmt::format("{}", *a), fmt::format("{}", *b));
   }
+  if (stored.correlations != computed.correlations) {
+    differ("correlations", fmt::format("[{}]", fmt::join(stored.correlations, ",")),
+           fmt::format("[{}]", fmt::join(computed.correlations, ",")));
+  }
   if (!(stored.loss == computed.loss)) {
     const auto text_of = [](const Loss& loss) {
       return fmt::format("{} in {}", name_at(model().results().loss_causes, loss.cause),

@@ -55,6 +55,7 @@ void Digest::add(const RunResult& result) {
   layout.put(result.estimate, result.has_estimate(), num_quantities);
   layout.put(result.standard_error, true, result.standard_error.size());
   layout.put(result.fit, true, result.fit.size());
+  layout.put(result.correlations, true, result.correlations.size());
   hash_.add(bytes_);
 
   if (result.health.empty()) return;

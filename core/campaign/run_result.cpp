@@ -20,6 +20,12 @@ std::optional<std::size_t> find_quantity(const ResultSchema& schema, std::string
   return static_cast<std::size_t>(found - schema.quantities.begin());
 }
 
+std::size_t num_correlations(const ResultSchema& schema) {
+  const auto n = static_cast<std::size_t>(
+      std::ranges::count_if(schema.quantities, &Quantity::has_standard_error));
+  return n == 0 ? 0 : n * (n - 1) / 2;
+}
+
 const Quantity& example_quantity(const ResultSchema& schema) {
   return schema.quantities.at((schema.quantities.size() - 1) / 2);
 }

@@ -76,6 +76,9 @@ struct ResultSchema {
   std::vector<HealthQuantity> fit = {};
 };
 
+/// How many RunResult::correlations there are.
+[[nodiscard]] std::size_t num_correlations(const ResultSchema& schema);
+
 /// The name at a position from 1, as in Loss; `none` at 0.
 [[nodiscard]] std::string_view name_at(const std::vector<std::string_view>& names,
                                        std::uint32_t position);
@@ -131,8 +134,10 @@ struct RunResult {
   std::vector<double> estimate{};  ///< Of each quantity, SI; if has_estimate().
   std::vector<double> standard_error{};  ///< SI, of those quantities that have one; or empty.
   std::vector<double> fit{};             ///< Of each fit quantity, beside standard_error.
-  std::vector<double> health{};          ///< Of each health quantity; may be empty if has_truth().
-  Loss loss{};                           ///< Says more if the status is `lost`.
+  /// Of each pair of estimates that have a standard error, (0, 1), (0, 2) ..., beside these.
+  std::vector<double> correlations{};
+  std::vector<double> health{};  ///< Of each health quantity; may be empty if has_truth().
+  Loss loss{};                   ///< Says more if the status is `lost`.
 
   /// True if `truth` means something.
   [[nodiscard]] bool has_truth() const { return status != RunStatus::no_draw; }

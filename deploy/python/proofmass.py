@@ -129,7 +129,7 @@ class Campaign:
         """
         with self._one_state():
             names = [row[1] for row in self._rows("PRAGMA table_xinfo(run_result)")
-                     if row[1] not in ("loss_cause", "loss_session")]
+                     if row[1] not in ("loss_cause", "loss_session", "correlations")]
             columns = self._arrays(f"SELECT {', '.join(map(_quoted, names))} FROM run_result "
                                    "ORDER BY run_index", names)
             losses = self._rows("SELECT run_index, loss_cause, loss_session FROM loop_health "

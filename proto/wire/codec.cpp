@@ -187,6 +187,14 @@ void check_magnitudes(const Values& values, bool has_values,
   }
 }
 
+void check_correlations(const Values& correlations, std::size_t count) {
+  require_size(correlations.size(), count, "correlation");
+  for (const double value : correlations) {
+    if (value >= -1.0 && value <= 1.0) continue;
+    throw ConfigError("correlation", fmt::format("{}", value), "must be in [-1, 1]");
+  }
+}
+
 void check_loss(const proto::ComputedRun& run, bool is_lost, const ResultSchema& schema) {
   require_in(run.loss_cause(), is_lost ? 1 : 0, is_lost ? schema.loss_causes.size() : 0,
              "loss_cause");
@@ -209,6 +217,7 @@ void check(const proto::ComputedRun& run, const ResultSchema& schema, std::size_
   check_values(run.standard_error(), has_errors ? num_errors : 0, "standard_error");
   check_magnitudes(run.health(), result.has_truth(), schema.health, "health");
   check_magnitudes(run.fit(), has_errors, schema.fit, "fit");
+  check_correlations(run.correlation(), has_errors ? num_correlations(schema) : 0);
   check_loss(run, result.status == RunStatus::lost, schema);
   check_time(run.compute_s(), "compute_s");
   check_time(run.elapsed_s(), "elapsed_s");

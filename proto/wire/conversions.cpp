@@ -45,6 +45,7 @@ ComputedRun computed_run(const proto::ComputedRun& message) {
   result.estimate.assign(message.estimate().begin(), message.estimate().end());
   result.standard_error.assign(message.standard_error().begin(), message.standard_error().end());
   result.fit.assign(message.fit().begin(), message.fit().end());
+  result.correlations.assign(message.correlation().begin(), message.correlation().end());
   result.health.assign(message.health().begin(), message.health().end());
   result.loss = {.cause = message.loss_cause(), .session = message.loss_session()};
   return {.result = std::move(result),
@@ -69,6 +70,7 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
     message.mutable_standard_error()->Assign(result.standard_error.begin(),
                                              result.standard_error.end());
     message.mutable_fit()->Assign(result.fit.begin(), result.fit.end());
+    message.mutable_correlation()->Assign(result.correlations.begin(), result.correlations.end());
   }
   message.set_loss_cause(result.loss.cause);
   message.set_loss_session(result.loss.session);

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
@@ -31,15 +33,18 @@ struct Columns {
         num_standard_errors(static_cast<int>(
             std::ranges::count_if(schema.quantities, &Quantity::has_standard_error))),
         num_fit(static_cast<int>(schema.fit.size())),
+        num_correlations(proofmass::num_correlations(schema)),
         num_health(static_cast<int>(schema.health.size())) {}
 
-  int num_quantities, num_standard_errors, num_fit, num_health;
+  int num_quantities, num_standard_errors, num_fit;
+  std::size_t num_correlations;
+  int num_health;
   int truth = num_leading_columns;
   int estimate = truth + num_quantities;
   int health = estimate + num_quantities;
   int loss_cause = health + num_health;
   int loss_session = loss_cause + 1;
-  int num_all = loss_session + 1 + num_standard_errors + num_fit;
+  int num_all = loss_session + 1 + num_standard_errors + num_fit + (num_correlations > 0 ? 1 : 0);
 };
 
 bool is_of_standard_errors(const ValueColumn& column) {
@@ -65,7 +70,12 @@ std::string list_of_standard_errors() {
   for (const ValueColumn& column : value_columns()) {
     if (is_of_standard_errors(column)) list += ", " + column.name;
   }
-  return list;
+  return columns().num_correlations > 0 ? list + ", correlations" : list;
+}
+
+/// `[0.25,-0.125]`, a JSON array.
+std::string format_correlations(const std::vector<double>& values) {
+  return fmt::format("[{}]", fmt::join(values, ","));
 }
 
 std::string insert_sql() {
@@ -187,11 +197,32 @@ RunResult read_result(const Statement& row) {
   return result;
 }
 
+/// What format_correlations() wrote.
+std::vector<double> read_correlations(const Statement& row, int column) {
+  const std::string text = row.text(column);
+  std::vector<double> values;
+  const char* next = text.data();
+  const char* const end = next + text.size();
+  for (double value = 0.0; next != end && (*next == '[' || *next == ',');) {
+    const auto [after, error] = std::from_chars(next + 1, end, value);
+    if (error != std::errc() || !(std::abs(value) <= 1.0)) break;
+    values.push_back(value);
+    next = after;
+  }
+  // As it was written, so that no other text has the same digest.
+  if (values.size() == columns().num_correlations && format_correlations(values) == text) {
+    return values;
+  }
+  row.refuse_as_damaged(fmt::format("correlations of run {}", row.count(0)));
+}
+
 /// Of a row of select_standard_errors_sql().
 void read_standard_errors(const Statement& row, RunResult& result) {
   const Columns& at = columns();
   result.standard_error = read_values(row, 1, at.num_standard_errors);
   result.fit = read_magnitudes(row, 1 + at.num_standard_errors, at.num_fit);
+  if (at.num_correlations == 0) return;
+  result.correlations = read_correlations(row, 1 + at.num_standard_errors + at.num_fit);
 }
 
 /// Those of results that are read in run order, from the same state of the file.
@@ -259,6 +290,12 @@ bool ResultRows::insert(const RunResult& result) {
   for (const ValueColumn& column : value_columns()) {
     if (is_of_standard_errors(column)) insert_.bind(++position, column.value_in(result));
   }
+  if (columns().num_correlations > 0) {
+    const std::string correlations = format_correlations(result.correlations);
+    insert_.bind(++position, result.correlations.empty()
+                                 ? std::optional<std::string_view>()
+                                 : std::optional<std::string_view>(correlations));
+  }
   insert_.finish();
   return database_.num_changes() == 1;
 }
@@ -286,7 +323,7 @@ bool are_equal(const RunResult& left, const RunResult& right) {
          (!left.has_truth() || left.truth == right.truth) &&
          (!left.has_estimate() ||
           (left.estimate == right.estimate && left.standard_error == right.standard_error &&
-           left.fit == right.fit)) &&
+           left.fit == right.fit && left.correlations == right.correlations)) &&
          left.health == right.health && left.loss == right.loss;
 }
 
@@ -301,6 +338,7 @@ std::uint64_t digest(const RunResult& result) {
   if (result.has_estimate()) digest = digest_with(digest, result.estimate);
   digest = digest_with(digest, result.standard_error);
   digest = digest_with(digest, result.fit);
+  digest = digest_with(digest, result.correlations);
   digest = digest_with(digest, result.health);
   if (result.status != RunStatus::lost) return digest;
   digest = digest_with(digest, std::uint64_t{result.loss.cause});

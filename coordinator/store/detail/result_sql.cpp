@@ -52,6 +52,9 @@ std::string added_columns() {
   }
   for (const HealthQuantity& quantity : model().results().fit) add("fit", quantity.column());
   if (text.empty()) return text;
+  if (num_correlations(model().results()) > 0) {
+    text += "ALTER TABLE run_result ADD COLUMN correlations TEXT;\n";
+  }
   return text + fmt::format(
                     "CREATE INDEX run_result_standard_errors ON run_result (run_index)\n"
                     "WHERE {};\n",
@@ -212,6 +215,7 @@ std::string has_standard_errors_sql() {
     if (quantity.has_standard_error) add("standard_error", quantity.column());
   }
   for (const HealthQuantity& quantity : model().results().fit) add("fit", quantity.column());
+  if (num_correlations(model().results()) > 0) text += "\n   OR correlations IS NOT NULL";
   return text;
 }
 

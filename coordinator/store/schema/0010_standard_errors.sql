@@ -3,6 +3,7 @@
 -- In run_result:
 --   standard_error_  of estimates that have one, NULL of all others
 --   fit_             how well these estimates fit the data of their run, NULL without them
+--   correlations     of these estimates: of each pair of them, (1, 2), (1, 3) ..., a JSON array
 -- The index has the runs that have them, so that they are read where they are alone.
 {added_columns}
 -- One row a run with an estimate and parameter.

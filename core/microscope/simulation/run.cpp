@@ -329,6 +329,12 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
       result.fit[0] += session.chi_squared;
       result.fit[1] += session.degrees_of_freedom;
     }
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      for (std::size_t j = i + 1; j < num_parameters; ++j) {
+        // To a millionth: a database keeps them as text.
+        result.correlations.push_back(std::round(1e6 * found.correlations[i][j]) / 1e6 + 0.0);
+      }
+    }
   }
   return result;
 }

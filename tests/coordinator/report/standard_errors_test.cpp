@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "coordinator/charts/svg.hpp"
+#include "coordinator/report/live_results.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/review_documents.hpp"
 #include "coordinator/table/terminal_table.hpp"
@@ -29,6 +30,7 @@ RunResult result_off_by(std::uint64_t run, double pull) {
     result.standard_error.push_back(0.1 * objectives[i]);
   }
   result.fit = {30.0 + static_cast<double>(run), 32.0};
+  result.correlations.assign(45, 0.0);
   return result;
 }
 
@@ -99,6 +101,9 @@ TEST_F(StandardErrorsTest, AreInEveryReport) {
   EXPECT_THAT(report_text(store, test::campaign_of(5)), HasSubstr(caption));
   EXPECT_THAT(review_html(review), AllOf(HasSubstr(caption), HasSubstr("id=\"pulls-title\"")));
   EXPECT_THAT(review_markdown(review), HasSubstr(caption));
+  LiveResults live(campaign);
+  for (const Delivery& delivery : deliveries) live.add(delivery.result);
+  EXPECT_THAT(live.html(), HasSubstr(caption));
   EXPECT_THAT(report_json(store, test::campaign_of(5), {}, {}),
               AllOf(HasSubstr("\"num_within_95\": 3"), HasSubstr("\"mean_chi_squared\": 32.0")));
 }

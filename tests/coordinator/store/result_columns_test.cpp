@@ -46,6 +46,8 @@ Delivery delivery_with_standard_errors(std::uint64_t run) {
     result.standard_error.push_back(sigma);
   }
   result.fit = {36.25, 37.5};
+  result.correlations.assign(45, -0.000125);
+  result.correlations[44] = 1.0 / 3.0;
   return delivery;
 }
 
@@ -61,8 +63,13 @@ TEST_F(ResultColumns, KeepStandardErrorsAndTheirFit) {
   ASSERT_EQ(results.size(), 5U);
   EXPECT_EQ(results[3].standard_error, deliveries[4].result.standard_error);
   EXPECT_EQ(results[3].fit, deliveries[4].result.fit);
+  EXPECT_EQ(results[3].correlations, deliveries[4].result.correlations);
   EXPECT_TRUE(results[4].standard_error.empty());
   EXPECT_TRUE(results[4].fit.empty());
+  EXPECT_TRUE(results[4].correlations.empty());
+  EXPECT_EQ(text("SELECT json_extract(correlations, '$[0]') || ' ' || json_array_length("
+                 "correlations) FROM run_result WHERE run_index = 3"),
+            "-0.000125 45");
   EXPECT_EQ(text("SELECT group_concat(standard_error * 1024.0) FROM error_long WHERE run_index = 0"
                  " AND parameter IN ('a_c11_delta_x', 'a_c11_delta_z')"),
             "1.0,0.5");
@@ -83,6 +90,13 @@ TEST_F(ResultColumns, HaveNoHalfOfTheStandardErrors) {
     return test::store_error_of(
         [&] { Store::open_read_only(file()).for_each_result([](const RunResult&) {}); });
   };
+  for (const char* const other :
+       {"'[0.5]'", "replace(correlations, '0.3333', '1.3333')", "correlations || ' '", "NULL"}) {
+    const std::string before = text("SELECT correlations FROM run_result");
+    change(std::string("UPDATE run_result SET correlations = ") + other);
+    EXPECT_THAT(refusal(), HasSubstr("correlations of run 0"));
+    change("UPDATE run_result SET correlations = '" + before + "'");
+  }
   change("UPDATE run_result SET fit_degrees_of_freedom = -1");
   EXPECT_THAT(refusal(), HasSubstr("fit_degrees_of_freedom of run 0 (must be in [0, 1e+90])"));
   change("UPDATE run_result SET fit_chi_squared = NULL");

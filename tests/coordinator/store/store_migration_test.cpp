@@ -88,8 +88,8 @@ TEST_F(StoreMigration, AddsStandardErrorsThatOldRunsDoNotHave) {
   }
   EXPECT_EQ(integer("SELECT count(*) FROM standard_errors"), 0);
   EXPECT_EQ(integer("SELECT count(*) FROM pragma_table_info('run_result') WHERE name LIKE "
-                    "'standard_error_%' OR name LIKE 'fit_%'"),
-            12);
+                    "'standard_error_%' OR name LIKE 'fit_%' OR name = 'correlations'"),
+            13);
 }
 
 // A file keeps the budget of the program that made it, which took one level for all runs. Run 2 has

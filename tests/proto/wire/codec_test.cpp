@@ -69,6 +69,7 @@ RunResult some_result(RunIndex run, RunStatus status) {
   if (status == RunStatus::completed) {
     result.standard_error.assign(num_parameters, 1.0 / 3.0);
     result.fit = {37.0 / 3.0, hard_numbers[0] * hard_numbers[0]};
+    result.correlations.assign(45, -1.0 / 3.0);
   }
   if (status == RunStatus::lost)
     result.loss = loss_of(LossCause::residual, SessionTarget::k2_sensor_2);
@@ -184,6 +185,7 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
     EXPECT_EQ(got.result.health, sent.result.health);
     EXPECT_EQ(got.result.standard_error, sent.result.standard_error);
     EXPECT_EQ(got.result.fit, sent.result.fit);
+    EXPECT_EQ(got.result.correlations, sent.result.correlations);
     EXPECT_EQ(got.result.loss, sent.result.loss);
     EXPECT_EQ(got.result.num_draws, 3U);
     EXPECT_EQ(got.result.num_rounds, 7U);

@@ -319,9 +319,20 @@ TEST(MalformedComputedRun, HasAllStandardErrorsWithTheirFitOrNone) {
       for (int i = 0; i < num_errors; ++i) run.add_standard_error(1.0);
       run.add_fit(chi_squared);
       run.add_fit(3.0);
+      for (int i = 0; i < 45; ++i) run.add_correlation(-1.0);
     };
   };
   EXPECT_EQ(refusal_of_run(with(10, 1.0)), "accepted");
+  EXPECT_EQ(refusal_of_run([&](auto& run) {
+              with(10, 1.0)(run);
+              run.set_correlation(7, 1.5);
+            }),
+            "correlation = 1.5 (must be in [-1, 1])");
+  EXPECT_EQ(refusal_of_run([&](auto& run) {
+              with(10, 1.0)(run);
+              run.add_correlation(0.0);
+            }),
+            "correlation = 46 entries (must be 45 with this status)");
   EXPECT_EQ(refusal_of_run(with(9, 1.0)),
             "standard_error = 9 entries (must be 10 with this status)");
   EXPECT_EQ(refusal_of_run(with(10, -1.0)), "fit.chi_squared = -1 (must be in [0, 1e+90])");

@@ -71,7 +71,10 @@ TEST(ResultDigest, DependsOnStandardErrorsAndTheirFit) {
   with_errors.fit = {3.0, 4.0};
   RunResult other_fit = with_errors;
   other_fit.fit[0] = 3.5;
-  for (const auto& [a, b] : {std::pair{known, with_errors}, std::pair{with_errors, other_fit}}) {
+  RunResult other_correlations = with_errors;
+  other_correlations.correlations = {0.5};
+  for (const auto& [a, b] : {std::pair{known, with_errors}, std::pair{with_errors, other_fit},
+                             std::pair{with_errors, other_correlations}}) {
     EXPECT_NE(digest(a), digest(b));
     EXPECT_FALSE(are_equal(a, b));
   }

@@ -112,6 +112,8 @@ TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
 Estimation errors_of_three(const RunPhasors& /*records*/, const EstimationInput& input) {
   Estimation estimation{.num_rounds = 1, .converged = true};
   estimation.standard_errors.fill(3e-9);
+  estimation.session_fits = {{1.25, 1.5}, {2.5, 2.5}};
+  estimation.correlations[1][2] = 0.1234567;
   if (input.config.convergence > 0.5) estimation.standard_errors.back() = HUGE_VAL;
   return estimation;
 }
@@ -127,6 +129,9 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
   const RunResult result = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(result.status, RunStatus::completed);
   EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3e-9));
+  EXPECT_EQ(result.fit, (std::vector<double>{3.75, 4.0}));
+  ASSERT_EQ(result.correlations.size(), num_correlations(results_of(std::array{method})));
+  EXPECT_EQ(result.correlations[9], 0.123457);  // Of the second with the third.
   campaign.scenario.estimation.convergence = 0.7;
   const RunResult unusable = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(unusable.status, RunStatus::not_finite);
@@ -137,6 +142,7 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
     EXPECT_TRUE(quantity.has_standard_error) << quantity.name;
   }
   const std::array without{*estimation_methods().begin()};
+  EXPECT_TRUE(results_of(without).fit.empty());
   for (const Quantity& quantity : results_of(without).quantities) {
     EXPECT_FALSE(quantity.has_standard_error) << quantity.name;
   }
