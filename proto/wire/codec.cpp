@@ -243,7 +243,7 @@ void check(const proto::Heartbeat& heartbeat) {
   require_in(heartbeat.num_runs_max(), 0, runs_held_max, "num_runs_max");
   require_count(heartbeat.held_size(), 0, ranges_per_message_max, "held");
   require_count(heartbeat.set_aside_size(), 0, ranges_per_message_max, "set_aside");
-  require_count(heartbeat.computing_size(), 0, slots_max, "computing");
+  require_count(heartbeat.computing_size(), 0, ranges_per_message_max, "computing");
   int num_held = 0;
   for (const proto::HeldRuns& held : heartbeat.held()) check_held(held, num_held);
   for (const proto::HeldRuns& held : heartbeat.set_aside()) check_held(held, num_held);

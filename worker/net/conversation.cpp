@@ -326,8 +326,12 @@ void Conversation::send_heartbeat(TimePoint now) {
   const std::size_t room = wire::ranges_per_message_max - num_ranges(heartbeat.held());
   *heartbeat.mutable_set_aside() = grouped(std::move(aside), room);
   reported_batches_.clear();
+  // What is not listed is blamed for no crash; a card's runs may lie apart.
+  std::size_t room_of_batches = wire::ranges_per_message_max;
   for (const RunningBatch& batch : execution_.computing()) {
     reported_batches_.push_back(batch.number);
+    if (batch.ranges.size() > room_of_batches) continue;
+    room_of_batches -= batch.ranges.size();
     proto::ComputedBatch& message = *heartbeat.add_computing();
     message.set_campaign(batch.campaign.value);
     message.set_num_steps_done(batch.num_steps_done);

@@ -222,10 +222,10 @@ TEST(MalformedHeartbeat, HasABoundedNumberOfRanges) {
             "held = 4097 entries (must be in [0, 4096])");
   EXPECT_EQ(refusal(good_heartbeat,
                     [](auto& heartbeat) {
-                      for (int i = 0; i < 65536; ++i)
+                      for (int i = 0; i < 4096; ++i)
                         *heartbeat.add_computing() = heartbeat.computing(0);
                     }),
-            "computing = 65537 entries (must be in [0, 65536])");
+            "computing = 4097 entries (must be in [0, 4096])");
   const auto fill = [](auto& ranges) {
     for (int i = 0; i < 4095; ++i) *ranges.Add() = ranges.Get(0);
   };

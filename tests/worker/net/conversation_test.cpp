@@ -186,6 +186,23 @@ TEST_F(ConversationTest, SaysSoonWhatItComputesNow) {
   EXPECT_TRUE(take_sent<proto::Heartbeat>().computing().empty());
 }
 
+TEST_F(ConversationTest, NamesAsManyBatchesAsAMessageTakes) {
+  register_with_campaign();
+  const auto every_second_run = [](std::uint64_t first, std::size_t count) {
+    RunningBatch batch{.number = first + 1, .campaign = campaign_1, .time_left = std::nullopt};
+    for (std::size_t i = 0; i < count; ++i) batch.ranges.push_back({{first + 2 * i}, 1});
+    return batch;
+  };
+  execution.batches = {every_second_run(0, 4000), every_second_run(10'000, 97),
+                       every_second_run(20'000, 96)};
+  tick_after(2s);
+  const auto heartbeat = take_sent<proto::Heartbeat>();
+  ASSERT_EQ(heartbeat.computing_size(), 2);
+  EXPECT_EQ(heartbeat.computing(1).ranges_size(), 96);
+  tick_after(1s);
+  EXPECT_TRUE(sent.empty()) << "it computes the same";
+}
+
 TEST_F(ConversationTest, CountsUnacknowledgedResultsAgainstItsCredit) {
   register_with_campaign();
   (void)compute(lease(0, 96));
