@@ -30,7 +30,8 @@ bool are_same(const RunResult& a, const RunResult& b) {
   return a.run == b.run && a.status == b.status && a.num_draws == b.num_draws &&
          a.num_rounds == b.num_rounds && a.loss == b.loss && are_same(a.truth, b.truth) &&
          are_same(a.estimate, b.estimate) && are_same(a.standard_error, b.standard_error) &&
-         are_same(a.fit, b.fit) && are_same(a.health, b.health);
+         are_same(a.fit, b.fit) && are_same(a.correlations, b.correlations) &&
+         are_same(a.health, b.health);
 }
 
 /// Whether a run is one of those to be checked: as good as at random, and the same every time.

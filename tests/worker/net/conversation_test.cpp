@@ -189,7 +189,8 @@ TEST_F(ConversationTest, SaysSoonWhatItComputesNow) {
 TEST_F(ConversationTest, NamesAsManyBatchesAsAMessageTakes) {
   register_with_campaign();
   const auto every_second_run = [](std::uint64_t first, std::size_t count) {
-    RunningBatch batch{.number = first + 1, .campaign = campaign_1, .time_left = std::nullopt};
+    RunningBatch batch{
+        .number = first + 1, .campaign = campaign_1, .ranges = {}, .time_left = std::nullopt};
     for (std::size_t i = 0; i < count; ++i) batch.ranges.push_back({{first + 2 * i}, 1});
     return batch;
   };
