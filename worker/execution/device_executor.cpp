@@ -36,8 +36,7 @@ bool are_same(const RunResult& a, const RunResult& b) {
 
 /// Whether a run is one of those to be checked: as good as at random, and the same every time.
 bool is_checked(RunIndex run, double fraction) {
-  const auto number = static_cast<double>(fnv1a(fnv1a_basis, run.value) >> 11);
-  return number * 0x1p-53 < fraction;
+  return fraction_of(mixed(run.value)) < fraction;
 }
 
 /// Computes some of a device's runs again, on a thread of its own so that the device goes on.
