@@ -178,8 +178,7 @@ int plan_campaign(const PlanOptions& options) {
 
 void add_plan(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<PlanOptions>(
-      app, chosen, "plan", "Show what a campaign can find out, or allocate its time",
-      plan_campaign);
+      app, chosen, "plan", "Predict the errors of a campaign, or plan it", plan_campaign);
   add_campaign_file(command, options.file);
   add_override_options(command, options.overrides);
   command
