@@ -11,6 +11,7 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/definition.hpp"
+#include "core/campaign/plan_study.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/math/instruction_set.hpp"
 
@@ -92,6 +93,13 @@ class Model {
   /// @throws DefinitionError naming file, line, field, value and rule.
   [[nodiscard]] virtual std::unique_ptr<Campaign> read_campaign(Document& document,
                                                                 DataFiles& files) const = 0;
+
+  /// What the sessions of a campaign of this model find out, without its noise being simulated.
+  /// @return Null if the model has no bound of it.
+  /// @throws ConfigError if its sessions cannot be estimated by the method that has one.
+  [[nodiscard]] virtual std::unique_ptr<PlanStudy> study(const Campaign& /*campaign*/) const {
+    return nullptr;
+  }
 
   /// A campaign file with every key at its nominal value, its meaning and its rule.
   [[nodiscard]] virtual std::string example() const = 0;

@@ -73,7 +73,7 @@ int run_proofmass(int argc, char** argv) {
   Command chosen;
   // As `--help` lists them: the usual ones first.
   const std::vector<std::pair<const char*, std::vector<std::function<void(CLI::App&, Command&)>>>>
-      groups{{"Run a campaign", {add_run, add_init, add_check, add_sweep}},
+      groups{{"Run a campaign", {add_run, add_init, add_check, add_plan, add_sweep}},
              {"Look at its results", {add_report, add_plot, add_list}},
              {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
              {"Serve campaigns to other machines",

@@ -9,6 +9,7 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/planning/plan_study.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/model.hpp"
@@ -131,6 +132,12 @@ class MicroscopeModel final : public Model {
   [[nodiscard]] std::unique_ptr<Campaign> read_campaign(Document& document,
                                                         DataFiles& files) const override {
     return std::make_unique<MicroscopeCampaign>(proofmass::read_campaign(document, files));
+  }
+
+  [[nodiscard]] std::unique_ptr<PlanStudy> study(const Campaign& campaign) const override {
+    const auto* const own = dynamic_cast<const MicroscopeCampaign*>(&campaign);
+    PROOFMASS_EXPECT(own != nullptr);
+    return study_plan(*own);
   }
 
   [[nodiscard]] std::string example() const override {

@@ -72,6 +72,7 @@ void add_run(CLI::App& app, Command& chosen);
 void add_sweep(CLI::App& app, Command& chosen);
 void add_init(CLI::App& app, Command& chosen);
 void add_check(CLI::App& app, Command& chosen);
+void add_plan(CLI::App& app, Command& chosen);
 void add_keygen(CLI::App& app, Command& chosen);
 
 // Commands that read or change a database.

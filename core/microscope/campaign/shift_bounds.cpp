@@ -144,7 +144,8 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
   if (has_noise_) white_density_ *= square(scenario.noise.scale);
   for (const Session& session : scenario.sessions) {
     duration_s_ += fit_duration_s(scenario, session);
-    if (const Excitation* const motion = mass_excitation(session)) {
+    for (const Excitation* const motion : mass_excitations(session)) {
+      if (motion == nullptr) continue;
       double& largest = mass_acceleration_m_s2_[index(motion->axis)];
       largest = std::max(largest, square(turn_rad * motion->frequency_hz) * motion->amplitude);
     }

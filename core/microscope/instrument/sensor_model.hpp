@@ -24,8 +24,8 @@ struct SatelliteMotion {
   Vector3<T> omega_dot_IS_S;  ///< Ω̇, rad/s².
 };
 
-/// Whether a session moves a test mass. Where none moves, the terms of the motion are not computed.
-enum class TestMasses : std::uint8_t { at_rest, moving };
+/// How many motions of the test masses a session commands. The terms of others are not computed.
+enum class TestMasses : std::uint8_t { at_rest, moving, moving_twice };
 
 /// Factors of the motion q_S(t) = motion_direction_S·(position, velocity, acceleration) that a
 /// session commands of a test mass. All are 0 where no mass moves.
@@ -42,6 +42,7 @@ template <typename T>
 struct SensorModel {
   Vector3<T> rest_position_S_m;  ///< r_k without excitation: from O_sat to O_k.
   Vector3<T> motion_direction_S;  ///< [θ_k]ᵀ e_a s_k: an axis of K in S; 0 if the mass is at rest.
+  Vector3<T> second_direction_S;  ///< That of the second motion.
   Vector3<T> parasitic_K_m_s2;    ///< p_k.
   Vector3<T> offset_K_m_s2;       ///< b0_k − ([K1_k] + [η_k]) p_k: all that is constant.
   Matrix3<T> sensitivity_KS;      ///< [M_k].
@@ -52,22 +53,30 @@ struct SensorModel {
 /// eq:instrument-dynamics with O_kO_sat = −r_k): Γ_sat − ([T] − [In]) r + [Cor] ṙ + r̈. The mass
 /// follows the session's command exactly, as the sensor's own loop is far faster.
 ///
-/// @tparam masses  `at_rest` only with a motion that is 0; then it makes no difference to the
-/// value.
-template <TestMasses masses = TestMasses::moving, typename T, typename Shared>
+/// @tparam masses  `at_rest` only with motions that are 0, `moving` only with a second one that is;
+///                 then it makes no difference to the value.
+template <TestMasses masses = TestMasses::moving_twice, typename T, typename Shared>
 PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
                                                    const SatelliteMotion<T>& satellite,
-                                                   const MassMotionPhaseOf<Shared>& motion) {
+                                                   const MassMotionPhaseOf<Shared>& motion,
+                                                   const MassMotionPhaseOf<Shared>& second = {}) {
   Vector3<T> r_S = sensor.rest_position_S_m;
-  if constexpr (masses == TestMasses::moving) {
+  if constexpr (masses != TestMasses::at_rest) {
     r_S += T(motion.position_m) * sensor.motion_direction_S;
+  }
+  if constexpr (masses == TestMasses::moving_twice) {
+    r_S += T(second.position_m) * sensor.second_direction_S;
   }
   const Vector3<T> at_rest_S =
       satellite.acceleration_S - gravity_gradient(satellite.gradient_s2, satellite.radial_S, r_S) +
       inertia_gradient(satellite.omega_IS_S, satellite.omega_dot_IS_S, r_S);
   if constexpr (masses == TestMasses::at_rest) return at_rest_S;
-  const Vector3<T> velocity_S = T(motion.velocity_m_s) * sensor.motion_direction_S;
-  const Vector3<T> acceleration_S = T(motion.acceleration_m_s2) * sensor.motion_direction_S;
+  Vector3<T> velocity_S = T(motion.velocity_m_s) * sensor.motion_direction_S;
+  Vector3<T> acceleration_S = T(motion.acceleration_m_s2) * sensor.motion_direction_S;
+  if constexpr (masses == TestMasses::moving_twice) {
+    velocity_S += T(second.velocity_m_s) * sensor.second_direction_S;
+    acceleration_S += T(second.acceleration_m_s2) * sensor.second_direction_S;
+  }
   return at_rest_S + T(2.0) * cross(satellite.omega_IS_S, velocity_S) + acceleration_S;
 }
 

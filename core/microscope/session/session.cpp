@@ -150,10 +150,14 @@ double line_frequency_hz(const Session& session, const LineMultiple& line, doubl
   return std::abs(frequency_hz);
 }
 
-const Excitation* mass_excitation(const Session& session) {
-  const auto found =
-      std::ranges::find(session.excitations, ExcitationKind::test_mass, &Excitation::kind);
-  return found == session.excitations.end() ? nullptr : &*found;
+MassExcitations mass_excitations(const Session& session) {
+  MassExcitations found{};
+  std::size_t num_found = 0;
+  for (const Excitation& excitation : session.excitations) {
+    if (excitation.kind != test_mass || num_found == found.size()) continue;
+    found[num_found++] = &excitation;
+  }
+  return found;
 }
 
 double test_frequency_hz(const Session& session, double orbit_period_s) {

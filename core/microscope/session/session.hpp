@@ -59,8 +59,9 @@ struct Excitation {
   bool operator==(const Excitation&) const = default;
 };
 
-/// Excitations of one session at most.
+/// Excitations of one session at most, and those among them that move test masses.
 inline constexpr std::size_t num_excitations_max = 4;
+inline constexpr std::size_t num_mass_motions_max = 2;
 
 // Signals of the ground.
 
@@ -114,6 +115,7 @@ enum class LineSignals : std::uint8_t {
   squares,    ///< Γ_mes,1x² and Γ_mes,2x², m²/s⁴.
   /// The elements of [T̂] − [În], row by row, times half the position of the moving masses, m/s².
   moved,
+  moved_again,  ///< The same with the second of mass_excitations().
 };
 
 inline constexpr std::size_t num_line_bases = 7;                     ///< Before Signal::product.
@@ -217,7 +219,8 @@ struct Session {
   /// is inertial pointing.
   double spin_rate_rad_s = 0.0;
   DragFreeSource drag_free = DragFreeSource::common;
-  /// At most num_excitations_max, of which one moves test masses. The first is the target's.
+  /// At most num_excitations_max. The first is the target's. Two that move test masses do so in
+  /// opposition, along Y and along Z.
   std::vector<Excitation> excitations;
   std::vector<LineMultiple> fit_lines;    ///< Lines whose phasors give the estimate: one or two.
   std::vector<LineMultiple> known_lines;  ///< Other lines, fitted together with those.
@@ -234,8 +237,14 @@ struct Session {
 /// that turns about +Y.
 [[nodiscard]] double test_frequency_hz(const Session& session, double orbit_period_s);
 
-/// The excitation that moves test masses; null if there is none.
-[[nodiscard]] const Excitation* mass_excitation(const Session& session);
+/// The excitations that move test masses, in their order; null where there is none.
+using MassExcitations = std::array<const Excitation*, num_mass_motions_max>;
+[[nodiscard]] MassExcitations mass_excitations(const Session& session);
+
+/// The first one of these; null if there is none.
+[[nodiscard]] inline const Excitation* mass_excitation(const Session& session) {
+  return mass_excitations(session)[0];
+}
 
 /// The eleven sessions of the paper's 140 orbits ([Hardy2013] section 4.2).
 [[nodiscard]] std::vector<Session> hardy2013_sessions();

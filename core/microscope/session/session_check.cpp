@@ -126,9 +126,14 @@ void SessionCheck::check_excitation(std::size_t i) const {
   // The quadratic factors show at twice the excitation's frequency, which must be seen too.
   check_number(key + "frequency_hz", excitation.frequency_hz,
                Range{.minimum = 0.0, .maximum = nyquist_hz_ / 2, .minimum_open = true});
-  if (excitation.kind == ExcitationKind::test_mass && &excitation != mass_excitation(session_)) {
-    refuse(key + "kind", spelling(excitation.kind), "one excitation may move test masses");
-  }
+  const Excitation* const first = mass_excitation(session_);
+  if (excitation.kind != ExcitationKind::test_mass || &excitation == first) return;
+  const bool are_apart = excitation.motion == MassMotion::opposition &&
+                         first->motion == MassMotion::opposition && excitation.axis != Axis::x &&
+                         first->axis != Axis::x && excitation.axis != first->axis;
+  if (are_apart && &excitation == mass_excitations(session_)[1]) return;
+  refuse(key + "kind", spelling(excitation.kind),
+         "a second one that moves test masses needs both in opposition, along y and along z");
 }
 
 void SessionCheck::check_lines() const {

@@ -41,6 +41,7 @@ HWY_INLINE SensorModel<Batch> gather_sensor(ConstantsOfLanes constants, std::siz
   };
   return {gather_vector([&](std::size_t lane) { return sensor(lane).rest_position_S_m; }),
           gather_vector([&](std::size_t lane) { return sensor(lane).motion_direction_S; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).second_direction_S; }),
           gather_vector([&](std::size_t lane) { return sensor(lane).parasitic_K_m_s2; }),
           gather_vector([&](std::size_t lane) { return sensor(lane).offset_K_m_s2; }),
           gather_matrix([&](std::size_t lane) { return sensor(lane).sensitivity_KS; }),

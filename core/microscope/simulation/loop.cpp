@@ -12,10 +12,8 @@ Matrix3<double> matrix(const Eigen::Matrix3d& m) {
 }
 
 /// s of q(t) = [θ]ᵀ e_a s Δ_TM sin(2π f t) for each mass.
-std::array<double, 2> motion_factors(const Session& session) {
-  const Excitation* const excitation = mass_excitation(session);
-  if (excitation == nullptr) return {0.0, 0.0};
-  switch (excitation->motion) {
+std::array<double, 2> motion_factors(MassMotion motion) {
+  switch (motion) {
     case MassMotion::opposition:
       return {-0.5, 0.5};
     case MassMotion::mass_1:
@@ -26,14 +24,32 @@ std::array<double, 2> motion_factors(const Session& session) {
   return {0.0, 0.0};
 }
 
+/// Directions of the motions that a session commands of the mass of sensor k.
+std::array<Eigen::Vector3d, num_mass_motions_max> motion_directions_S(const Session& session,
+                                                                      const Sensor& sensor,
+                                                                      std::size_t k) {
+  std::array<Eigen::Vector3d, num_mass_motions_max> directions;
+  directions.fill(Eigen::Vector3d::Zero());
+  const MassExcitations excitations = mass_excitations(session);
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    if (excitations[i] == nullptr) continue;
+    const double factor = motion_factors(excitations[i]->motion)[k];
+    if (factor == 0.0) continue;
+    const auto axis = static_cast<Eigen::Index>(index(excitations[i]->axis));
+    directions[i] = factor * sensor.alignment_KS().transpose().col(axis);
+  }
+  return directions;
+}
+
 SensorModel<double> make_sensor_model(const Sensor& sensor,
                                       const Eigen::Vector3d& rest_position_S_m,
-                                      const Eigen::Vector3d& motion_direction_S) {
+                                      const std::array<Eigen::Vector3d, 2>& directions_S) {
   // measured_acceleration() applies [M] to Γ_App + p, so only the last two terms with p are
   // constant.
   const Eigen::Vector3d& p = sensor.parasitic_K_m_s2;
   return {.rest_position_S_m = vector(rest_position_S_m),
-          .motion_direction_S = vector(motion_direction_S),
+          .motion_direction_S = vector(directions_S[0]),
+          .second_direction_S = vector(directions_S[1]),
           .parasitic_K_m_s2 = vector(p),
           .offset_K_m_s2 = vector(sensor.read_out_bias_K_m_s2 - sensor.symmetric_part() * p),
           .sensitivity_KS = matrix(sensor.sensitivity_KS()),
@@ -56,7 +72,6 @@ std::array<double, 2> drag_free_weights(DragFreeSource source) {
 
 LoopConstants<double> make_loop_constants(const Instrument& instrument, const Scenario& scenario,
                                           const Session& session) {
-  const std::array<double, 2> factors = motion_factors(session);
   const std::array<double, 2> weights = drag_free_weights(session.drag_free);
   const Eigen::Vector3d bias_error(scenario.drag_free.bias_compensation_error_x_m_s2,
                                    scenario.drag_free.bias_compensation_error_y_m_s2,
@@ -67,13 +82,9 @@ LoopConstants<double> make_loop_constants(const Instrument& instrument, const Sc
     const Sensor& sensor = instrument.sensors[k];
     // r_1 = r_c − ½Δ, r_2 = r_c + ½Δ
     const double side = k == 0 ? -0.5 : 0.5;
-    Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-    if (factors[k] != 0.0) {
-      const auto axis = static_cast<Eigen::Index>(index(mass_excitation(session)->axis));
-      direction = factors[k] * sensor.alignment_KS().transpose().col(axis);
-    }
-    constants.sensors[k] = make_sensor_model(
-        sensor, instrument.centre_offset_S_m + side * instrument.offcentring_S_m, direction);
+    constants.sensors[k] =
+        make_sensor_model(sensor, instrument.centre_offset_S_m + side * instrument.offcentring_S_m,
+                          motion_directions_S(session, sensor, k));
     subtracted_bias += weights[k] * sensor.read_out_bias_K_m_s2;
   }
   constants.sensor_range_m_s2 = scenario.sensor.range_m_s2;

@@ -130,8 +130,8 @@ struct Loop {
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
-      const Vector3<T> kinematic_S =
-          kinematic_acceleration<masses>(sensor, satellite, shared.mass_motion);
+      const Vector3<T> kinematic_S = kinematic_acceleration<masses>(
+          sensor, satellite, shared.mass_motion, shared.second_motion);
       observation.kinematic_S_x[k] = kinematic_S.x;
       observation.measured_K[k] = measured_acceleration(sensor, kinematic_S) + noise.sensor_K[k];
     }

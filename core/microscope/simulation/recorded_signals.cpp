@@ -50,7 +50,7 @@ template <std::size_t k>
 Vector kinematic(const Sample& sample) {
   return kinematic_acceleration(sample.constants.sensors[k],
                                 sample.loop.motion(sample.constants, sample.shared, sample.noise),
-                                sample.shared.mass_motion);
+                                sample.shared.mass_motion, sample.shared.second_motion);
 }
 
 constexpr std::array measured_rows{
@@ -151,6 +151,8 @@ constexpr std::array excitation_rows{
               [](const Sample& s) { return s.shared.mass_motion.velocity_m_s; }},
     SignalRow{"mass_acceleration", m_s2, "", "its second derivative",
               [](const Sample& s) { return s.shared.mass_motion.acceleration_m_s2; }},
+    SignalRow{"second_mass_position", "m", "", "a second motion of the test masses",
+              [](const Sample& s) { return s.shared.second_motion.position_m; }},
 };
 
 std::span<const GroupRows> groups() {

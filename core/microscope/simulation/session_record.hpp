@@ -211,11 +211,14 @@ PROOFMASS_INLINE void add_further(const std::array<T, num_signals>& values,
         add_line<2>(values, square, T(1.0), at, num_outputs, sums.lines[i]);
         break;
       }
-      case LineSignals::moved: {
+      case LineSignals::moved:
+      case LineSignals::moved_again: {
         const auto element = [&](std::size_t s) {
           return values[s < 3 ? first_row + s : rest + s - 3];
         };
-        const T motion = T(0.5) * T(shared.mass_motion.position_m);
+        const auto& moved =
+            signals == LineSignals::moved ? shared.mass_motion : shared.second_motion;
+        const T motion = T(0.5) * T(moved.position_m);
         add_line<9>(values, element, motion, at, num_outputs, sums.lines[i]);
         break;
       }
@@ -329,10 +332,11 @@ template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
   if (!setup.line_readers.empty()) {
-    constexpr SampleKind kind{.monitoring = Monitoring::on, .lines = RecordedLines::further};
+    constexpr SampleKind kind{moving_twice, SignalSet::all, true, Monitoring::on,
+                              RecordedLines::further};
     constexpr SampleKind kind_at_rest{at_rest, SignalSet::all, true, kind.monitoring, kind.lines};
-    return setup.masses == moving ? advance_groups<kind, Signals, Group, Observer>
-                                  : advance_groups<kind_at_rest, Signals, Group, Observer>;
+    return setup.masses == at_rest ? advance_groups<kind_at_rest, Signals, Group, Observer>
+                                   : advance_groups<kind, Signals, Group, Observer>;
   }
   const Monitoring monitoring = setup.residual_reader != nullptr ? Monitoring::on : Monitoring::off;
   const std::size_t wanted =

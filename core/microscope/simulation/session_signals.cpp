@@ -92,6 +92,7 @@ void SessionSignals::excite(const SamplePhases& phases, SharedSample& sample) co
   // A sample may still hold the values of an earlier one. The first excitation of an axis replaces
   // them, a further one is added.
   std::array<bool, 3> is_turned{}, is_pushed{};
+  bool is_moved = false;
   const auto put = [](double& value, bool& is_set, double excitation) {
     value = is_set ? value + excitation : excitation;
     is_set = true;
@@ -110,8 +111,9 @@ void SessionSignals::excite(const SamplePhases& phases, SharedSample& sample) co
         break;
       case ExcitationKind::test_mass: {
         const double omega = 2.0 * std::numbers::pi * excitation.frequency_hz;
-        sample.mass_motion = {value, omega * excitation.amplitude * phase.cosine,
-                              -omega * omega * value};
+        (is_moved ? sample.second_motion : sample.mass_motion) = {
+            value, omega * excitation.amplitude * phase.cosine, -omega * omega * value};
+        is_moved = true;
         break;
       }
     }

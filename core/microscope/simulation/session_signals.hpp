@@ -35,7 +35,8 @@ struct SharedSampleOf {
   /// What the attitude command alone makes of the on-board estimate, which is linear: the ground
   /// takes it out again.
   AttitudeEstimator<T> commanded;
-  MassMotionPhaseOf<T> mass_motion;  ///< Of the moving test masses.
+  MassMotionPhaseOf<T> mass_motion;    ///< Of the moving test masses.
+  MassMotionPhaseOf<T> second_motion;  ///< Of the second of mass_excitations().
 };
 using SharedSample = SharedSampleOf<double>;
 

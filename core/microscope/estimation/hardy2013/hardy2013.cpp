@@ -239,6 +239,11 @@ RecordNeeds hardy2013_needs(const Session& session) {
 }
 
 void check_hardy2013(const std::vector<Session>& sessions) {
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    if (mass_excitations(sessions[i])[1] == nullptr) continue;
+    throw ConfigError(fmt::format("session[{}].excitations", i), "two that move test masses",
+                      "estimation.method = \"hardy2013\" takes one");
+  }
   for (const std::string_view name : names_of(SessionTarget{})) {
     if (name == target_info(SessionTarget::no_target).name) continue;
     const auto serves = [&](const Session& session) {

@@ -324,6 +324,35 @@ Estimation estimate_joint(const RunPhasors& records, const EstimationInput& inpu
   return result;
 }
 
+JointInformation::JointInformation(const RunPhasors& records, const EstimationInput& input,
+                                   const UnknownArray& unknowns) {
+  const JointFit fit(records, input);
+  for (const NormalEquations& session : fit.of_sessions(unknowns)) {
+    sessions_.emplace_back(session.matrix);
+  }
+  beside_ = fit.beside(unknowns).matrix;
+  for (std::size_t i = 0; i < num_parameters; ++i) units_[i] = fit.unit(i);
+}
+
+ParameterArray JointInformation::standard_errors(std::span<const double> factors) const {
+  PROOFMASS_EXPECT(factors.size() == sessions_.size());
+  NormalMatrix matrix = beside_;
+  for (std::size_t i = 0; i < factors.size(); ++i) matrix += factors[i] * sessions_[i];
+  // With the nuisances in front, the last rows of the factor are that of what the lines tell of the
+  // parameters while the nuisances are free.
+  constexpr auto num_wanted = static_cast<Eigen::Index>(num_parameters);
+  const NormalMatrix reversed = matrix.reverse();
+  const NormalMatrix factor = Eigen::LLT<NormalMatrix>(reversed).matrixL();
+  using Square = Eigen::Matrix<double, num_wanted, num_wanted>;
+  const Square last = factor.bottomRightCorner<num_wanted, num_wanted>();
+  const Square inverse = last.triangularView<Eigen::Lower>().solve(Square::Identity());
+  ParameterArray errors;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    errors[i] = units_[i] * inverse.col(num_wanted - 1 - static_cast<Eigen::Index>(i)).norm();
+  }
+  return errors;
+}
+
 namespace {
 
 /// factor·f of an excitation plus orbital·f_orb.
@@ -346,6 +375,21 @@ bool tells_of_squares(const Excitation& excitation) {
           excitation.motion != MassMotion::opposition);
 }
 
+/// Two that shake X make lines at sum and difference of their frequencies, of K2 times both: 1e-11
+/// m/s², which tell no more than the squares do, and leak.
+void add_products(const std::vector<Excitation>& excitations, RecordNeeds& needs) {
+  for (std::size_t i = 0; i < excitations.size(); ++i) {
+    for (std::size_t j = i + 1; j < excitations.size(); ++j) {
+      if (!tells_of_squares(excitations[i]) || !tells_of_squares(excitations[j])) continue;
+      for (const double sign : {1.0, -1.0}) {
+        LineMultiple product = multiple(i, 1.0, 0.0);
+        product.further[j - 1] = sign;
+        needs.neighbours.push_back(product);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 RecordNeeds joint_needs(const Session& session) {
@@ -360,10 +404,13 @@ RecordNeeds joint_needs(const Session& session) {
     if (!tells_of_squares(excitations[i])) continue;
     needs.lines.push_back({multiple(i, 2.0, 0.0), LineSignals::squares});
   }
+  const MassExcitations motions = mass_excitations(session);
   for (std::size_t i = 0; i < excitations.size(); ++i) {
     if (!moves_apart(excitations[i])) continue;
+    const bool is_first = &excitations[i] == motions[0];
     for (const double orbital : {2.0, -2.0}) {
-      needs.lines.push_back({multiple(i, 1.0, orbital), LineSignals::moved});
+      needs.lines.push_back(
+          {multiple(i, 1.0, orbital), is_first ? LineSignals::moved : LineSignals::moved_again});
     }
   }
   // Lines of which the model of another line has no term: they must not leak into it. A line that
@@ -374,7 +421,13 @@ RecordNeeds joint_needs(const Session& session) {
     for (const double orbital : {0.0, 2.0, -2.0}) {
       needs.neighbours.push_back(multiple(i, 1.0, orbital));
     }
+    // The signals of one motion do not tell what leaks from the other one.
+    if (motions[1] == nullptr) continue;
+    for (const double orbital : {1.0, -1.0, 3.0, -3.0}) {
+      needs.neighbours.push_back(multiple(i, 1.0, orbital));
+    }
   }
+  add_products(excitations, needs);
   return needs;
 }
 

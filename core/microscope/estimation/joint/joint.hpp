@@ -1,7 +1,10 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <span>
 #include <vector>
 
+#include "core/microscope/estimation/joint/joint_model.hpp"
 #include "core/microscope/estimation/methods.hpp"
 
 namespace proofmass {
@@ -14,6 +17,24 @@ namespace proofmass {
 /// (noise.scale 0) they are those of scale 1. Its diagnostic `last_move` is the largest move of an
 /// estimate in the last round, in standard errors.
 [[nodiscard]] Estimation estimate_joint(const RunPhasors& records, const EstimationInput& input);
+
+/// What the fit of a run tells of the unknowns.
+class JointInformation {
+ public:
+  /// Arguments as of estimate_joint().
+  /// @param unknowns  Of the instrument: the model is linearised about them.
+  JointInformation(const RunPhasors& records, const EstimationInput& input,
+                   const UnknownArray& unknowns);
+
+  /// Standard errors, SI, if the lines of each session told so many times as much: what they tell
+  /// is in proportion to the length of the record.
+  [[nodiscard]] ParameterArray standard_errors(std::span<const double> factors) const;
+
+ private:
+  std::vector<Eigen::MatrixXd> sessions_;  ///< Normal matrices, in `units_`.
+  Eigen::MatrixXd beside_;                 ///< Of priors, and of what no session's lines tell.
+  ParameterArray units_;                   ///< SI.
+};
 
 /// 2 f_orb, the line of each angular and each drag-free excitation, 2 f of what is shaken along X,
 /// and f ± 2 f_orb of masses that move in opposition along Y or Z.

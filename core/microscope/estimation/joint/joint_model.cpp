@@ -1,5 +1,6 @@
 #include "core/microscope/estimation/joint/joint_model.hpp"
 
+#include <algorithm>
 #include <numbers>
 #include <span>
 
@@ -96,11 +97,10 @@ Dual common_constant(DragFreeSource source, const Dual& a, const Dual& b, const 
   return Dual(0.0) - a * b - cross;
 }
 
-/// Direction e of the relative motion in S: a row of [θ_c].
-Vector motion_direction(const Session& session, const Unknowns& x) {
-  const Excitation* const excitation = mass_excitation(session);
-  if (excitation == nullptr || excitation->axis == Axis::x) return {1.0, 0.0, 0.0};
-  if (excitation->axis == Axis::y) {
+/// Direction e of a relative motion in S: a row of [θ_c].
+Vector motion_direction(const Excitation& excitation, const Unknowns& x) {
+  if (excitation.axis == Axis::x) return {1.0, 0.0, 0.0};
+  if (excitation.axis == Axis::y) {
     return {x[Unknown::coupling_z] - x[Parameter::a_c12], 1.0, x[Unknown::alignment_x]};
   }
   return {x[Unknown::coupling_y] - x[Parameter::a_c13], Dual(0.0) - x[Unknown::alignment_x], 1.0};
@@ -130,6 +130,28 @@ Dual constant_of(const std::array<double, num_line_bases>& means, const Unknowns
 }
 
 }  // namespace
+
+UnknownArray true_unknowns(const Instrument& instrument, double bias_compensation_error_x_m_s2) {
+  const ParameterArray parameters = true_parameters(instrument, bias_compensation_error_x_m_s2);
+  const auto& [one, two] = instrument.sensors;
+  const Eigen::Vector3d k1 = 0.5 * (one.scale_factor + two.scale_factor);
+  const Eigen::Vector3d p = 0.5 * (one.parasitic_K_m_s2 + two.parasitic_K_m_s2);
+  const Eigen::Vector3d b = -0.5 * (one.parasitic_K_m_s2 - two.parasitic_K_m_s2);
+  const Eigen::Vector3d k2d = 0.5 * (one.quadratic_s2_m - two.quadratic_s2_m);
+  UnknownArray unknowns{};
+  std::copy(parameters.begin(), parameters.end(), unknowns.begin());
+  const auto at = [&](Unknown unknown) -> double& { return unknowns[index(unknown)]; };
+  at(Unknown::motion_gain) = sensitivity_matrices(instrument).common(0, 0) - 1.0;
+  at(Unknown::coupling_z) = 0.5 * (one.coupling_rad.z() + two.coupling_rad.z());
+  at(Unknown::coupling_y) = 0.5 * (one.coupling_rad.y() + two.coupling_rad.y());
+  at(Unknown::alignment_x) = 0.5 * (one.misalignment_SK_rad.x() + two.misalignment_SK_rad.x());
+  at(Unknown::differential_bias) = k1.x() * b.x();
+  at(Unknown::parasitic_y) = k1.x() * p.y();
+  at(Unknown::parasitic_z) = k1.x() * p.z();
+  at(Unknown::scale_y) = 2.0 * k2d.y() * b.y() / k1.y();
+  at(Unknown::scale_z) = 2.0 * k2d.z() * b.z() / k1.z();
+  return unknowns;
+}
 
 Dual differential_constant(const std::array<double, num_line_bases>& means,
                            const UnknownArray& unknowns) {
@@ -168,7 +190,11 @@ LineCoefficients line_coefficients(const Session& session,
   for (Dual& component : half_offcentring) component = half * component;
   of.gradients = tilted_product({one + kappa, a_c12 / a_c11, a_c13 / a_c11}, half_offcentring, x);
   of.gradients[0] = of.gradients[0] + rectified_gradient(session, k2_1, k2_2);
-  of.moved = tilted_product({a_c11 + kappa, a_c12, a_c13}, motion_direction(session, x), x);
+  const MassExcitations motions = mass_excitations(session);
+  for (std::size_t i = 0; i < motions.size() && motions[i] != nullptr; ++i) {
+    of.moved[i] =
+        tilted_product({a_c11 + kappa, a_c12, a_c13}, motion_direction(*motions[i], x), x);
+  }
   return of;
 }
 
@@ -189,7 +215,8 @@ Prediction predict(const LineCoefficients& coefficients, LineSignals signals,
   add(signals == LineSignals::gradients ? gradients : gradients.first(3),
       index(Signal::gradient_xx));
   if (signals == LineSignals::squares) add(coefficients.squares, num_line_bases);
-  if (signals == LineSignals::moved) add(coefficients.moved, num_line_bases);
+  if (signals == LineSignals::moved) add(coefficients.moved[0], num_line_bases);
+  if (signals == LineSignals::moved_again) add(coefficients.moved[1], num_line_bases);
   return sum;
 }
 

@@ -4,6 +4,7 @@
 #include <complex>
 #include <cstddef>
 
+#include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
 
@@ -35,6 +36,10 @@ inline constexpr std::size_t num_unknowns = num_parameters + 12;
 /// One value for each unknown, SI.
 using UnknownArray = std::array<double, num_unknowns>;
 
+/// What the unknowns of an instrument are, but for the tilt of its star tracker, which is 0.
+[[nodiscard]] UnknownArray true_unknowns(const Instrument& instrument,
+                                         double bias_compensation_error_x_m_s2);
+
 /// A number with its derivatives by all unknowns: arithmetic on it yields the exact Jacobian.
 struct Dual {
   double value = 0.0;
@@ -49,7 +54,8 @@ struct LineCoefficients {
   std::array<Dual, 3> common;     ///< Of Γ_mes,c.
   std::array<Dual, 9> gradients;  ///< Of [T̂] − [În], row by row.
   std::array<Dual, 2> squares;    ///< Of the squares, about their means.
-  std::array<Dual, 9> moved;      ///< Of LineSignals::moved.
+  /// Of LineSignals::moved, and of moved_again.
+  std::array<std::array<Dual, 9>, num_mass_motions_max> moved;
 };
 
 /// The coefficients of a session.

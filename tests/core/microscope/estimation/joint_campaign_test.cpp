@@ -146,6 +146,8 @@ TEST(JointCampaign, HasTheBitsOfARunAloneInABatch) {
   campaign.seed = 42;
   campaign.scenario.simulation.settling_s = 100.0;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 2;
+  campaign.scenario.sessions[3].excitations.push_back(
+      {ExcitationKind::test_mass, Axis::z, 1e-5, 0.0091237, MassMotion::opposition});
   const RunPlan plan(campaign, joint_method);
   const Estimation alone = plan.estimation(plan.record(RunIndex{1}, {}));
   for (const InstructionSet set : available_instruction_sets()) {

@@ -152,6 +152,7 @@ const Matrix3<double> identity{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
 SensorModel<double> perfect_model() {
   return {.rest_position_S_m = zero,
           .motion_direction_S = zero,
+          .second_direction_S = zero,
           .parasitic_K_m_s2 = zero,
           .offset_K_m_s2 = zero,
           .sensitivity_KS = identity,
@@ -203,6 +204,21 @@ TEST(KinematicAcceleration, IncludesTheMotionOfTheMassAndItsCoriolisTerm) {
   EXPECT_DOUBLE_EQ(a.x, 8.0);
   EXPECT_DOUBLE_EQ(a.y, 2.0 * 0.5 * 4.0);
   EXPECT_DOUBLE_EQ(a.z, 0.0);
+}
+
+// Two motions at once are the sum of each alone.
+TEST(KinematicAcceleration, AddsASecondMotion) {
+  SensorModel<double> sensor = perfect_model();
+  sensor.motion_direction_S = {0.0, 1.0, 0.0};
+  sensor.second_direction_S = {0.0, 0.0, 1.0};
+  SatelliteMotion<double> satellite = at_rest();
+  satellite.omega_IS_S = {0.5, 0.0, 0.0};
+  const MassMotionPhase first{.position_m = 3.0, .velocity_m_s = 4.0, .acceleration_m_s2 = 8.0};
+  const MassMotionPhase second{.position_m = 5.0, .velocity_m_s = 6.0, .acceleration_m_s2 = 7.0};
+  const Vector3<double> a = kinematic_acceleration(sensor, satellite, first, second);
+  EXPECT_DOUBLE_EQ(a.x, 0.0);
+  EXPECT_DOUBLE_EQ(a.y, (1e-6 - 0.25) * 3.0 - 2.0 * 0.5 * 6.0 + 8.0);
+  EXPECT_DOUBLE_EQ(a.z, (1e-6 - 0.25) * 5.0 + 2.0 * 0.5 * 4.0 + 7.0);
 }
 
 TEST(KinematicAcceleration, FollowsTheSatelliteAsAWhole) {

@@ -256,10 +256,27 @@ TEST(ValidateSessions, RefusesFurtherExcitationsThatAreWrong) {
             "a multiple of)");
   EXPECT_EQ(after([](Session& s) { s.known_lines[4].further[0] = 1001.0; }),
             "session[6].known_lines[4] = [2, [0, 1001, 1]] (must be multiples from -1000 to 1000)");
+}
+
+TEST(ValidateSessions, AcceptsMassesThatMoveAlongTwoAxesAtOnce) {
+  const auto with = [](const Excitation& further, std::size_t session = at_a_c12) {
+    return refusal_after([&](Sessions& s) { s[session].excitations.push_back(further); });
+  };
+  EXPECT_EQ(with({ExcitationKind::test_mass, Axis::z, 1e-6, 5e-3}), "");
+  const std::string rule =
+      "excitations[1].kind = test_mass (a second one that moves test masses needs both in "
+      "opposition, along y and along z)";
+  EXPECT_EQ(with({ExcitationKind::test_mass, Axis::y, 1e-6, 5e-3}), "session[3]." + rule);
+  EXPECT_EQ(with({ExcitationKind::test_mass, Axis::x, 1e-6, 5e-3}), "session[3]." + rule);
+  EXPECT_EQ(with({ExcitationKind::test_mass, Axis::z, 1e-6, 5e-3, MassMotion::mass_1}),
+            "session[3]." + rule);
+  EXPECT_EQ(with({ExcitationKind::test_mass, Axis::z, 1e-6, 5e-3}, 9), "session[9]." + rule);
   EXPECT_EQ(refusal_after([](Sessions& s) {
-              s[at_a_c12].excitations.push_back({ExcitationKind::test_mass, Axis::z, 1e-6, 5e-3});
+              const Excitation z{ExcitationKind::test_mass, Axis::z, 1e-6, 5e-3};
+              s[at_a_c12].excitations.insert(s[at_a_c12].excitations.end(), {z, z});
             }),
-            "session[3].excitations[1].kind = test_mass (one excitation may move test masses)");
+            "session[3].excitations[2].kind = test_mass (a second one that moves test masses needs "
+            "both in opposition, along y and along z)");
 }
 
 TEST(ValidateSessions, LetsASessionWithoutTargetShakeWhatItLikes) {

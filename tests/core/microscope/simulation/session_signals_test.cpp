@@ -124,22 +124,34 @@ TEST(SessionSignals, ExciteTheDragFreeLoopInPhaseWithTheRecord) {
   }
 }
 
-// Several excitations: sines of one axis add up, and each channel has its own.
+TEST(SessionSignals, AddUpExcitationsOfOneAxis) {
+  Fixture fixture;
+  fixture.session.excitations = {{ExcitationKind::drag_free, Axis::y, 2e-8, 1.2e-3},
+                                 {ExcitationKind::drag_free, Axis::y, 1e-8, 3.1e-3}};
+  for (const auto& [time_s, sample] : all_samples(fixture)) {
+    ASSERT_NEAR(
+        sample.drag_free_command_S_m_s2.y,
+        2e-8 * std::sin(two_pi * 1.2e-3 * time_s) + 1e-8 * std::sin(two_pi * 3.1e-3 * time_s),
+        3e-8 * 1e-12);
+  }
+}
+
+// Each channel has its own, and so has a second motion of the masses.
 TEST(SessionSignals, ExciteAllThatTheSessionShakes) {
   Fixture fixture;
   fixture.session.excitations = {
       {ExcitationKind::test_mass, Axis::y, 1e-5, 9.88e-3},
       {ExcitationKind::drag_free, Axis::y, 2e-8, 1.2e-3},
       {ExcitationKind::attitude, Axis::z, 3.5e-3, 1e-3},
-      {ExcitationKind::drag_free, Axis::y, 1e-8, 3.1e-3},
+      {ExcitationKind::test_mass, Axis::z, 2e-5, 3.1e-3},
   };
   const auto sine = [](double amplitude, double frequency_hz, double time_s) {
     return amplitude * std::sin(two_pi * frequency_hz * time_s);
   };
   for (const auto& [time_s, sample] : all_samples(fixture)) {
-    ASSERT_NEAR(sample.drag_free_command_S_m_s2.y,
-                sine(2e-8, 1.2e-3, time_s) + sine(1e-8, 3.1e-3, time_s), 3e-8 * 1e-12);
+    ASSERT_NEAR(sample.drag_free_command_S_m_s2.y, sine(2e-8, 1.2e-3, time_s), 2e-8 * 1e-12);
     ASSERT_EQ(sample.drag_free_command_S_m_s2.x, 0.0);
+    ASSERT_NEAR(sample.second_motion.position_m, sine(2e-5, 3.1e-3, time_s), 2e-5 * 1e-12);
     ASSERT_NEAR(sample.attitude_command_S_rad.z, sine(3.5e-3, 1e-3, time_s), 3.5e-3 * 1e-12);
     ASSERT_NEAR(sample.mass_motion.position_m, sine(1e-5, 9.88e-3, time_s), 1e-5 * 1e-12);
   }
