@@ -51,6 +51,7 @@ void MicroscopeCampaign::validate_without_columns() const {
   scenario.validate();
   check_environment(*this);
   for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
+  check_relations(dispersions);
 }
 
 Interpretation MicroscopeCampaign::interpretation() const {

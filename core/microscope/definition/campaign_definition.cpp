@@ -82,6 +82,7 @@ class MagnitudeCheck {
     check("mean", law.mean);
     check("standard_deviation", law.standard_deviation);
     check("value", law.value);
+    for (const double value : law.values) check("values", value);
   }
 
   /// @param column  The values of the quantity's table, one a run.
