@@ -165,6 +165,12 @@ std::vector<Entry> scenario_entries(const MicroscopeCampaign& campaign) {
                   "All randomness follows from it."),
       whole_entry("campaign.runs", static_cast<std::int64_t>(campaign.num_runs), "May grow later."),
   };
+  // Left out where it is 1, so that the text of a campaign remains the one that it was stored with.
+  if (campaign.realisations != 1) {
+    entries.push_back(whole_entry("campaign.realisations",
+                                  static_cast<std::int64_t>(campaign.realisations),
+                                  "Runs that share one instrument and differ in their noise."));
+  }
   if (!campaign.environment_file.empty()) {
     entries.push_back(text_entry("environment.file", campaign.environment_file,
                                  "External accelerations, relative to this file."));

@@ -311,6 +311,10 @@ MicroscopeCampaign read_definition(Document& document) {
   auto num_runs = static_cast<std::int64_t>(campaign.num_runs);
   document.read("campaign.seed", seed, range::not_negative);
   document.read("campaign.runs", num_runs, range::between(1, static_cast<double>(num_runs_max)));
+  std::int64_t realisations = 1;
+  document.read("campaign.realisations", realisations,
+                range::between(1, static_cast<double>(realisations_max)));
+  campaign.realisations = static_cast<std::uint64_t>(realisations);
   campaign.seed = static_cast<std::uint64_t>(seed);
   campaign.num_runs = static_cast<std::uint64_t>(num_runs);
   document.read("environment.file", campaign.environment_file);

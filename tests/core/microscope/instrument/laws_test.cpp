@@ -245,5 +245,33 @@ TEST(TruncatedLaw, RefusesWhatADoubleCannotHold) {
             path + "standard_deviation = 1 (must be <= 1e+06 (maximum - minimum), 0.5)");
 }
 
+// Runs of one instrument share its draws; those of today are the same.
+TEST(Realisations, ShareTheDrawsOfTheirInstrument) {
+  MicroscopeCampaign plain;
+  plain.num_runs = 12;
+  MicroscopeCampaign campaign = plain;
+  campaign.realisations = 4;
+  for (std::uint64_t run = 0; run < 12; ++run) {
+    const RunDraw of_run = campaign.draw(RunIndex{run}), expected = plain.draw(RunIndex{run / 4});
+    EXPECT_EQ(of_run.values, expected.values);
+    EXPECT_EQ(of_run.truth, expected.truth);
+    EXPECT_EQ(of_run.num_draws, expected.num_draws);
+  }
+  EXPECT_NE(campaign.draw(RunIndex{3}).values, campaign.draw(RunIndex{4}).values);
+}
+
+TEST(Realisations, AreANumber) {
+  MicroscopeCampaign campaign;
+  campaign.realisations = 0;
+  EXPECT_THROW(campaign.validate(), ConfigError);
+  campaign.realisations = realisations_max + 1;
+  try {
+    campaign.validate();
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_STREQ(error.what(), "campaign.realisations = 4097 (must be in [1, 4096])");
+  }
+}
+
 }  // namespace
 }  // namespace proofmass
