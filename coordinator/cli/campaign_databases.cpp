@@ -17,6 +17,7 @@
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
@@ -64,7 +65,8 @@ void extend_same(Store& store, const Campaign& wanted, const std::filesystem::pa
 namespace {
 
 void check_plan(const Campaign& wanted, const StopPlan& plan) {
-  if (plan.stop_rule.empty() || wanted.table_columns.empty()) return;
+  if (plan.stop_rule.empty()) return;
+  if (wanted.table_columns.empty()) return require_independent(wanted, "until", plan.stop_rule);
   throw UsageError(
       fmt::format("until = {} (must not be with quantities whose law is a table)", plan.stop_rule));
 }

@@ -150,6 +150,10 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors;
+  std::optional<RunningInstruments> instruments;
+  if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
+    instruments.emplace(objectives, realisations);
+  }
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
@@ -160,6 +164,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       require_in_range(result, model().results());
       statistics.add(result);
       standard_errors.add(result);
+      if (instruments) instruments->add(result);
       kept.add(result);
       if (budget && result.is_completed()) {
         add_total(result.run, budget->of_run(result).total, totals, results.totals);
@@ -172,6 +177,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
     results.digests = digest.finish();
     results.statistics = statistics.statistics();
     results.standard_errors = standard_errors.statistics();
+    if (instruments) results.instruments = instruments->statistics();
     for (std::size_t i = 0; i < objectives.size() && results.statistics.num_estimated > 0; ++i) {
       std::vector<double> errors = kept.take(store, i);
       complete(results.statistics.accuracy[i], errors);

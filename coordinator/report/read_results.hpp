@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
+#include "coordinator/report/instruments.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
@@ -70,6 +71,7 @@ struct ReadResults {
   std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
   CampaignWarnings warnings;
   StandardErrorStatistics standard_errors;
+  std::optional<InstrumentStatistics> instruments = {};  ///< With several realisations for each.
 };
 
 /// Sees what read_results() reads.

@@ -19,10 +19,12 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
                                                       statistics, results.digests.results, check)) +
                      given_up_text(given_up, paint) +
                      wire::visible_lines(warnings_text(results.warnings) + stop_text(store));
+  const InstrumentStatistics instruments = results.instruments.value_or(InstrumentStatistics{});
   for (const Table& table :
        {accuracy_table(campaign.objectives(), statistics), interval_table(statistics, num_given_up),
         error_table(statistics, num_given_up, campaign.interpretation()),
-        standard_error_table(results.standard_errors),
+        standard_error_table(results.standard_errors), variance_table(instruments),
+        instrument_table(instruments),
         budget_table(campaign.error_budget(), statistics, results.totals)}) {
     if (!table.rows.empty()) text += "\n" + terminal_text(table, {.paint = paint});
   }

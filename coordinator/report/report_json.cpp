@@ -228,6 +228,9 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"budget", budget_of(campaign, checked.results)},
             {"requirements", Json::array()},
             {"matrix", Json::array()}};
+  if (const auto& instruments = checked.results.instruments) {
+    json["instruments"] = json_of(*instruments);
+  }
   json["why_not_independent"] = why_not_independent(campaign);
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
   for (const RequirementAnswer& row : matrix.answers()) {

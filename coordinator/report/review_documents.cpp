@@ -114,6 +114,12 @@ std::string standard_errors_markup(const Review& review) {
   return pulls ? flow(table_part(standard_error_table(statistics)) + figure_of(*pulls)) : "";
 }
 
+std::string instruments_markup(const Review& review) {
+  if (!review.results.instruments) return "";
+  return table_part(variance_table(*review.results.instruments)) +
+         table_part(instrument_table(*review.results.instruments));
+}
+
 std::string budget_markup(const Review& review) {
   const std::optional<BarChart> chart = budget_chart(review);
   if (!chart) return "";
@@ -170,6 +176,7 @@ std::vector<Section> sections_of(const Review& review) {
                table_part(interval_table(statistics, review.num_given_up)) +
                table_part(error_table(statistics, review.num_given_up, review.interpretation))},
           {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
+          {"instruments-section", "Instruments", instruments_markup(review)},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
@@ -275,6 +282,8 @@ std::string section(std::string_view title, std::initializer_list<Table> tables)
 
 std::string review_markdown(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
+  const InstrumentStatistics instruments =
+      review.results.instruments.value_or(InstrumentStatistics{});
   std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.identity.name));
   for (const auto& [sentence, source] : review_summary(review)) {
     text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
@@ -286,6 +295,7 @@ std::string review_markdown(const Review& review) {
                            interval_table(statistics, review.num_given_up),
                            error_table(statistics, review.num_given_up, review.interpretation)}) +
       section("Standard errors", {standard_error_table(review.results.standard_errors)}) +
+      section("Instruments", {variance_table(instruments), instrument_table(instruments)}) +
       section("Budget", {review_budget_table(review)}) +
       section("Causes of the errors", {cause_table(review)}) +
       section("How it was run",

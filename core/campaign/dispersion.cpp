@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -13,8 +14,9 @@
 namespace proofmass {
 
 std::span<const std::string_view> names_of(Law) {
-  static constexpr std::array<std::string_view, 5> names{"uniform", "normal", "truncated_normal",
-                                                         "fixed", "table"};
+  static constexpr std::array<std::string_view, 9> names{"uniform",   "normal",  "truncated_normal",
+                                                         "fixed",     "table",   "discrete",
+                                                         "truncated", "derived", "correlated"};
   return names;
 }
 
@@ -43,6 +45,14 @@ class DispersionCheck {
         return;
       case Law::table:
         return check_source();
+      case Law::discrete:
+        return check_choices();
+      case Law::truncated:
+        return check_bounds();
+      case Law::derived:
+        return check_expression();
+      case Law::correlated:
+        return check_correlations();
     }
     refuse("law", fmt::format("{}", static_cast<int>(dispersion_.law)), "unknown law");
   }
@@ -87,6 +97,66 @@ class DispersionCheck {
     }
   }
 
+  // The inverse of the distribution function reaches as far as a double holds probabilities.
+  void check_bounds() const {
+    constexpr double deviations_max = 30.0, slimness_max = 1e6;
+    check_spread();
+    check_interval();
+    const double nearest =
+        std::fmax(dispersion_.minimum - dispersion_.mean, dispersion_.mean - dispersion_.maximum);
+    if (nearest > deviations_max * dispersion_.standard_deviation) {
+      refuse("mean", fmt::format("{}", dispersion_.mean),
+             fmt::format("must be at most {} standard deviations beyond [{}, {}]", deviations_max,
+                         dispersion_.minimum, dispersion_.maximum));
+    }
+    const double widest = slimness_max * (dispersion_.maximum - dispersion_.minimum);
+    if (dispersion_.standard_deviation > widest) {
+      refuse("standard_deviation", fmt::format("{}", dispersion_.standard_deviation),
+             fmt::format("must be <= {:g} (maximum - minimum), {}", slimness_max, widest));
+    }
+  }
+
+  void check_choices() const {
+    check_list("values", dispersion_.values);
+    check_list("probabilities", dispersion_.probabilities);
+    const std::size_t num_values = dispersion_.values.size();
+    if (dispersion_.probabilities.size() != num_values) {
+      refuse("probabilities", fmt::format("{} of them", dispersion_.probabilities.size()),
+             fmt::format("must be {}, one for each value", num_values));
+    }
+    double sum = 0.0;
+    for (const double probability : dispersion_.probabilities) {
+      if (probability < 0.0)
+        refuse("probabilities", fmt::format("{}", probability), "must be >= 0");
+      sum += probability;
+    }
+    if (std::abs(sum - 1.0) > 1e-9) {
+      refuse("probabilities", fmt::format("{} together", sum), "must be 1, to 1e-9");
+    }
+  }
+
+  void check_list(std::string_view key, const std::vector<double>& list) const {
+    if (list.empty() || list.size() > law_list_size_max) {
+      refuse(key, fmt::format("{} of them", list.size()),
+             fmt::format("must be 1 to {}", law_list_size_max));
+    }
+    for (const double value : list) check_finite(key, value);
+  }
+
+  void check_expression() const {
+    if (dispersion_.expression.size() <= expression_size_max) return;
+    refuse("expression", fmt::format("{} bytes", dispersion_.expression.size()),
+           fmt::format("must be at most {}", expression_size_max));
+  }
+
+  void check_correlations() const {
+    check_spread();
+    check_list("correlations", dispersion_.correlations);
+    if (dispersion_.correlations.size() == dispersion_.with.size()) return;
+    refuse("correlations", fmt::format("{} of them", dispersion_.correlations.size()),
+           fmt::format("must be {}, one for each quantity of `with`", dispersion_.with.size()));
+  }
+
   void check_source() const {
     if (dispersion_.file.empty()) refuse("file", "\"\"", "must name a file");
     if (dispersion_.column.empty()) refuse("column", "\"\"", "must name a column");
@@ -126,25 +196,78 @@ double draw_truncated(const Dispersion& law, const RandomStream& stream,
   return std::fmin(std::fmax(law.mean, law.minimum), law.maximum);
 }
 
+/// Φ(x) for x ≤ 0, by bisection of its inverse over all doubles: with the bits that the inverse
+/// has.
+double normal_below(double x) {
+  auto low = std::bit_cast<std::uint64_t>(1e-300);
+  auto high = std::bit_cast<std::uint64_t>(0.5);
+  if (x < inverse_normal(1e-300)) return 0.0;
+  while (high - low > 1) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    (inverse_normal(std::bit_cast<double>(middle)) < x ? low : high) = middle;
+  }
+  return std::bit_cast<double>(high);
+}
+
+/// A normal law on [minimum, maximum] by the inverse of its distribution function. It is computed
+/// in the lower half, where small probabilities have all their digits.
+double draw_within_bounds(const Dispersion& law, double uniform) {
+  double from = (law.minimum - law.mean) / law.standard_deviation;
+  double to = (law.maximum - law.mean) / law.standard_deviation;
+  const bool is_mirrored = from > 0.0;
+  if (is_mirrored) {
+    from = -std::exchange(to, -from);
+    uniform = 1.0 - uniform;
+  }
+  const double below = normal_below(from);
+  const double within = (to > 0.0 ? 1.0 - normal_below(-to) : normal_below(to)) - below;
+  const double deviate = inverse_normal(std::fmin(below + uniform * within, 1.0 - 0x1p-53));
+  const double value = law.mean + law.standard_deviation * (is_mirrored ? -deviate : deviate);
+  return std::fmin(std::fmax(value, law.minimum), law.maximum);
+}
+
+double chosen_value(const Dispersion& law, double uniform) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i + 1 < law.values.size(); ++i) {
+    sum += law.probabilities[i];
+    if (uniform < sum) return law.values[i];
+  }
+  return law.values.back();
+}
+
+RandomStream stream_of(std::string_view name, std::uint64_t seed, RunIndex run) {
+  return {seed, run, stream_id(fmt::format("draw/{}", name))};
+}
+
 }  // namespace
+
+double draw_deviate(std::string_view name, std::uint64_t seed, RunIndex run, std::uint32_t draw) {
+  return inverse_normal(uniform(stream_of(name, seed, run).block(draw * blocks_per_draw)));
+}
 
 double draw_value(const Dispersion& dispersion, std::string_view name, std::uint64_t seed,
                   RunIndex run, std::uint32_t draw, double table_value) {
-  const RandomStream stream(seed, run, stream_id(fmt::format("draw/{}", name)));
+  const RandomStream stream = stream_of(name, seed, run);
   const std::uint32_t block = draw * blocks_per_draw;
   switch (dispersion.law) {
     case Law::uniform:
       return dispersion.minimum +
              (dispersion.maximum - dispersion.minimum) * uniform(stream.block(block));
     case Law::normal:
-      return dispersion.mean +
-             dispersion.standard_deviation * inverse_normal(uniform(stream.block(block)));
+      return dispersion.mean + dispersion.standard_deviation * draw_deviate(name, seed, run, draw);
     case Law::truncated_normal:
       return draw_truncated(dispersion, stream, block);
     case Law::fixed:
       return dispersion.value;
     case Law::table:
       return table_value;
+    case Law::discrete:
+      return chosen_value(dispersion, uniform(stream.block(block)));
+    case Law::truncated:
+      return draw_within_bounds(dispersion, uniform(stream.block(block)));
+    case Law::derived:
+    case Law::correlated:
+      break;
   }
   PROOFMASS_EXPECT(false);
   return 0.0;

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/runs.hpp"
 
@@ -16,12 +18,22 @@ enum class Law : std::uint8_t {
   truncated_normal = 3,  ///< mean, standard_deviation, on [minimum, maximum].
   fixed = 4,             ///< value.
   table = 5,             ///< One value a run, from a column of a file.
+  discrete = 6,          ///< One of values, with probabilities.
+  truncated = 7,         ///< As truncated_normal, from one deviate, and with the mean anywhere.
+  derived = 8,           ///< expression, of other drawn quantities.
+  correlated = 9,        ///< mean, standard_deviation, and correlations with other normal laws.
 };
 
 [[nodiscard]] std::span<const std::string_view> names_of(Law);
 
 /// Most bytes of the name of a data file or of a column.
 inline constexpr std::size_t data_name_size_max = 1024;
+
+/// Most entries of a list that belongs to a law.
+inline constexpr std::size_t law_list_size_max = 64;
+
+/// Most bytes of an expression.
+inline constexpr std::size_t expression_size_max = 1024;
 
 /// The law of one drawn quantity; only the fields of its law mean something, the others are 0.
 struct Dispersion {
@@ -35,6 +47,11 @@ struct Dispersion {
   std::string column;  ///< For `table`: heading of the column.
   /// For `table`: the values are independent draws of one law, and not those of a design.
   bool is_independent = false;
+  std::vector<double> values = {};         ///< For `discrete`; so is the next one.
+  std::vector<double> probabilities = {};  ///< Of `values`; their sum is 1.
+  std::string expression = {};             ///< For `derived`, see evaluate_expression().
+  std::vector<std::string> with = {};      ///< For `correlated`: other quantities.
+  std::vector<double> correlations = {};   ///< For `correlated`: with each of `with`.
 
   bool operator==(const Dispersion&) const = default;
 
@@ -47,8 +64,13 @@ struct Dispersion {
 ///
 /// @param name         Of the quantity; that of its random stream, so it must never change.
 /// @param table_value  Its value in this run, for the law `table`.
+/// @pre The law needs no other quantity: it is neither `derived` nor `correlated`.
 [[nodiscard]] double draw_value(const Dispersion& dispersion, std::string_view name,
                                 std::uint64_t seed, RunIndex run, std::uint32_t draw,
                                 double table_value);
+
+/// The standard normal deviate that a quantity with the law `normal` or `correlated` follows.
+[[nodiscard]] double draw_deviate(std::string_view name, std::uint64_t seed, RunIndex run,
+                                  std::uint32_t draw);
 
 }  // namespace proofmass

@@ -12,7 +12,18 @@
 
 namespace proofmass {
 
+std::uint64_t num_realisations(const Campaign& campaign) {
+  for (const DefinitionItem& item : campaign.items()) {
+    if (item.key != "campaign.realisations") continue;
+    return static_cast<std::uint64_t>(std::get<std::int64_t>(item.value));
+  }
+  return 1;
+}
+
 std::string why_not_independent(const Campaign& campaign) {
+  if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
+    return fmt::format("{} runs each share one draw (campaign.realisations)", realisations);
+  }
   constexpr std::string_view law_key = ".law";
   const std::vector<DefinitionItem> items = campaign.items();
   for (const DefinitionItem& item : items) {

@@ -55,10 +55,9 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
   const AcceptedDraw accepted = draw_instrument(*this, run, of_table);
   RunDraw draw{.num_draws = accepted.num_draws};
   if (!accepted.instrument) return draw;
-  const DrawnValues values = draw_values(dispersions, seed, run, accepted.num_draws - 1, of_table);
   const ParameterArray truth =
       true_parameters(*accepted.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
-  draw.values.assign(values.begin(), values.end());
+  draw.values.assign(accepted.values.begin(), accepted.values.end());
   draw.truth.assign(truth.begin(), truth.end());
   return draw;
 }

@@ -47,6 +47,11 @@ double chi_square_above(double x, double degrees) {
   return boost::math::gamma_q(0.5 * degrees, 0.5 * x);
 }
 
+double chi_square_quantile(double probability, double degrees) {
+  PROOFMASS_EXPECT(probability > 0.0 && probability < 1.0);
+  return 2.0 * boost::math::gamma_p_inv(0.5 * degrees, probability);
+}
+
 double binomial_at_most(double k, double n, double probability) {
   if (k < 0.0) return 0.0;
   if (k >= n) return 1.0;

@@ -32,6 +32,9 @@ namespace proofmass {
 /// P(X > x), with full precision where that is small.
 [[nodiscard]] double chi_square_above(double x, double degrees);
 
+/// x with P(X ≤ x) = probability in (0, 1).
+[[nodiscard]] double chi_square_quantile(double probability, double degrees);
+
 /// P(X ≤ k) of X ~ Bin(n, probability), 0 < probability < 1. Counts may be fractions: the
 /// incomplete beta function then interpolates.
 [[nodiscard]] double binomial_at_most(double k, double n, double probability);

@@ -21,15 +21,25 @@ bool is_line(double multiple, double of_line) { return std::abs(multiple - of_li
 
 // The largest value of a law, but for one draw in 370 of a normal one; that of a table is in its
 // column.
-double size_of(const Dispersion& law) {
+double size_of(const DispersionSet& dispersions, std::size_t quantity) {
+  const Dispersion& law = dispersions[quantity];
   switch (law.law) {
     case Law::uniform:
+    case Law::truncated:
     case Law::truncated_normal:
       return std::max(std::abs(law.minimum), std::abs(law.maximum));
     case Law::normal:
+    case Law::correlated:
       return std::abs(law.mean) + 3.0 * law.standard_deviation;
     case Law::fixed:
       return std::abs(law.value);
+    case Law::discrete:
+      return std::abs(
+          *std::ranges::max_element(law.values, {}, [](double value) { return std::abs(value); }));
+    case Law::derived: {
+      const LawMoments moments = sampled_moments(dispersions, quantity);
+      return std::abs(moments.mean) + 3.0 * moments.standard_deviation;
+    }
     case Law::table:
       break;
   }
@@ -40,7 +50,7 @@ double size_of(const Dispersion& law) {
 class Sizes {
  public:
   Sizes(const DispersionSet& dispersions, const std::vector<std::vector<double>>& table_columns) {
-    std::ranges::transform(dispersions, sizes_.begin(), size_of);
+    for (std::size_t i = 0; i < num_drawn; ++i) sizes_[i] = size_of(dispersions, i);
     const std::vector<std::size_t> of_table = table_elements(dispersions);
     for (std::size_t i = 0; i < std::min(of_table.size(), table_columns.size()); ++i) {
       for (const double value : table_columns[i]) {

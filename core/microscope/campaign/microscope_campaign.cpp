@@ -48,9 +48,14 @@ void MicroscopeCampaign::validate() const {
 
 void MicroscopeCampaign::validate_without_columns() const {
   check_identity(*this);
+  if (realisations < 1 || realisations > realisations_max) {
+    throw ConfigError("campaign.realisations", fmt::format("{}", realisations),
+                      fmt::format("must be in [1, {}]", realisations_max));
+  }
   scenario.validate();
   check_environment(*this);
   for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
+  check_relations(dispersions);
 }
 
 Interpretation MicroscopeCampaign::interpretation() const {
@@ -71,10 +76,12 @@ MicroscopeCampaign hardy2013_campaign() {
 
 AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
                              std::span<const double> table_values) {
+  const RunIndex of_instrument{run.value / campaign.realisations};
   AcceptedDraw draw;
   while (draw.num_draws < num_draws_max) {
-    const Instrument instrument = make_instrument(
-        draw_values(campaign.dispersions, campaign.seed, run, draw.num_draws, table_values));
+    draw.values = draw_values(campaign.dispersions, campaign.seed, of_instrument, draw.num_draws,
+                              table_values);
+    const Instrument instrument = make_instrument(draw.values);
     ++draw.num_draws;
     if (is_accepted(instrument, campaign.scenario.acceptance)) {
       draw.instrument = instrument;

@@ -21,6 +21,9 @@ class MicroscopeCampaign final : public Campaign {
  public:
   MicroscopeCampaign() { name = "hardy2013"; }
 
+  /// Runs that share one drawn instrument and differ in their noise: those from i·realisations on
+  /// have the draws of instrument i.
+  std::uint64_t realisations = 1;
   Scenario scenario;
   DispersionSet dispersions = nominal_dispersions();
   std::string environment_file;        ///< As written in the campaign file; empty if harmonic.
@@ -46,6 +49,9 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] Warner warner() const override;
 };
 
+/// Most realisations of the noise for one instrument.
+inline constexpr std::uint64_t realisations_max = 4096;
+
 /// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
 [[nodiscard]] MicroscopeCampaign hardy2013_campaign();
 
@@ -53,10 +59,11 @@ class MicroscopeCampaign final : public Campaign {
 struct AcceptedDraw {
   std::optional<Instrument> instrument;  ///< Empty if all num_draws_max were rejected.
   std::uint32_t num_draws = 0;           ///< At most num_draws_max.
+  DrawnValues values{};                  ///< Of the instrument; of the last one rejected without.
 };
 
-/// Draws the run's instrument, again as a whole until it is accepted. A pure function of the
-/// campaign and the arguments.
+/// Draws the instrument that the run has, again as a whole until it is accepted. A pure function of
+/// the campaign and the arguments. It is the only place where runs become instruments.
 /// @param table_values  campaign.table_values(run).
 [[nodiscard]] AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
                                            std::span<const double> table_values);

@@ -42,12 +42,24 @@ void read_environment(MicroscopeCampaign& campaign, DataFiles& files) {
                                                  campaign.scenario.orbit.period_s);
 }
 
+/// A row of a file is the value of one instrument, and a column has one for each run.
+std::vector<double> of_each_run(std::vector<double> rows, const MicroscopeCampaign& campaign) {
+  if (campaign.realisations == 1) return rows;
+  const std::uint64_t num_covered = rows.size() * campaign.realisations;
+  std::vector<double> column(std::min(num_covered, campaign.num_runs));
+  for (std::size_t run = 0; run < column.size(); ++run)
+    column[run] = rows[run / campaign.realisations];
+  return column;
+}
+
 void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
   for (const std::size_t element : campaign.table_quantities()) {
     const Dispersion& dispersion = campaign.dispersions[element];
     const std::string path = fmt::format("dispersion.{}.file", drawn_names()[element]);
-    campaign.table_columns.push_back(parse_column(
-        files.text_of(dispersion.file, path), files.name_of(dispersion.file), dispersion.column));
+    campaign.table_columns.push_back(
+        of_each_run(parse_column(files.text_of(dispersion.file, path),
+                                 files.name_of(dispersion.file), dispersion.column),
+                    campaign));
   }
 }
 
@@ -82,6 +94,7 @@ class MagnitudeCheck {
     check("mean", law.mean);
     check("standard_deviation", law.standard_deviation);
     check("value", law.value);
+    for (const double value : law.values) check("values", value);
   }
 
   /// @param column  The values of the quantity's table, one a run.
@@ -121,7 +134,12 @@ void check_independence(const MicroscopeCampaign& campaign) {
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     const Dispersion& law = campaign.dispersions[drawn[i]];
     if (!law.is_independent) continue;
-    const IndependencePValues p_values = independence_p_values(campaign.table_columns[i]);
+    std::vector<double> rows;
+    for (std::size_t run = 0; run < campaign.table_columns[i].size();
+         run += campaign.realisations) {
+      rows.push_back(campaign.table_columns[i][run]);
+    }
+    const IndependencePValues p_values = independence_p_values(rows);
     const bool is_serial = p_values.serial < independence_p_value_min;
     if (!is_serial && p_values.regular >= independence_p_value_min) continue;
     throw ConfigError(

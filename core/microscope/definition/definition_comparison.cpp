@@ -21,6 +21,10 @@ class Comparison {
       : first_(first), second_(second) {}
 
   std::vector<DefinitionDifference> run() {
+    if (first_.realisations != second_.realisations) {
+      differ("realisations", fmt::format("{}", first_.realisations),
+             fmt::format("{}", second_.realisations));
+    }
     compare_entries("", fields_of(first_), fields_of(second_));
     compare_sessions();
     compare_environment();
@@ -38,7 +42,8 @@ class Comparison {
   static std::vector<Entry> fields_of(const MicroscopeCampaign& campaign) {
     std::vector<Entry> entries = detail::scenario_entries(campaign);
     std::erase_if(entries, [](const Entry& entry) {
-      return entry.path == "campaign.runs" || entry.path == "environment.file";
+      return entry.path == "campaign.runs" || entry.path == "campaign.realisations" ||
+             entry.path == "environment.file";
     });
     for (Entry& entry : entries) {
       constexpr std::string_view table = "campaign.";

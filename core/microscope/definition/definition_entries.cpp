@@ -21,17 +21,28 @@ std::span<const std::string_view> keys_of(Law law) {
                                                              "minimum", "maximum"};
   static constexpr std::array<std::string_view, 1> constant{"value"};
   static constexpr std::array<std::string_view, 2> source{"file", "column"};
+  static constexpr std::array<std::string_view, 2> choices{"values", "probabilities"};
+  static constexpr std::array<std::string_view, 1> function{"expression"};
+  static constexpr std::array<std::string_view, 4> relation{"mean", "standard_deviation", "with",
+                                                            "correlations"};
   switch (law) {
     case Law::uniform:
       return interval;
     case Law::normal:
       return spread;
     case Law::truncated_normal:
+    case Law::truncated:
       return truncated;
     case Law::fixed:
       return constant;
     case Law::table:
       return source;
+    case Law::discrete:
+      return choices;
+    case Law::derived:
+      return function;
+    case Law::correlated:
+      return relation;
   }
   PROOFMASS_EXPECT(!"every law has keys");
   return {};
@@ -51,7 +62,19 @@ double* number_at(Dispersion& dispersion, std::string_view key) {
 std::string* text_at(Dispersion& dispersion, std::string_view key) {
   if (key == "file") return &dispersion.file;
   if (key == "column") return &dispersion.column;
+  if (key == "expression") return &dispersion.expression;
   return nullptr;
+}
+
+std::vector<double>* numbers_at(Dispersion& dispersion, std::string_view key) {
+  if (key == "values") return &dispersion.values;
+  if (key == "probabilities") return &dispersion.probabilities;
+  if (key == "correlations") return &dispersion.correlations;
+  return nullptr;
+}
+
+std::vector<std::string>* texts_at(Dispersion& dispersion, std::string_view key) {
+  return key == "with" ? &dispersion.with : nullptr;
 }
 
 namespace {
@@ -74,14 +97,29 @@ Entry choice_entry(std::string_view path, Choice choice, std::string comment = {
                     std::move(comment));
 }
 
-Entry lines_entry(std::string_view path, const std::vector<LineMultiple>& lines) {
+/// @param item_text  The text of an item.
+template <typename Item, typename TextOf>
+Entry list_entry(std::string_view path, const std::vector<Item>& items, const TextOf& item_text) {
   std::string text = "[";
-  for (const LineMultiple& line : lines) {
+  for (const Item& item : items) {
     if (text.size() > 1) text += ", ";
-    text += text_of(line);
+    text += item_text(item);
   }
   text += "]";
   return {std::string(path), text, "", text};
+}
+
+Entry lines_entry(std::string_view path, const std::vector<LineMultiple>& lines) {
+  return list_entry(path, lines, [](const LineMultiple& line) { return text_of(line); });
+}
+
+Entry law_entry(std::string_view key, Dispersion& law) {
+  if (const double* const number = number_at(law, key)) return real_entry(key, *number);
+  if (const auto* const numbers = numbers_at(law, key)) {
+    return list_entry(key, *numbers, number_text);
+  }
+  if (const auto* const texts = texts_at(law, key)) return list_entry(key, *texts, quoted_text);
+  return text_entry(key, *text_at(law, key));
 }
 
 std::string inline_table(const std::vector<Entry>& entries) {
@@ -127,6 +165,12 @@ std::vector<Entry> scenario_entries(const MicroscopeCampaign& campaign) {
                   "All randomness follows from it."),
       whole_entry("campaign.runs", static_cast<std::int64_t>(campaign.num_runs), "May grow later."),
   };
+  // Left out where it is 1, so that the text of a campaign remains the one that it was stored with.
+  if (campaign.realisations != 1) {
+    entries.push_back(whole_entry("campaign.realisations",
+                                  static_cast<std::int64_t>(campaign.realisations),
+                                  "Runs that share one instrument and differ in their noise."));
+  }
   if (!campaign.environment_file.empty()) {
     entries.push_back(text_entry("environment.file", campaign.environment_file,
                                  "External accelerations, relative to this file."));
@@ -166,9 +210,7 @@ std::vector<Entry> dispersion_entries(const Dispersion& dispersion) {
   Dispersion fields = dispersion;
   std::vector<Entry> entries{choice_entry("law", dispersion.law)};
   for (const std::string_view key : keys_of(dispersion.law)) {
-    const double* const number = number_at(fields, key);
-    entries.push_back(number != nullptr ? real_entry(key, *number)
-                                        : text_entry(key, *text_at(fields, key)));
+    entries.push_back(law_entry(key, fields));
   }
   if (dispersion.is_independent) entries.push_back({"independent", "true", "", "true"});
   return entries;

@@ -40,9 +40,13 @@ struct Entry {
 
 [[nodiscard]] std::string_view name_of(Law law);
 
-/// The field of a key, null if the key has a text.
+/// The field of a key, null unless the key has a number.
 [[nodiscard]] double* number_at(Dispersion& dispersion, std::string_view key);
-/// The field of a key, null if the key has a number.
+/// The field of a key, null unless the key has a text.
 [[nodiscard]] std::string* text_at(Dispersion& dispersion, std::string_view key);
+/// The field of a key, null unless the key has a list of numbers.
+[[nodiscard]] std::vector<double>* numbers_at(Dispersion& dispersion, std::string_view key);
+/// The field of a key, null unless the key has a list of texts.
+[[nodiscard]] std::vector<std::string>* texts_at(Dispersion& dispersion, std::string_view key);
 
 }  // namespace proofmass::detail

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/definition/document.hpp"
@@ -174,8 +175,10 @@ std::vector<Session> read_sessions(Document& document) {
 }
 
 constexpr std::string_view independent_key = "independent";
-constexpr std::array<std::string_view, 8> all_keys{
-    "minimum", "maximum", "mean", "standard_deviation", "value", "file", "column", independent_key};
+constexpr std::array<std::string_view, 13> all_keys{
+    "minimum",      "maximum", "mean", "standard_deviation", "value",        "file",
+    "column",       "values",  "with", "probabilities",      "correlations", "expression",
+    independent_key};
 
 // The only key of a law that may be absent: a table is no draw unless somebody says so.
 void read_independence(Document& document, const std::string& path, Dispersion& dispersion) {
@@ -185,9 +188,37 @@ void read_independence(Document& document, const std::string& path, Dispersion& 
   dispersion.is_independent = found->value_or(false);
 }
 
+/// Reads a list of numbers or of texts.
+template <typename Item>
+bool read_list(Document& document, const std::string& path, std::string_view rule,
+               std::vector<Item>& items) {
+  const toml::node* const found = document.find(path);
+  if (found == nullptr) return false;
+  const toml::array* const list = found->as_array();
+  bool is_list = list != nullptr && list->size() <= law_list_size_max;
+  std::vector<Item> read;
+  for (std::size_t i = 0; is_list && i < list->size(); ++i) {
+    const std::optional<Item> item = (*list)[i].template value<Item>();
+    is_list = item.has_value() && !(*list)[i].is_boolean();
+    if (is_list) read.push_back(*item);
+  }
+  if (!is_list) {
+    document.refuse(path, fmt::format("must be a list of at most {} {}", law_list_size_max, rule));
+    return false;
+  }
+  items = std::move(read);
+  return true;
+}
+
 bool read_key(Document& document, const std::string& path, std::string_view key,
               Dispersion& dispersion) {
   if (double* const number = number_at(dispersion, key)) return document.read(path, *number);
+  if (auto* const numbers = numbers_at(dispersion, key)) {
+    return read_list(document, path, "numbers", *numbers);
+  }
+  if (auto* const texts = texts_at(dispersion, key)) {
+    return read_list(document, path, "names of drawn quantities", *texts);
+  }
   return document.read(path, *text_at(dispersion, key));
 }
 
@@ -280,6 +311,10 @@ MicroscopeCampaign read_definition(Document& document) {
   auto num_runs = static_cast<std::int64_t>(campaign.num_runs);
   document.read("campaign.seed", seed, range::not_negative);
   document.read("campaign.runs", num_runs, range::between(1, static_cast<double>(num_runs_max)));
+  std::int64_t realisations = 1;
+  document.read("campaign.realisations", realisations,
+                range::between(1, static_cast<double>(realisations_max)));
+  campaign.realisations = static_cast<std::uint64_t>(realisations);
   campaign.seed = static_cast<std::uint64_t>(seed);
   campaign.num_runs = static_cast<std::uint64_t>(num_runs);
   document.read("environment.file", campaign.environment_file);

@@ -154,8 +154,12 @@ class CommentedWriter {
         "# standard_deviation), truncated_normal (all four), fixed (value), or table (file, "
         "column: a\n"
         "# comma-separated file with headings, one row a run; independent = true: its rows are\n"
-        "# independent draws, else no interval or verdict follows from them). A table such as\n"
-        "# [dispersion.offcentring_m.x] changes the law of one element.\n";
+        "# independent draws, else no interval or verdict follows from them), discrete (values,\n"
+        "# probabilities), truncated (as truncated_normal, the mean anywhere), derived "
+        "(expression:\n"
+        "# of other quantities) or correlated (mean, standard_deviation; with: earlier normal\n"
+        "# quantities; correlations: with each). A table such as [dispersion.offcentring_m.x]\n"
+        "# changes the law of one element.\n";
     for (const DrawGroup& group : draw_groups()) write_group(group);
   }
 

@@ -156,12 +156,15 @@ class JointStudy final : public PlanStudy {
 
   void add_instruments(const RunPhasors& phasors, const EstimationInput& input) {
     // A table has values for the runs of the campaign only.
-    const std::uint64_t num_runs = campaign_.table_quantities().empty()
-                                       ? num_instruments_max
-                                       : std::min(campaign_.num_runs, num_instruments_max);
+    const std::uint64_t each = campaign_.realisations;
+    const std::uint64_t num_drawn =
+        campaign_.table_quantities().empty()
+            ? num_instruments_max
+            : std::min((campaign_.num_runs + each - 1) / each, num_instruments_max);
     const double bias_m_s2 = campaign_.scenario.drag_free.bias_compensation_error_x_m_s2;
-    for (std::uint64_t i = 0; i < num_runs; ++i) {
-      const AcceptedDraw draw = draw_instrument(campaign_, {i}, campaign_.table_values({i}));
+    for (std::uint64_t i = 0; i < num_drawn; ++i) {
+      const RunIndex run{i * each};
+      const AcceptedDraw draw = draw_instrument(campaign_, run, campaign_.table_values(run));
       if (!draw.instrument) continue;
       instruments_.emplace_back(phasors, input, true_unknowns(*draw.instrument, bias_m_s2));
     }

@@ -32,7 +32,8 @@ struct Prior {
 
 /// Of one drawn quantity. Its bound is the nominal one: that of a table's column, whose values the
 /// method does not see, and the unit of the least deviation that a prior has.
-Prior prior_of(const Dispersion& dispersion, double bound) {
+Prior prior_of(const DispersionSet& dispersions, std::size_t quantity, double bound) {
+  const Dispersion& dispersion = dispersions[quantity];
   Prior prior{.mean = 0.0, .deviation = bound / std::sqrt(3.0)};
   const double middle = 0.5 * (dispersion.minimum + dispersion.maximum);
   const double flat = (dispersion.maximum - dispersion.minimum) / std::sqrt(12.0);
@@ -41,6 +42,7 @@ Prior prior_of(const Dispersion& dispersion, double bound) {
       prior = {middle, flat};
       break;
     case Law::normal:
+    case Law::correlated:
       prior = {dispersion.mean, dispersion.standard_deviation};
       break;
     case Law::truncated_normal:
@@ -50,6 +52,13 @@ Prior prior_of(const Dispersion& dispersion, double bound) {
     case Law::fixed:
       prior = {dispersion.value, 0.0};
       break;
+    case Law::discrete:
+    case Law::truncated:
+    case Law::derived: {
+      const LawMoments moments = sampled_moments(dispersions, quantity);
+      prior = {moments.mean, moments.standard_deviation};
+      break;
+    }
     case Law::table:
       break;
   }
@@ -66,7 +75,7 @@ class GroupPriors {
     const auto group = std::ranges::find(draw_groups(), name, &DrawGroup::name);
     PROOFMASS_EXPECT(group != draw_groups().end());
     for (std::size_t i = 0; i < group->count; ++i) {
-      elements_[i] = prior_of(dispersions[group->first + i], group->bound);
+      elements_[i] = prior_of(dispersions, group->first + i, group->bound);
     }
   }
 

@@ -110,7 +110,7 @@ TEST(DispersionValidate, RefusesWhatIsNotFiniteUnderAnyLaw) {
   EXPECT_EQ(refusal_of(law(Law::normal, 0, 0, infinity)), "d.mean = inf (must be finite)");
   EXPECT_EQ(refusal_of(law(Law::normal, 0, 0, 0, infinity)),
             "d.standard_deviation = inf (must be finite)");
-  EXPECT_EQ(refusal_of(law(static_cast<Law>(9))), "d.law = 9 (unknown law)");
+  EXPECT_EQ(refusal_of(law(static_cast<Law>(10))), "d.law = 10 (unknown law)");
 }
 
 }  // namespace
