@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -22,7 +23,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// Differences of several parameters are kept together up to this size.
+/// Errors of several parameters are kept together up to this size.
 constexpr std::size_t kept_size = std::size_t{128} << 20;
 
 /// Calls visit(first, second) for each run of either campaign, ascending; null for one that lacks
@@ -47,89 +48,42 @@ bool have_same_draw(const RunResult& first, const RunResult& second) {
          (!first.has_truth() || std::ranges::equal(first.truth, second.truth, have_same_bits));
 }
 
-/// Calls visit(first, second) for runs that are compared: a pair, or, if runs are not paired, one
-/// of either campaign.
-template <typename Visit>
-void visit_compared(const RunResult* a, const RunResult* b, bool is_paired, const Visit& visit) {
-  const RunResult* const of_first = a != nullptr && a->is_completed() ? a : nullptr;
-  const RunResult* const of_second = b != nullptr && b->is_completed() ? b : nullptr;
-  if (is_paired && (of_first == nullptr || of_second == nullptr)) return;
-  visit(of_first, of_second);
-}
-
-/// visit_compared() for all runs of both campaigns, in run order.
-template <typename Visit>
-void walk_compared(const ComparedCampaign& first, const ComparedCampaign& second, bool is_paired,
-                   const Visit& visit) {
-  walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
-    visit_compared(a, b, is_paired, visit);
-  });
-}
-
 std::size_t num_quantities() { return model().results().quantities.size(); }
 
-/// Errors of one side in two passes, and the largest |error| of each parameter; the order of
-/// the model's quantities.
-struct SideErrors {
-  std::vector<ErrorPasses> errors = std::vector<ErrorPasses>(num_quantities());
-  std::vector<double> worst = std::vector<double>(num_quantities());
-  std::vector<CompensatedSum> magnitudes = std::vector<CompensatedSum>(num_quantities());
+/// Errors of some parameters, from `begin` on, in the runs of one side that have an estimate.
+class SideErrors {
+ public:
+  SideErrors(std::size_t begin, std::size_t end) : begin_(begin), columns_(end - begin) {}
 
-  void add(const RunResult* result) {
-    if (result == nullptr) return;
-    for (std::size_t i = 0; i < num_quantities(); ++i) {
-      const double error = result->error(i);
-      errors[i].add(error);
-      magnitudes[i].add(std::abs(error));
-      worst[i] = std::max(worst[i], std::abs(error));
+  /// @param has_pair  Whether the other side has an estimate of the run as well.
+  void add(const RunResult& result, bool has_pair) {
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      columns_[i].push_back(result.error(begin_ + i));
+    have_pairs_.push_back(has_pair);
+  }
+  void keep_pairs() {
+    for (std::vector<double>& errors : columns_) {
+      std::size_t num_kept = 0;
+      for (std::size_t i = 0; i < errors.size(); ++i) {
+        if (have_pairs_[i]) errors[num_kept++] = errors[i];
+      }
+      errors.resize(num_kept);
     }
   }
-
-  void add_again(const RunResult* result) {
-    if (result == nullptr) return;
-    for (std::size_t i = 0; i < num_quantities(); ++i) errors[i].add_again(result->error(i));
+  [[nodiscard]] const std::vector<double>& of(std::size_t parameter) const {
+    return columns_[parameter - begin_];
   }
 
-  [[nodiscard]] ComparedAccuracy accuracy(std::size_t parameter) const {
-    const ErrorPasses& passes = errors[parameter];
-    const Moments about = passes.errors();
-    return {.bias = about.mean,
-            .standard_deviation = about.standard_deviation,
-            .mean = magnitudes[parameter].value() / static_cast<double>(passes.count()),
-            .worst = worst[parameter],
-            .num_in_tail = passes.num_in_tail()};
-  }
+ private:
+  std::size_t begin_;
+  std::vector<std::vector<double>> columns_;
+  std::vector<bool> have_pairs_;
 };
 
-struct BothErrors {
-  SideErrors first;
-  SideErrors second;
-  std::vector<double> tail_limits = std::vector<double>(num_quantities());
-
-  void add(const RunResult* a, const RunResult* b) {
-    first.add(a);
-    second.add(b);
-  }
-  void begin_second() {
-    for (std::size_t i = 0; i < num_quantities(); ++i) {
-      tail_limits[i] = tail_limit(first.errors[i], second.errors[i]);
-      first.errors[i].begin_second(tail_limits[i]);
-      second.errors[i].begin_second(tail_limits[i]);
-    }
-  }
-  void add_again(const RunResult* a, const RunResult* b) {
-    first.add_again(a);
-    second.add_again(b);
-  }
-};
-
-/// Each pass reads both files, which takes most of the time, so that the first one has all that can
-/// be known at once: it takes runs for paired until they prove not to be.
-void read_first_pass(const ComparedCampaign& first, const ComparedCampaign& second,
-                     CampaignComparison& comparison, BothErrors& errors) {
-  std::string& why = comparison.why_unpaired;
-  if (first.campaign->seed != second.campaign->seed) why = "the seeds differ";
-  const bool was_paired = comparison.is_paired();
+/// Reads the errors that are compared, and sets why they are not those of pairs.
+void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
+                 CampaignComparison& comparison, SideErrors& of_first, SideErrors& of_second) {
+  std::string why = first.campaign->seed == second.campaign->seed ? "" : "the seeds differ";
   bool has_common_run = false;
   walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
     if (a != nullptr && b != nullptr) {
@@ -138,102 +92,52 @@ void read_first_pass(const ComparedCampaign& first, const ComparedCampaign& seco
         why = fmt::format("the draws of run {} differ", a->run.value);
       }
     }
-    if (comparison.is_paired() != was_paired) return;
-    visit_compared(a, b, was_paired, [&](const RunResult* of_first, const RunResult* of_second) {
-      errors.add(of_first, of_second);
-    });
+    const bool has_first = a != nullptr && a->is_completed();
+    const bool has_second = b != nullptr && b->is_completed();
+    if (has_first) of_first.add(*a, has_second);
+    if (has_second) of_second.add(*b, has_first);
   });
   if (why.empty() && !has_common_run) why = "no run is finished in both";
-  if (comparison.is_paired() == was_paired) return;
-  errors = {};
-  walk_compared(first, second, false,
-                [&](const RunResult* a, const RunResult* b) { errors.add(a, b); });
+  comparison.why_unpaired = why;
+  if (!comparison.is_paired()) return;
+  of_first.keep_pairs();
+  of_second.keep_pairs();
 }
 
-/// What is compared of some parameters of all pairs; 16 bytes a pair and parameter.
-class Pairs {
- public:
-  Pairs(std::size_t begin, std::size_t end, std::size_t num_pairs)
-      : begin_(begin), parameters_(end - begin) {
-    for (PairedErrors& parameter : parameters_) {
-      parameter.differences.reserve(num_pairs);
-      parameter.deviation_differences.reserve(num_pairs);
-    }
+ComparedAccuracy accuracy_of(std::span<const double> errors, double limit) {
+  const Moments about = moments(errors);
+  ComparedAccuracy accuracy{.bias = about.mean,
+                            .standard_deviation = about.standard_deviation,
+                            .num_in_tail = num_beyond(errors, limit)};
+  CompensatedSum magnitudes;
+  for (const double error : errors) {
+    magnitudes.add(std::abs(error));
+    accuracy.worst = std::max(accuracy.worst, std::abs(error));
   }
-
-  void add(const RunResult& first, const RunResult& second, const BothErrors& errors) {
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      const std::size_t parameter = begin_ + i;
-      parameters_[i].add(
-          {.error = first.error(parameter), .mean = errors.first.errors[parameter].mean()},
-          {.error = second.error(parameter), .mean = errors.second.errors[parameter].mean()},
-          errors.tail_limits[parameter]);
-    }
-  }
-
-  void compare(const BothErrors& errors, CampaignComparison& comparison) {
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      ParameterComparison& parameter = comparison.parameters[begin_ + i];
-      parameter.bias_interval =
-          mean_interval(moments(parameters_[i].differences), default_confidence);
-      parameter.smallest_scale_factor =
-          smallest_scale_factor(errors.first.errors[begin_ + i], parameters_[i], num_quantities());
-      parameter.p_values = compare_paired_errors(std::move(parameters_[i]));
-    }
-  }
-
- private:
-  std::size_t begin_;
-  std::vector<PairedErrors> parameters_;
-};
-
-void compare_pairs(const ComparedCampaign& first, const ComparedCampaign& second,
-                   BothErrors& errors, CampaignComparison& comparison) {
-  const std::size_t size = comparison.num_first * 2 * sizeof(double);
-  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_quantities());
-  for (std::size_t begin = 0; begin < num_quantities(); begin += num_at_a_time) {
-    Pairs pairs(begin, std::min(begin + num_at_a_time, num_quantities()), comparison.num_first);
-    walk_compared(first, second, true, [&](const RunResult* a, const RunResult* b) {
-      if (begin == 0) errors.add_again(a, b);
-      pairs.add(*a, *b, errors);
-    });
-    pairs.compare(errors, comparison);
-  }
+  accuracy.mean = magnitudes.value() / static_cast<double>(errors.size());
+  return accuracy;
 }
 
-// Of few runs of one side, all of both are needed, one parameter after the other.
-ChangePValues compare_few(const ComparedCampaign& first, const ComparedCampaign& second,
-                          std::size_t parameter) {
-  std::vector<double> of_first, of_second;
-  walk_compared(first, second, false, [&](const RunResult* a, const RunResult* b) {
-    if (a != nullptr) of_first.push_back(a->error(parameter));
-    if (b != nullptr) of_second.push_back(b->error(parameter));
-  });
-  return compare_few_errors(of_first, of_second);
-}
-
-void compare_unpaired_runs(const ComparedCampaign& first, const ComparedCampaign& second,
-                           BothErrors& errors, CampaignComparison& comparison) {
-  walk_compared(first, second, false,
-                [&](const RunResult* a, const RunResult* b) { errors.add_again(a, b); });
-  const bool are_few = std::min(comparison.num_first, comparison.num_second) < num_welch_min;
-  for (std::size_t i = 0; i < num_quantities(); ++i) {
-    ParameterComparison& parameter = comparison.parameters[i];
-    const ErrorPasses& a = errors.first.errors[i];
-    const ErrorPasses& b = errors.second.errors[i];
-    parameter.bias_interval = compare_means(a.errors(), b.errors(), default_confidence).interval;
-    parameter.p_values = are_few ? compare_few(first, second, i) : compare_many_errors(a, b);
-    if (!are_few) parameter.smallest_scale_factor = smallest_scale_factor(a, b, num_quantities());
+ParameterComparison compared_parameter(const std::vector<double>& first,
+                                       const std::vector<double>& second, bool is_paired) {
+  const double limit = tail_limit(first, second);
+  ParameterComparison parameter;
+  parameter.first = accuracy_of(first, limit);
+  parameter.second = accuracy_of(second, limit);
+  parameter.tail_limit = limit;
+  if (is_paired) {
+    std::vector<double> differences(first.size());
+    std::ranges::transform(second, first, differences.begin(), std::minus<>());
+    parameter.bias_interval = mean_interval(moments(differences), default_confidence);
+    parameter.smallest_scale_factor = smallest_paired_scale_factor(first, second, num_quantities());
+    parameter.p_values = compare_paired_errors(first, second);
+  } else {
+    parameter.bias_interval =
+        compare_means(moments(first), moments(second), default_confidence).interval;
+    parameter.smallest_scale_factor = smallest_scale_factor(first, second, num_quantities());
+    parameter.p_values = compare_errors(first, second);
   }
-}
-
-void keep_accuracies(const BothErrors& errors, CampaignComparison& comparison) {
-  for (std::size_t i = 0; i < num_quantities(); ++i) {
-    ParameterComparison& parameter = comparison.parameters[i];
-    parameter.first = errors.first.accuracy(i);
-    parameter.second = errors.second.accuracy(i);
-    parameter.tail_limit = errors.tail_limits[i];
-  }
+  return parameter;
 }
 
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
@@ -247,11 +151,15 @@ std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
   return differences;
 }
 
-std::string why_too_few(const CampaignComparison& comparison) {
+std::string why_not_compared(const ComparedCampaign& first, const ComparedCampaign& second,
+                             const CampaignComparison& comparison) {
   const std::size_t num_needed = comparison.is_paired() ? 1 : 2;
-  if (std::min(comparison.num_first, comparison.num_second) >= num_needed) return "";
-  return fmt::format("{} and {} runs with an estimate (must be at least {})", comparison.num_first,
-                     comparison.num_second, num_needed);
+  if (std::min(comparison.num_first, comparison.num_second) < num_needed) {
+    return fmt::format("{} and {} runs with an estimate (must be at least {})",
+                       comparison.num_first, comparison.num_second, num_needed);
+  }
+  const std::string why = why_not_independent(*first.campaign);
+  return why.empty() ? why_not_independent(*second.campaign) : why;
 }
 
 /// A campaign of a file, of which one state is read.
@@ -266,12 +174,8 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
   if (is_stopped()) throw Interrupted();
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   CheckedResults checked = read_checked_results(store, *campaign);
-  const CampaignStatistics& statistics = checked.results.statistics;
-  const MissingEstimates missing{.num_not_converged = statistics.num_not_converged,
-                                 .num_not_finite = statistics.num_not_finite,
-                                 .num_no_draw = statistics.num_no_draw,
-                                 .num_lost = statistics.num_lost,
-                                 .num_given_up = num_runs_in(checked.given_up)};
+  const MissingEstimates missing =
+      missing_in(checked.results.statistics, num_runs_in(checked.given_up));
   const auto open_results = [&store, is_stopped]() -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
     return [reader = std::make_shared<ResultReader>(store.results()), is_stopped] {
@@ -299,20 +203,22 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
   comparison.parameters.resize(num_quantities());
-  BothErrors errors;
-  read_first_pass(first, second, comparison, errors);
-  comparison.num_first = errors.first.errors.front().count();
-  comparison.num_second = errors.second.errors.front().count();
-  comparison.why_not_compared = why_too_few(comparison);
-  for (const ComparedCampaign* const side : {&first, &second}) {
-    if (!comparison.why_not_compared.empty()) break;
-    comparison.why_not_compared = why_not_independent(*side->campaign);
+  const std::uint64_t size =
+      (first.campaign->num_runs + second.campaign->num_runs) * sizeof(double);
+  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_quantities());
+  for (std::size_t begin = 0; begin < num_quantities(); begin += num_at_a_time) {
+    const std::size_t end = std::min(begin + num_at_a_time, num_quantities());
+    SideErrors of_first(begin, end), of_second(begin, end);
+    read_errors(first, second, comparison, of_first, of_second);
+    comparison.num_first = of_first.of(begin).size();
+    comparison.num_second = of_second.of(begin).size();
+    comparison.why_not_compared = why_not_compared(first, second, comparison);
+    if (!comparison.why_not_compared.empty()) return comparison;
+    for (std::size_t i = begin; i < end; ++i) {
+      comparison.parameters[i] =
+          compared_parameter(of_first.of(i), of_second.of(i), comparison.is_paired());
+    }
   }
-  if (!comparison.why_not_compared.empty()) return comparison;
-  errors.begin_second();
-  const auto compare = comparison.is_paired() ? compare_pairs : compare_unpaired_runs;
-  compare(first, second, errors, comparison);
-  keep_accuracies(errors, comparison);
   return comparison;
 }
 

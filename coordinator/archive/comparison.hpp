@@ -32,8 +32,7 @@ struct ComparedCampaign {
   std::shared_ptr<const Campaign> campaign;
   std::string model_version;
   std::string build;
-  /// Begins with the first result, the same ones each time: they are read several times and not
-  /// kept.
+  /// Begins with the first result, the same ones each time.
   std::function<ResultStream()> open_results;
 };
 
@@ -76,11 +75,10 @@ struct CampaignComparison {
 
 /// Compares the runs with an estimate: those that both campaigns have, run by run, if their seed
 /// and the truths of all common runs agree to the last bit, and else all of each. P-values are of
-/// compare_paired_errors() for pairs, else of compare_many_errors(), or compare_few_errors() below
-/// num_welch_min runs; intervals are of 95 %.
+/// compare_paired_errors() for pairs, else of compare_errors(); intervals are of 95 %.
 ///
-/// Keeps nothing of each run, but 16 bytes of each pair, as ranks need all differences of a
-/// parameter, and 128 MB of several parameters' at a time to save passes.
+/// Keeps the errors of as many parameters at a time as some 128 MB hold, of one at least: up to
+/// 800,000 runs in both together each file is read once.
 [[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                                    const ComparedCampaign& second);
 

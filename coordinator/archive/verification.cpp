@@ -242,10 +242,7 @@ class Verification {
   std::optional<ResultScan> scan_;
 };
 
-void check_arguments(const std::filesystem::path& file, const VerifyOptions& options) {
-  if (!(options.fraction >= 0.0 && options.fraction <= 1.0)) {
-    throw ArchiveError(fmt::format("fraction = {} (must be in [0, 1])", options.fraction));
-  }
+void check_campaign_file(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
     throw ArchiveError(fmt::format("campaign database = {} (does not exist)", file.string()));
@@ -263,7 +260,7 @@ constexpr std::size_t verdict_width = 13;
 
 bool verify(const std::filesystem::path& file, const VerifyOptions& options,
             const std::function<void(const Check&)>& report, const IsStopped& is_stopped) {
-  check_arguments(file, options);
+  check_campaign_file(file);
   return Verification(file, options, report, is_stopped).run();
 }
 

@@ -53,8 +53,7 @@ struct VerifyOptions {
 ///
 /// @param report  Called with each check as soon as it is made.
 /// @return True if no check fails.
-/// @throws ArchiveError if there is no such file, if it is no campaign database or if the fraction
-/// is out of range; Interrupted.
+/// @throws ArchiveError if there is no such file or it is no campaign database; Interrupted.
 [[nodiscard]] bool verify(const std::filesystem::path& file, const VerifyOptions& options,
                           const std::function<void(const Check&)>& report,
                           const IsStopped& is_stopped);

@@ -148,7 +148,7 @@ proto::ReplyEnvelope CampaignService::control(CampaignId id, wire::ControlAction
     case wire::ControlAction::archive:
       PROOFMASS_EXPECT(false);  // See archive().
     case wire::ControlAction::retry:
-      writer_.retry_given_up(id);
+      writer_.write(id, RetriedRuns{});
       on_retry(state_, id, context_.now(), outbox_);
       break;
   }
@@ -218,7 +218,7 @@ void CampaignService::review_control(CampaignId id, Served& served) {
                                 .priority = campaign.priority,
                                 .audit_fraction = campaign.audit_fraction};
   if (control == served.written) return;
-  writer_.set_control(id, control);
+  writer_.write(id, control);
   const bool has_new_results = served.num_summarised != campaign.num_committed_here;
   if (control.phase == Phase::finished && has_new_results) {
     served.is_summary_due = files_ != nullptr;

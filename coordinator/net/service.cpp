@@ -118,26 +118,29 @@ class Service::Impl final : public Outbox {
 
   void store(WorkerId worker, wire::LeasedResult result) override {
     const CampaignId campaign = result.campaign;
-    writer_.deliver(campaign, delivery_of(worker, std::move(result)));
+    writer_.write(campaign, delivery_of(worker, std::move(result)));
     if (expects_no_result(state_.campaigns.at(campaign))) writer_.hurry(campaign);
   }
 
   void compare(WorkerId worker, wire::LeasedResult result) override {
-    writer_.compare(result.campaign, delivery_of(worker, std::move(result)));
+    const CampaignId campaign = result.campaign;
+    writer_.write(campaign, SecondDelivery{delivery_of(worker, std::move(result))});
   }
 
   void record(CampaignId campaign, WorkerId worker, const ReturnedRuns& returned) override {
     history_.note_lent(campaign, worker);
     history_.note_reason(worker, returned.reason);
-    writer_.record_loss(campaign, returned);
+    writer_.write(campaign, returned);
   }
 
-  void give_up(CampaignId campaign, RunIndex run) override { writer_.give_up(campaign, run); }
+  void give_up(CampaignId campaign, RunIndex run) override {
+    writer_.write(campaign, GivenUpRun{run});
+  }
 
   using Outbox::log;
   void log(Event event, CampaignId campaign) override {
     if (campaign == CampaignId{} || campaign_service_.is_served(campaign)) {
-      writer_.record_event(campaign, entry_of(event));
+      writer_.write(campaign, entry_of(event));
     }
     const auto served = state_.campaigns.find(campaign);
     if (served != state_.campaigns.end()) {
@@ -322,25 +325,7 @@ class Service::Impl final : public Outbox {
     on_store_recovered(state_, recovered.campaign, now(), *this);
   }
 
-  void complete(const LogGrown& grown) {
-    log({.severity = Severity::warning,
-         .kind = "write_ahead_log_grown",
-         .fields = {{"size_bytes", grown.size},
-                    Field::remark("(somebody reads an old state of the file)")}},
-        grown.campaign);
-  }
-  void complete(const LogKept& kept) {
-    log({.severity = Severity::warning,
-         .kind = "write_ahead_log_kept",
-         .fields = {Field::reason(kept.reason)}},
-        kept.campaign);
-  }
-  void complete(const LogFolded& folded) {
-    log({.kind = "write_ahead_log_folded"}, folded.campaign);
-  }
-  void complete(const LogShrunk& shrunk) {
-    log({.kind = "write_ahead_log_shrunk"}, shrunk.campaign);
-  }
+  void complete(const FileEvent& happened) { log(happened.event, happened.campaign); }
 
   /// Results are acknowledged before their workers are told to end.
   void end(bool leaves_workers) {

@@ -21,11 +21,11 @@ void WorkerHistory::note_lent(CampaignId campaign, WorkerId id) {
   if (known == registered_.end() || found == state_.workers.end()) return;
   if (!known->second.campaigns.insert(campaign).second) return;
   const Worker& worker = found->second;
-  writer_.record_worker_joined(campaign, {.session = worker.session,
-                                          .name = worker.name,
-                                          .host = worker.host_name,
-                                          .process_id = worker.process_id,
-                                          .num_slots = worker.num_slots});
+  writer_.write(campaign, WorkerJoined{.session = worker.session,
+                                       .name = worker.name,
+                                       .host = worker.host_name,
+                                       .process_id = worker.process_id,
+                                       .num_slots = worker.num_slots});
 }
 
 void WorkerHistory::note_closed(CampaignId campaign) {
@@ -44,7 +44,7 @@ void WorkerHistory::review() {
   }
   if (!state_.awaited.empty()) return;
   for (const SessionId session : std::exchange(attached_, {})) {
-    writer_.record_worker_ended({.session = session, .reason = LossReason::silent});
+    writer_.write({}, WorkerEnded{.session = session, .reason = LossReason::silent});
   }
 }
 
@@ -59,9 +59,9 @@ void WorkerHistory::end_all(LossReason reason) {
 
 void WorkerHistory::end(WorkerId worker, SessionId session) {
   const auto reason = reasons_.find(worker);
-  writer_.record_worker_ended(
-      {.session = session,
-       .reason = reason == reasons_.end() ? LossReason::silent : reason->second});
+  writer_.write(
+      {}, WorkerEnded{.session = session,
+                      .reason = reason == reasons_.end() ? LossReason::silent : reason->second});
   registered_.erase(worker);
   reasons_.erase(worker);
 }

@@ -1,5 +1,3 @@
-#include "coordinator/query/draw_table.hpp"
-
 #include <sqlite3ext.h>
 
 #include <algorithm>
@@ -17,7 +15,9 @@
 
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/virtual_table-inl.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
+#include "core/runs.hpp"
 
 SQLITE_EXTENSION_INIT3
 
@@ -30,6 +30,38 @@ enum DrawColumn : int {
   unit_column,
   draw_value_column,
   draw_campaign_column
+};
+
+/// What the runs of a campaign draw, computed again when asked for.
+class DrawnCampaign {
+ public:
+  explicit DrawnCampaign(std::shared_ptr<const Campaign> campaign)
+      : campaign_(std::move(campaign)) {}
+
+  [[nodiscard]] std::string_view campaign_name() const { return campaign_->name; }
+  [[nodiscard]] std::uint64_t num_runs() const { return campaign_->num_runs; }
+
+  /// The values of the run's accepted draw, those its simulation begins with; empty if all draws
+  /// were rejected. The reference holds until the next call.
+  /// @pre The run is one of the campaign's.
+  [[nodiscard]] const std::vector<double>& values_of(RunIndex run) {
+    if (last_run_ == run) return last_values_;
+    last_values_ = campaign_->draw(run).values;
+    last_run_ = run;
+    return last_values_;
+  }
+
+ private:
+  std::shared_ptr<const Campaign> campaign_;
+  std::optional<RunIndex> last_run_;  ///< A join asks for the quantities of a run one by one.
+  std::vector<double> last_values_;
+};
+
+/// The rows of draw() that a statement wants: at least those, as SQLite looks at each row again.
+struct DrawScan {
+  std::uint64_t first_run = 0;
+  std::uint64_t end_run = 0;            ///< One behind the last.
+  std::optional<std::size_t> quantity;  ///< Index into Model::drawn(); empty for all.
 };
 
 struct DrawCursor : sqlite3_vtab_cursor {
@@ -64,17 +96,18 @@ struct DrawCursor : sqlite3_vtab_cursor {
 struct Offer {
   int column;
   unsigned char comparison;
-  std::optional<RunComparison> run_comparison;
+  bool is_lower = false;  ///< It bounds the runs from below.
+  bool is_upper = false;
 };
 
 constexpr std::array<Offer, 7> offers{{
-    {draw_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
-    {quantity_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
-    {run_index_column, SQLITE_INDEX_CONSTRAINT_EQ, RunComparison::equal},
-    {run_index_column, SQLITE_INDEX_CONSTRAINT_GT, RunComparison::above},
-    {run_index_column, SQLITE_INDEX_CONSTRAINT_GE, RunComparison::at_least},
-    {run_index_column, SQLITE_INDEX_CONSTRAINT_LT, RunComparison::below},
-    {run_index_column, SQLITE_INDEX_CONSTRAINT_LE, RunComparison::at_most},
+    {draw_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ},
+    {quantity_column, SQLITE_INDEX_CONSTRAINT_EQ},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_EQ, true, true},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_GT, true, false},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_GE, true, false},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_LT, false, true},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_LE, false, true},
 }};
 constexpr int campaign_bit = 1 << 0;
 constexpr int quantity_bit = 1 << 1;
@@ -125,16 +158,24 @@ void DrawCursor::choose_plan(sqlite3_index_info& plan) {
 // Other types than these compare by rules of SQLite's own, and narrow nothing.
 void narrow(DrawScan& scan, const Offer& offer, sqlite3_value* value) {
   const int type = sqlite3_value_type(value);
-  if (type == SQLITE_NULL) return scan.leave_none();
-  if (offer.run_comparison && type == SQLITE_INTEGER) {
-    scan.narrow(*offer.run_comparison, std::int64_t{sqlite3_value_int64(value)});
-  } else if (offer.run_comparison && type == SQLITE_FLOAT) {
-    scan.narrow(*offer.run_comparison, sqlite3_value_double(value));
-  } else if (!offer.run_comparison && type == SQLITE_TEXT) {
-    const std::span<const DrawnQuantity> drawn = model().drawn();
+  const std::span<const DrawnQuantity> drawn = model().drawn();
+  if (type == SQLITE_NULL) {
+    scan.end_run = scan.first_run;
+  } else if (offer.column == quantity_column && type == SQLITE_TEXT) {
     const auto found = std::ranges::find(drawn, text_of(value), &DrawnQuantity::name);
-    if (found == drawn.end()) return scan.leave_none();
-    scan.quantity = static_cast<std::size_t>(found - drawn.begin());
+    if (found == drawn.end()) {
+      scan.end_run = scan.first_run;
+    } else {
+      scan.quantity = static_cast<std::size_t>(found - drawn.begin());
+    }
+  } else if (offer.column == run_index_column && type != SQLITE_TEXT && type != SQLITE_BLOB) {
+    // One step outside all run indices excludes or admits as much as any further one.
+    const double bound =
+        std::clamp(sqlite3_value_double(value), -1.0, static_cast<double>(num_runs_max));
+    const auto end = static_cast<std::uint64_t>(std::floor(bound) + 1.0);
+    if (offer.is_lower)
+      scan.first_run = std::max(scan.first_run, end - std::min<std::uint64_t>(end, 1));
+    if (offer.is_upper) scan.end_run = std::min(scan.end_run, end);
   }
 }
 
@@ -192,44 +233,6 @@ void DrawCursor::give_column(sqlite3_context* context, int number) const {
 }
 
 }  // namespace
-
-DrawnCampaign::DrawnCampaign(std::shared_ptr<const Campaign> campaign)
-    : campaign_(std::move(campaign)) {}
-
-const std::vector<double>& DrawnCampaign::values_of(RunIndex run) {
-  if (last_run_ == run) return last_values_;
-  last_values_ = campaign_->draw(run).values;
-  last_run_ = run;
-  return last_values_;
-}
-
-void DrawScan::narrow(RunComparison comparison, std::int64_t bound) {
-  // One step outside all run indices excludes or admits as much as any further one.
-  const auto limit = static_cast<std::int64_t>(num_runs_max);
-  const std::int64_t run = std::clamp<std::int64_t>(bound, -1, limit);
-  const auto not_negative = [](std::int64_t value) {
-    return static_cast<std::uint64_t>(std::max<std::int64_t>(value, 0));
-  };
-  const bool is_lower = comparison != RunComparison::below && comparison != RunComparison::at_most;
-  const bool is_upper = comparison != RunComparison::above && comparison != RunComparison::at_least;
-  const std::int64_t first = comparison == RunComparison::above ? run + 1 : run;
-  const std::int64_t end = comparison == RunComparison::below ? run : run + 1;
-  if (is_lower) first_run = std::max(first_run, not_negative(first));
-  if (is_upper) end_run = std::min(end_run, not_negative(end));
-  end_run = std::max(first_run, end_run);
-}
-
-void DrawScan::narrow(RunComparison comparison, double bound) {
-  const double limit = static_cast<double>(num_runs_max);
-  const double run = std::floor(std::clamp(bound, -1.0, limit));
-  // Between two indices, or at one: what is below it is at most the index before or it.
-  const bool is_below = comparison == RunComparison::below;
-  const bool is_above = comparison == RunComparison::above;
-  narrow(is_below   ? RunComparison::at_most
-         : is_above ? RunComparison::at_least
-                    : comparison,
-         static_cast<std::int64_t>(run));
-}
 
 int register_draw_table(sqlite3* connection) {
   return VirtualTable<DrawCursor>::add_to(connection);

@@ -92,6 +92,14 @@ std::uint64_t MissingEstimates::total() const {
   return num_not_converged + num_not_finite + num_no_draw + num_lost + num_given_up;
 }
 
+MissingEstimates missing_in(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  return {.num_not_converged = statistics.num_not_converged,
+          .num_not_finite = statistics.num_not_finite,
+          .num_no_draw = statistics.num_no_draw,
+          .num_lost = statistics.num_lost,
+          .num_given_up = num_given_up};
+}
+
 std::string reasons_text(const MissingEstimates& missing) {
   const std::array<std::pair<std::uint64_t, std::string_view>, 5> reasons{
       {{missing.num_not_converged, "not converged"},

@@ -33,6 +33,10 @@ struct MissingEstimates {
   bool operator==(const MissingEstimates&) const = default;
 };
 
+/// Those of a campaign, of which so many runs were given up.
+[[nodiscard]] MissingEstimates missing_in(const CampaignStatistics& statistics,
+                                          std::uint64_t num_given_up);
+
 /// `2 not finite, 1 without draw`, at most 76 characters; empty if there are none.
 [[nodiscard]] std::string reasons_text(const MissingEstimates& missing);
 

@@ -42,8 +42,7 @@ std::string report_text(const Store& store, const Campaign& campaign, Paint pain
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
                          const CampaignStatistics& statistics, std::string_view digest,
                          DigestCheck check) {
-  const std::uint64_t num_imperfect = statistics.num_not_converged + statistics.num_not_finite +
-                                      statistics.num_no_draw + statistics.num_lost;
+  const std::uint64_t num_imperfect = missing_in(statistics, 0).total();
   std::string text = fmt::format("Campaign  {}\nSeed      {}\nDigest    {}\n", name, seed, digest);
   if (check == DigestCheck::not_checked) {
     text += fmt::format("          (not checked: no stored one of these {} runs)\n",

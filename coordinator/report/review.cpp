@@ -21,14 +21,6 @@ CampaignIdentity identity_of(const Store& store) {
           .definition_digest = store.table_digest()};
 }
 
-MissingEstimates missing_of(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  return {.num_not_converged = statistics.num_not_converged,
-          .num_not_finite = statistics.num_not_finite,
-          .num_no_draw = statistics.num_no_draw,
-          .num_lost = statistics.num_lost,
-          .num_given_up = num_given_up};
-}
-
 Review read_of_one_state(const Store& store, const Campaign& campaign,
                          std::vector<StatedRequirement> stated) {
   Review review{.database = {},
@@ -60,7 +52,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                          auto magnitudes) { matrix.add_magnitudes(quantity, magnitudes); }});
   review.results = std::move(checked.results);
   review.digest_check = checked.check;
-  review.missing = missing_of(review.results.statistics, review.num_given_up);
+  review.missing = missing_in(review.results.statistics, review.num_given_up);
   review.figures = figures.figures();
   review.matrix = matrix.answers();
   review.why_not_independent = why_not_independent(campaign);

@@ -122,11 +122,11 @@ Table execution_table(const Review& review) {
        {"results computed a second time",
         fmt::format("{}, {} of them differed", execution.num_audited, execution.num_contradicting)},
        {"runs given up", std::to_string(review.num_given_up)}});
-  for (const LossShare& loss : execution.losses) {
+  for (const LossCount& loss : execution.losses) {
     table.rows.push_back(
         {fmt::format("lost: {}", loss.reason),
          fmt::format("{} runs in {} losses, {}", loss.num_runs, loss.num_losses,
-                     loss.is_blamed ? "counted against these runs" : "no run is blamed")});
+                     loss.num_blamed > 0 ? "counted against these runs" : "no run is blamed")});
   }
   return table;
 }

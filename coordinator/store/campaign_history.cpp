@@ -1,5 +1,7 @@
 #include "coordinator/store/campaign_history.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <set>
@@ -95,16 +97,18 @@ std::vector<HostShare> read_hosts(const Database& database) {
 }
 
 /// Reasons are words of this program; a file from elsewhere may have any number of others.
-std::vector<LossShare> read_losses(const Database& database) {
-  Statement rows = database.prepare(
-      "SELECT reason, count(*), sum(num_runs), is_blamed FROM attempt GROUP BY reason, is_blamed "
-      "ORDER BY sum(num_runs) DESC, reason, is_blamed LIMIT 20");
-  std::vector<LossShare> losses;
-  while (rows.step()) {
-    losses.push_back({.reason = rows.text(0),
-                      .num_losses = rows.count(1),
-                      .num_runs = rows.count(2),
-                      .is_blamed = rows.integer(3) != 0});
+/// @param keys  Columns of which each combination is counted by itself.
+std::vector<LossCount> losses_by(const Database& database, std::string_view keys) {
+  Statement row = database.prepare(
+      fmt::format("SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt "
+                  "GROUP BY {0} ORDER BY 3 DESC, {0} LIMIT 20",
+                  keys));
+  std::vector<LossCount> losses;
+  while (row.step()) {
+    losses.push_back({.reason = row.text(0),
+                      .num_losses = row.count(1),
+                      .num_runs = row.count(2),
+                      .num_blamed = row.count(3)});
   }
   return losses;
 }
@@ -143,19 +147,7 @@ std::vector<StoredEvent> CampaignHistory::events_after(std::uint64_t id,
   return events;
 }
 
-std::vector<LossCount> CampaignHistory::losses() const {
-  Statement row = database_->prepare(
-      "SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt GROUP BY reason "
-      "ORDER BY 3 DESC, reason");
-  std::vector<LossCount> losses;
-  while (row.step()) {
-    losses.push_back({.reason = row.text(0),
-                      .num_losses = row.count(1),
-                      .num_runs = row.count(2),
-                      .num_blamed = row.count(3)});
-  }
-  return losses;
-}
+std::vector<LossCount> CampaignHistory::losses() const { return losses_by(*database_, "reason"); }
 
 // The condition of the inner query is that of an index: completed runs are not looked at.
 std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
@@ -217,7 +209,7 @@ Execution Store::execution() const {
   Statement total = database.prepare("SELECT total(compute_s) FROM worker");
   if (total.step()) execution.compute_s = total.real(0);
   execution.hosts = read_hosts(database);
-  execution.losses = read_losses(database);
+  execution.losses = losses_by(database, "reason, is_blamed");
   execution.num_retried = database.count("SELECT count(*) FROM delivery WHERE attempt > 1");
   execution.num_audited = num_compared();
   execution.num_contradicting = database.count("SELECT count(*) FROM audit WHERE NOT is_equal");

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/store/records.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -25,14 +26,6 @@ struct StoredEvent {
   std::string text = {};
 
   bool operator==(const StoredEvent&) const = default;
-};
-
-/// Losses with one reason: runs that came back without a result, and were lent again.
-struct LossCount {
-  std::string reason = {};
-  std::uint64_t num_losses = 0;  ///< Ranges of runs.
-  std::uint64_t num_runs = 0;
-  std::uint64_t num_blamed = 0;  ///< Losses that count against their runs.
 };
 
 /// Finished runs that ended without an estimate in one way.

@@ -120,12 +120,12 @@ struct HostShare {
   double compute_s = 0.0;  ///< Time of processor cores.
 };
 
-/// Runs that came back without a result, for one reason.
-struct LossShare {
+/// Losses of one kind: runs that came back without a result, and were lent again.
+struct LossCount {
   std::string reason;
   std::uint64_t num_losses = 0;  ///< Ranges of runs.
   std::uint64_t num_runs = 0;
-  bool is_blamed = false;  ///< They count against these runs.
+  std::uint64_t num_blamed = 0;  ///< Losses that count against their runs.
 };
 
 /// How a campaign was computed, as far as its database keeps it.
@@ -135,7 +135,8 @@ struct Execution {
   std::uint64_t num_hosts = 0;
   double compute_s = 0.0;        ///< Of the results that were kept; time of processor cores.
   std::vector<HostShare> hosts;  ///< At most 20, those with the most results first.
-  std::vector<LossShare> losses;
+  /// By reason and whether they are blamed, the one with the most runs first.
+  std::vector<LossCount> losses;
   std::uint64_t num_retried = 0;  ///< Results that were kept of a later attempt than the first.
   std::uint64_t num_audited = 0;  ///< Results that were compared with a second one.
   std::uint64_t num_contradicting = 0;  ///< Second results that differed.

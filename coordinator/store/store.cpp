@@ -172,7 +172,6 @@ std::vector<std::vector<double>> Store::table_columns() const {
 }
 
 void Store::extend(const Campaign& campaign, std::string_view definition) {
-  detail::check_extension(impl_->database, campaign);
   impl_->commit(
       [&](Database& database) { detail::extend_campaign(database, campaign, definition); });
 }

@@ -129,8 +129,8 @@ class Store {
   [[nodiscard]] std::vector<std::vector<double>> table_columns() const;
 
   /// Raises the number of runs; takes the table values of the new ones.
-  /// @throws StoreError if that number is less than before, or if name, seed, data tables or the
-  ///         table values of the old runs are not those of the file. The caller compares the rest.
+  /// @pre It is the campaign of the file: the caller has compared them.
+  /// @throws StoreError if the file has more runs.
   void extend(const Campaign& campaign, std::string_view definition);
 
   [[nodiscard]] CampaignControl control() const;

@@ -39,6 +39,12 @@ bool is_written_out(const OpenFile& file) {
   return file.writing.empty() && file.waiting.size() == 0;
 }
 
+/// Whether an entry that is for no single campaign is for this file.
+bool concerns(const Entry& entry, const OpenFile& file) {
+  const auto* const ended = std::get_if<WorkerEnded>(&entry);
+  return ended != nullptr ? file.known.contains(ended->session) : !file.is_rest_wanted;
+}
+
 /// Keeps in mind which workers the file has without an end.
 void note_worker(OpenFile& file, const Entry& entry) {
   if (const auto* joined = std::get_if<WorkerJoined>(&entry)) file.known.insert(joined->session);
@@ -54,7 +60,6 @@ struct StoreWriter::Impl {
   // Called by the service.
   OpenFile& file(wire::CampaignId campaign);
   void add(wire::CampaignId campaign, Entry entry);
-  void add_where(const Entry& entry, const std::function<bool(const OpenFile&)>& is_for);
   [[nodiscard]] bool add(OpenFile& open_file, Entry entry);
   void wait_for(wire::CampaignId campaign, std::function<void()> action);
 
@@ -98,21 +103,15 @@ void StoreWriter::Impl::add(wire::CampaignId campaign, Entry entry) {
   bool is_sooner = false;
   {
     const std::lock_guard lock(mutex);
-    is_sooner = add(file(campaign), std::move(entry));
-  }
-  if (is_sooner) changed.notify_one();  // Otherwise the thread would wake for every result.
-}
-
-void StoreWriter::Impl::add_where(const Entry& entry,
-                                  const std::function<bool(const OpenFile&)>& is_for) {
-  bool is_sooner = false;
-  {
-    const std::lock_guard lock(mutex);
-    for (auto& [campaign, open_file] : files) {
-      if (is_for(open_file)) is_sooner = add(open_file, entry) || is_sooner;
+    if (campaign != wire::CampaignId{}) {
+      is_sooner = add(file(campaign), std::move(entry));
+    } else {
+      for (auto& [id, open_file] : files) {
+        if (concerns(entry, open_file)) is_sooner = add(open_file, entry) || is_sooner;
+      }
     }
   }
-  if (is_sooner) changed.notify_one();
+  if (is_sooner) changed.notify_one();  // Otherwise the thread would wake for every result.
 }
 
 /// True if the file is to be written to sooner than before. @pre The lock is held.
@@ -221,11 +220,12 @@ void StoreWriter::Impl::fold(wire::CampaignId campaign, Lock& lock) {
   }
   if (reason.has_value() == open_file.is_log_kept) return;
   open_file.is_log_kept = reason.has_value();
-  if (reason) {
-    completions.emplace_back(LogKept{.campaign = campaign, .reason = *reason});
-  } else {
-    completions.emplace_back(LogFolded{.campaign = campaign});
-  }
+  completions.emplace_back(
+      FileEvent{.campaign = campaign,
+                .event = reason ? wire::Event{.severity = wire::Severity::warning,
+                                              .kind = "write_ahead_log_kept",
+                                              .fields = {wire::Field::reason(*reason)}}
+                                : wire::Event{.kind = "write_ahead_log_folded"}});
   lock.unlock();
   wake();
   lock.lock();
@@ -281,11 +281,14 @@ void StoreWriter::Impl::watch_log(wire::CampaignId campaign, OpenFile& open_file
   const bool is_large = log_size > config.log_size_max;
   if (is_large == open_file.has_large_log) return;
   open_file.has_large_log = is_large;
+  wire::Event event{.kind = "write_ahead_log_shrunk"};
   if (is_large) {
-    completions.emplace_back(LogGrown{.campaign = campaign, .size = log_size});
-  } else {
-    completions.emplace_back(LogShrunk{.campaign = campaign});
+    event = {.severity = wire::Severity::warning,
+             .kind = "write_ahead_log_grown",
+             .fields = {{"size_bytes", log_size},
+                        wire::Field::remark("(somebody reads an old state of the file)")}};
   }
+  completions.emplace_back(FileEvent{.campaign = campaign, .event = std::move(event)});
 }
 
 std::optional<TimePoint> StoreWriter::Impl::next_due_time() const {
@@ -353,36 +356,8 @@ void StoreWriter::access(wire::CampaignId campaign, const std::function<void(Sto
   });
 }
 
-void StoreWriter::deliver(wire::CampaignId campaign, Delivery delivery) {
-  impl_->add(campaign, std::move(delivery));
-}
-
-void StoreWriter::compare(wire::CampaignId campaign, Delivery delivery) {
-  impl_->add(campaign, SecondDelivery{.delivery = std::move(delivery)});
-}
-
-void StoreWriter::record_loss(wire::CampaignId campaign, const ReturnedRuns& lost) {
-  impl_->add(campaign, lost);
-}
-
-void StoreWriter::give_up(wire::CampaignId campaign, RunIndex run) {
-  impl_->add(campaign, GivenUpRun{.run = run});
-}
-
-void StoreWriter::record_event(wire::CampaignId campaign, EventEntry event) {
-  if (campaign != wire::CampaignId{}) {
-    impl_->add(campaign, std::move(event));
-    return;
-  }
-  impl_->add_where(event, [](const OpenFile& file) { return !file.is_rest_wanted; });
-}
-
-void StoreWriter::record_worker_joined(wire::CampaignId campaign, const WorkerJoined& worker) {
-  impl_->add(campaign, worker);
-}
-
-void StoreWriter::record_worker_ended(const WorkerEnded& ended) {
-  impl_->add_where(ended, [&](const OpenFile& file) { return file.known.contains(ended.session); });
+void StoreWriter::write(wire::CampaignId campaign, Entry entry) {
+  impl_->add(campaign, std::move(entry));
 }
 
 void StoreWriter::rest(wire::CampaignId campaign) {
@@ -395,10 +370,6 @@ void StoreWriter::rest(wire::CampaignId campaign) {
   impl_->changed.notify_one();
 }
 
-void StoreWriter::set_control(wire::CampaignId campaign, const CampaignControl& control) {
-  impl_->add(campaign, control);
-}
-
 void StoreWriter::hurry(wire::CampaignId campaign) {
   {
     const std::lock_guard lock(impl_->mutex);
@@ -406,8 +377,6 @@ void StoreWriter::hurry(wire::CampaignId campaign) {
   }
   impl_->changed.notify_one();
 }
-
-void StoreWriter::retry_given_up(wire::CampaignId campaign) { impl_->add(campaign, RetriedRuns{}); }
 
 std::vector<Completion> StoreWriter::take_completions() {
   const std::lock_guard lock(impl_->mutex);

@@ -28,7 +28,7 @@ struct WriterConfig {
   /// Entries other than results that wait for one file, at most; further ones are counted and
   /// dropped.
   std::size_t num_records_max = 100'000;
-  /// Size of a file's write-ahead log above which LogGrown is said. Some megabytes are usual.
+  /// Size of a file's write-ahead log above which an event says so. Some megabytes are usual.
   std::uint64_t log_size_max = std::uint64_t{64} << 20;
 };
 
@@ -57,34 +57,21 @@ struct StoreRecovered {
   wire::CampaignId campaign;
 };
 
-/// The write-ahead log has become larger than usual: somebody has been reading one state of the
-/// file for long, and what was written since cannot leave the log before they end. Said once until
-/// LogShrunk. Nothing is lost, but for space on the disk.
-struct LogGrown {
+/// Something to be logged about a file, said once until it is over:
+///
+///     write_ahead_log_grown   somebody has been reading one state of the file for long, and what
+///     was
+///                             written since cannot leave the log before they end; nothing is lost
+///                             but space on the disk. Over with write_ahead_log_shrunk
+///     write_ahead_log_kept    after a file has come to rest: for the same reason its log cannot be
+///                             folded in, and the file must be copied together with it for now;
+///                             tried again each `retry_after`. Over with write_ahead_log_folded
+struct FileEvent {
   wire::CampaignId campaign;
-  std::uint64_t size = 0;  ///< Bytes.
+  wire::Event event;
 };
 
-/// The log is of the usual size again.
-struct LogShrunk {
-  wire::CampaignId campaign;
-};
-
-/// After rest(): the write-ahead log cannot be folded into the file while somebody reads an old
-/// state of it. The file must be copied together with its log for now. Said once until LogFolded;
-/// tried again each `retry_after`.
-struct LogKept {
-  wire::CampaignId campaign;
-  std::string reason;
-};
-
-/// The log that was kept is folded in: the file is whole without it.
-struct LogFolded {
-  wire::CampaignId campaign;
-};
-
-using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered, LogGrown,
-                                LogShrunk, LogKept, LogFolded>;
+using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered, FileEvent>;
 
 /// Writes to campaign databases, in a thread of its own: a service never waits for a disk.
 ///
@@ -111,24 +98,15 @@ class StoreWriter {
   /// been tried; waits for it, and throws what it throws. For what is rare: more runs, statistics.
   void access(wire::CampaignId campaign, const std::function<void(Store&)>& action);
 
-  /// Stores a result: leads to Committed with its run.
-  void deliver(wire::CampaignId campaign, Delivery delivery);
+  /// Stores an entry. A Delivery leads to Committed with its run; a SecondDelivery, of a run of
+  /// which a result is stored or was handed over before, to Compared. A worker's WorkerJoined goes
+  /// to the files of campaigns of which it was lent runs.
+  /// @param campaign  0 for all files that are concerned: of a WorkerEnded those that have the
+  /// worker
+  ///                  without an end, of anything else those that are not at rest.
+  void write(wire::CampaignId campaign, Entry entry);
   /// No more results will come soon: those that were delivered are committed at once.
   void hurry(wire::CampaignId campaign);
-  /// Compares a second result of a run: leads to Compared.
-  /// @pre A result of this run is stored, or was handed to deliver().
-  void compare(wire::CampaignId campaign, Delivery delivery);
-
-  void record_loss(wire::CampaignId campaign, const ReturnedRuns& lost);
-  void give_up(wire::CampaignId campaign, RunIndex run);
-  /// @param campaign  0 for all that are open and not at rest.
-  void record_event(wire::CampaignId campaign, EventEntry event);
-  /// To be called for the files of campaigns of which the worker was lent runs.
-  void record_worker_joined(wire::CampaignId campaign, const WorkerJoined& worker);
-  /// To all files that have the worker without an end.
-  void record_worker_ended(const WorkerEnded& ended);
-  void set_control(wire::CampaignId campaign, const CampaignControl& control);
-  void retry_given_up(wire::CampaignId campaign);
 
   /// Nothing more is expected for a file: once all that was handed over is written, the write-ahead
   /// log is folded in, so that a copy of the file alone is whole. Later entries are written as

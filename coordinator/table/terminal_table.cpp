@@ -243,11 +243,6 @@ std::string left_aligned(std::string_view text, std::size_t width) {
   return std::string(text) + std::string(width > taken ? width - taken : 0, ' ');
 }
 
-std::string right_aligned(std::string_view text, std::size_t width) {
-  const std::size_t taken = display_width(text);
-  return std::string(width > taken ? width - taken : 0, ' ') + std::string(text);
-}
-
 std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin) {
   std::istringstream stream(text);
   std::string lines, word;

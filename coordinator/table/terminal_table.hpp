@@ -35,9 +35,8 @@ struct TerminalStyle {
 /// of 80 columns. Whatever the texts hold, they are visible.
 [[nodiscard]] std::string terminal_text(const Table& table, const TerminalStyle& style = {});
 
-/// Text filled up with spaces on the right or left to `width` columns of a terminal.
+/// Text filled up with spaces on the right to `width` columns of a terminal.
 [[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
-[[nodiscard]] std::string right_aligned(std::string_view text, std::size_t width);
 
 /// Text broken between words to lines of at most 80 columns, from the second one on after `indent`
 /// spaces; the first one begins at column `begin`. No end of the last line.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "core/random/normal.hpp"
@@ -11,8 +12,6 @@ namespace proofmass {
 namespace {
 
 constexpr double tail_factor = 2.0;
-/// Mean of |x| in standard deviations, for a normal x.
-constexpr double normal_deviation = 0.8;
 
 constexpr double location_weight = 0.5;
 constexpr double scale_weight = 0.4;
@@ -32,101 +31,88 @@ std::vector<double> distances(std::span<const double> values, double centre) {
   return distances;
 }
 
-ErrorPasses first_pass_of(std::span<const double> values) {
-  ErrorPasses passes;
-  for (const double value : values) passes.add(value);
-  return passes;
-}
-
-std::size_t num_beyond(std::span<const double> values, double limit) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(values, [&](double value) { return std::abs(value) > limit; }));
-}
-
-}  // namespace
-
-void ErrorPasses::add(double error) {
-  ++count_;
-  sum_.add(error);
-  square_sum_.add(error * error);
-}
-
-double ErrorPasses::mean() const { return sum_.value() / static_cast<double>(count_); }
-
-void ErrorPasses::begin_second(double limit) {
-  mean_ = mean();
-  limit_ = limit;
-  const double mean_square = square_sum_.value() / static_cast<double>(count_);
-  const double variance = std::max(mean_square - mean_ * mean_, 0.0);
-  errors_ = MomentSums(mean_);
-  deviations_ = MomentSums(normal_deviation * std::sqrt(variance));
-}
-
-void ErrorPasses::add_again(double error) {
-  errors_.add(error);
-  const double deviation = error - mean_;
-  deviations_.add(std::abs(deviation));
-  if (deviation != 0.0) sign_sum_.add(std::copysign(1.0, deviation));
-  signed_square_sum_.add(deviation * std::abs(deviation));
-  if (std::abs(error) > limit_) ++num_in_tail_;
-}
-
-Moments ErrorPasses::scale_moments() const {
-  Moments scale = deviations();
-  if (scale.count < 2) return scale;
+/// Of |x − mean| − s (x − mean), s being the mean sign of x − mean: the same mean as |x − mean|
+/// has, and the scatter that this mean has, as the mean of a skew law moves it.
+Moments scale_moments(std::span<const double> errors) {
+  const double mean = mean_of(errors, {});
+  const std::vector<double> deviations = distances(errors, mean);
+  Moments scale = moments(deviations);
+  CompensatedSum signs, signed_squares;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    const double deviation = errors[i] - mean;
+    if (deviation != 0.0) signs.add(std::copysign(1.0, deviation));
+    signed_squares.add(deviation * deviations[i]);
+  }
   const auto n = static_cast<double>(scale.count);
-  const double sign = sign_sum_.value() / n;
-  const double covariance = signed_square_sum_.value() / (n - 1.0);
-  const double deviation = errors().standard_deviation;
+  const double sign = signs.value() / n;
+  const double covariance = signed_squares.value() / (n - 1.0);
+  const double deviation = moments(errors).standard_deviation;
   const double variance = scale.standard_deviation * scale.standard_deviation +
                           sign * (sign * deviation * deviation - 2.0 * covariance);
   scale.standard_deviation = std::sqrt(std::max(variance, 0.0));
   return scale;
 }
 
-double tail_limit(const ErrorPasses& first, const ErrorPasses& second) {
-  const double squares = first.square_sum() + second.square_sum();
-  return tail_factor * std::sqrt(squares / static_cast<double>(first.count() + second.count()));
+/// What a pair has of |error − mean of its campaign| more in the second campaign.
+std::vector<double> deviation_differences(std::span<const double> first,
+                                          std::span<const double> second) {
+  const std::vector<double> of_first = distances(first, mean_of(first, {}));
+  std::vector<double> differences = distances(second, mean_of(second, {}));
+  std::ranges::transform(differences, of_first, differences.begin(), std::minus<>());
+  return differences;
 }
 
-ChangePValues compare_many_errors(const ErrorPasses& first, const ErrorPasses& second) {
-  return {
-      .location = compare_means(first.errors(), second.errors(), default_confidence).mean_p_value,
-      .scale = compare_means(first.scale_moments(), second.scale_moments(), default_confidence)
-                   .mean_p_value,
-      .tail = fisher_exact_p_value({.num_first = first.count(),
-                                    .tail_first = first.num_in_tail(),
-                                    .num_second = second.count(),
-                                    .tail_second = second.num_in_tail()})};
+}  // namespace
+
+double tail_limit(std::span<const double> first, std::span<const double> second) {
+  const auto square_sum = [](std::span<const double> errors) {
+    CompensatedSum sum;
+    for (const double error : errors) sum.add(error * error);
+    return sum.value();
+  };
+  const auto count = static_cast<double>(first.size() + second.size());
+  return tail_factor * std::sqrt((square_sum(first) + square_sum(second)) / count);
 }
 
-ChangePValues compare_few_errors(std::span<const double> first, std::span<const double> second) {
-  const double centre = mean_of(first, second);
-  const double limit = tail_limit(first_pass_of(first), first_pass_of(second));
-  return {.location = compare_unpaired(first, second, default_confidence).p_value,
-          .scale = compare_unpaired(distances(first, centre), distances(second, centre),
-                                    default_confidence)
-                       .p_value,
-          .tail = fisher_exact_p_value({.num_first = first.size(),
-                                        .tail_first = num_beyond(first, limit),
-                                        .num_second = second.size(),
-                                        .tail_second = num_beyond(second, limit)})};
+std::size_t num_beyond(std::span<const double> errors, double limit) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(errors, [&](double error) { return std::abs(error) > limit; }));
 }
 
-void PairedErrors::add(const CentredError& first, const CentredError& second, double limit) {
-  differences.push_back(second.error - first.error);
-  deviation_differences.push_back(std::abs(second.error - second.mean) -
-                                  std::abs(first.error - first.mean));
-  const bool is_first_beyond = std::abs(first.error) > limit;
-  const bool is_second_beyond = std::abs(second.error) > limit;
-  if (is_first_beyond && !is_second_beyond) ++num_only_first;
-  if (is_second_beyond && !is_first_beyond) ++num_only_second;
+ChangePValues compare_errors(std::span<const double> first, std::span<const double> second) {
+  const double limit = tail_limit(first, second);
+  ChangePValues changes{.tail = fisher_exact_p_value({.num_first = first.size(),
+                                                      .tail_first = num_beyond(first, limit),
+                                                      .num_second = second.size(),
+                                                      .tail_second = num_beyond(second, limit)})};
+  if (std::min(first.size(), second.size()) < num_welch_min) {
+    const double centre = mean_of(first, second);
+    changes.location = compare_unpaired(first, second, default_confidence).p_value;
+    changes.scale =
+        compare_unpaired(distances(first, centre), distances(second, centre), default_confidence)
+            .p_value;
+  } else {
+    changes.location = compare_means(moments(first), moments(second), default_confidence).p_value;
+    changes.scale =
+        compare_means(scale_moments(first), scale_moments(second), default_confidence).p_value;
+  }
+  return changes;
 }
 
-ChangePValues compare_paired_errors(PairedErrors pairs) {
-  return {.location = rank_test_p_value(std::move(pairs.differences)),
-          .scale = rank_test_p_value(std::move(pairs.deviation_differences)),
-          .tail = sign_test_p_value(pairs.num_only_first, pairs.num_only_second)};
+ChangePValues compare_paired_errors(std::span<const double> first, std::span<const double> second) {
+  const double limit = tail_limit(first, second);
+  std::vector<double> differences(first.size());
+  std::ranges::transform(second, first, differences.begin(), std::minus<>());
+  std::size_t num_only_first = 0, num_only_second = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const bool is_first_beyond = std::abs(first[i]) > limit;
+    const bool is_second_beyond = std::abs(second[i]) > limit;
+    if (is_first_beyond && !is_second_beyond) ++num_only_first;
+    if (is_second_beyond && !is_first_beyond) ++num_only_second;
+  }
+  return {.location = rank_test_p_value(std::move(differences)),
+          .scale = rank_test_p_value(deviation_differences(first, second)),
+          .tail = sign_test_p_value(num_only_first, num_only_second)};
 }
 
 namespace {
@@ -141,26 +127,29 @@ double found_deviate(std::size_t num_parameters) {
 }  // namespace
 
 // (f − 1)² = z²(c₁²/m + f² c₂²/n) with the relative deviations c of the distances from the mean.
-std::optional<double> smallest_scale_factor(const ErrorPasses& first, const ErrorPasses& second,
+std::optional<double> smallest_scale_factor(std::span<const double> first,
+                                            std::span<const double> second,
                                             std::size_t num_parameters) {
+  if (std::min(first.size(), second.size()) < num_welch_min) return std::nullopt;
   const auto share = [&](const Moments& scale) {
     const double relative = found_deviate(num_parameters) * scale.standard_deviation / scale.mean;
     return relative * relative / static_cast<double>(scale.count);
   };
-  const double a = share(first.scale_moments());
-  const double b = share(second.scale_moments());
+  const double a = share(scale_moments(first));
+  const double b = share(scale_moments(second));
   if (!(a < 1.0 && b < 1.0)) return std::nullopt;
   return (1.0 + std::sqrt(1.0 - (1.0 - a) * (1.0 - b))) / (1.0 - b);
 }
 
 // A signed-rank test needs no more than 1/0.864 times the pairs of Student's t, whatever the law.
-std::optional<double> smallest_scale_factor(const ErrorPasses& first, const PairedErrors& pairs,
-                                            std::size_t num_parameters) {
+std::optional<double> smallest_paired_scale_factor(std::span<const double> first,
+                                                   std::span<const double> second,
+                                                   std::size_t num_parameters) {
   constexpr double least_efficiency = 0.864;
-  const auto n = static_cast<double>(pairs.deviation_differences.size());
-  const double deviation = moments(pairs.deviation_differences).standard_deviation;
+  const auto n = static_cast<double>(first.size());
+  const double deviation = moments(deviation_differences(first, second)).standard_deviation;
   const double change = found_deviate(num_parameters) * deviation / std::sqrt(least_efficiency * n);
-  const double mean = first.deviations().mean;
+  const double mean = moments(distances(first, mean_of(first, {}))).mean;
   if (!(mean > 0.0)) return std::nullopt;
   return 1.0 + change / mean;
 }

@@ -111,12 +111,12 @@ void fill(const std::filesystem::path& file, std::uint64_t num_runs) {
   Counter counter;
   StoreWriter writer([&] { counter.wake(); });
   writer.open(id, Store::create(file, campaign, ""));
-  writer.record_worker_joined(id, {.session = worker, .name = "null", .host = "here"});
+  writer.write(id, coordinator::WorkerJoined{.session = worker, .name = "null", .host = "here"});
   for (std::uint64_t run = 0; run < num_runs; ++run) {
-    writer.deliver(id, {.result = null_result(campaign.seed, RunIndex{run}),
-                        .worker = worker,
-                        .attempt = {1},
-                        .compute_s = 0.1});
+    writer.write(id, coordinator::Delivery{.result = null_result(campaign.seed, RunIndex{run}),
+                                           .worker = worker,
+                                           .attempt = {1},
+                                           .compute_s = 0.1});
     if (run % 1000 == 0) counter.wait(writer, run + 1, num_waiting_max);
   }
   counter.wait(writer, num_runs, 0);

@@ -251,7 +251,7 @@ def compare_unpaired(a, b, confidence):
             law.pvalue)
 
 
-def compare_many_errors(a, b):
+def compare_errors(a, b):
     first, second = columns[a], columns[b]
     limit = 2 * math.sqrt(np.mean(np.concatenate([first, second]) ** 2))
     location = scipy.stats.ttest_ind(second, first, equal_var=False)
@@ -385,7 +385,7 @@ CHECKS = {  # function: (values, relative tolerance)
     "first_order_index": (first_order_index, TOLERANCE),
     "rank_test": (rank_test, TOLERANCE),
     "compare_unpaired": (compare_unpaired, TOLERANCE),
-    "compare_many_errors": (compare_many_errors, TOLERANCE),
+    "compare_errors": (compare_errors, TOLERANCE),
     "holm_adjusted": (holm_adjusted, TOLERANCE),
     "student_quantile": (of_numbers(student_quantile), TOLERANCE),
     "student_two_sided": (of_numbers(lambda t, n: 2 * scipy.stats.t.sf(abs(t), n)), TOLERANCE),

@@ -127,17 +127,11 @@ void ask_about_campaigns(Questions& questions, const std::string& a, const std::
 }
 
 void ask_about_changes(Questions& questions, const std::string& a, const std::string& b) {
-  ErrorPasses first, second;
-  for (const double error : questions.column(a)) first.add(error);
-  for (const double error : questions.column(b)) second.add(error);
-  const double limit = tail_limit(first, second);
-  first.begin_second(limit);
-  second.begin_second(limit);
-  for (const double error : questions.column(a)) first.add_again(error);
-  for (const double error : questions.column(b)) second.add_again(error);
-  const ChangePValues found = compare_many_errors(first, second);
-  questions.ask(fmt::format("compare_many_errors {} {}", a, b),
-                {limit, found.location, found.scale, found.tail});
+  const std::vector<double>& first = questions.column(a);
+  const std::vector<double>& second = questions.column(b);
+  const ChangePValues found = compare_errors(first, second);
+  questions.ask(fmt::format("compare_errors {} {}", a, b),
+                {tail_limit(first, second), found.location, found.scale, found.tail});
 }
 
 void ask_about_two_columns(Questions& questions) {

@@ -10,10 +10,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <variant>
 
 #include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/names.hpp"
@@ -30,10 +28,6 @@ wire::CampaignPhase read_phase(const Database& database, std::string_view name) 
     if (wire::name_of(phase) == name) return phase;
   }
   database.refuse_as_damaged(fmt::format("phase = {}", name));
-}
-
-std::uint64_t stored_num_runs(const Database& database) {
-  return database.count("SELECT num_runs FROM campaign");
 }
 
 void insert_data_tables(Database& database, const std::vector<DataTable>& tables) {
@@ -53,15 +47,6 @@ void insert_data_tables(Database& database, const std::vector<DataTable>& tables
   }
 }
 
-/// The text at a key of a definition; empty if there is none.
-std::string text_at(const Campaign& campaign, std::string_view key) {
-  for (const DefinitionItem& item : campaign.items()) {
-    const auto* const text = std::get_if<std::string>(&item.value);
-    if (item.key == key && text != nullptr) return *text;
-  }
-  return "";
-}
-
 /// Name of each quantity with values in a table, in the order of the campaign's columns.
 std::vector<std::string_view> table_quantity_names(const Campaign& campaign) {
   std::vector<std::string_view> names;
@@ -76,45 +61,11 @@ void insert_dispersion_values(Database& database, const Campaign& campaign,
                               std::uint64_t first_run) {
   Statement insert = database.prepare("INSERT INTO dispersion_value VALUES (?, ?, ?)");
   const std::vector<std::string_view> names = table_quantity_names(campaign);
-  if (names.size() != campaign.table_columns.size()) {
-    throw StoreError(fmt::format("dispersion tables = {} (must be {}, one for each such quantity)",
-                                 campaign.table_columns.size(), names.size()));
-  }
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::vector<double>& values = campaign.table_columns[i];
-    if (values.size() < campaign.num_runs) {
-      throw StoreError(
-          fmt::format("dispersion.{} = table of {} values (must be {}, one for each run)", names[i],
-                      values.size(), campaign.num_runs));
-    }
     for (std::uint64_t run = first_run; run < campaign.num_runs; ++run) {
       insert.run(names[i], run, values[run]);
     }
-  }
-}
-
-void check_same(std::string_view field, const std::string& given, const std::string& stored) {
-  if (given == stored) return;
-  throw StoreError(fmt::format("{} = {} (the campaign database has {})", field, given, stored));
-}
-
-// All values are finite: they differ in the sign of a zero if equal, and that the file does not
-// keep.
-void check_same_values(std::string_view drawn_name, const std::vector<double>& given,
-                       const std::vector<double>& stored, std::uint64_t num_runs) {
-  if (stored.size() != num_runs) {
-    throw StoreError(fmt::format(
-        "dispersion.{} = table (the campaign database holds no values for it)", drawn_name));
-  }
-  if (given.size() < stored.size()) {
-    throw StoreError(
-        fmt::format("dispersion.{} = table of {} values (the campaign database has {})", drawn_name,
-                    given.size(), stored.size()));
-  }
-  for (std::size_t run = 0; run < stored.size(); ++run) {
-    if (given[run] == stored[run]) continue;
-    throw StoreError(fmt::format("dispersion.{} = {} (for run {} the campaign database has {})",
-                                 drawn_name, given[run], run, stored[run]));
   }
 }
 
@@ -199,33 +150,12 @@ std::vector<double> read_dispersion_values(const Database& database, std::string
   return values;
 }
 
-void check_extension(const Database& database, const Campaign& campaign) {
-  const std::uint64_t num_runs = stored_num_runs(database);
-  check_same("campaign.name", campaign.name, database.text("SELECT name FROM campaign"));
-  check_same("campaign.seed", std::to_string(campaign.seed),
-             database.text("SELECT seed FROM campaign"));
-  if (campaign.num_runs < num_runs) {
-    throw StoreError(
-        fmt::format("campaign.runs = {} (must be at least {}, as in the campaign "
-                    "database)",
-                    campaign.num_runs, num_runs));
-  }
-  const std::vector<DataTable> stored = read_data_tables(database);
-  const std::vector<DataTable> given = campaign.definition(TableColumns::left_out).tables;
-  if (stored != given) {
-    const std::string& key = (given.empty() ? stored : given).front().key;
-    throw StoreError(fmt::format("{} = {} (its rows are not those of the campaign database)", key,
-                                 text_at(campaign, key)));
-  }
-  const std::vector<std::string_view> names = table_quantity_names(campaign);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    check_same_values(names[i], campaign.table_columns[i],
-                      read_dispersion_values(database, names[i]), num_runs);
-  }
-}
-
 void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
-  insert_dispersion_values(database, campaign, stored_num_runs(database));
+  const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
+  if (campaign.num_runs < num_runs) {
+    database.refuse(fmt::format("has {} runs, and was to have {}", num_runs, campaign.num_runs));
+  }
+  insert_dispersion_values(database, campaign, num_runs);
   database.prepare("UPDATE campaign SET num_runs = ?, definition = ?")
       .run(campaign.num_runs, definition);
   fix_num_runs(database);

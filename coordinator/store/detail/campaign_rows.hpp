@@ -27,11 +27,8 @@ void insert_parameters(Database& database, const Campaign& campaign);
 [[nodiscard]] std::vector<double> read_dispersion_values(const Database& database,
                                                          std::string_view drawn_name);
 
-/// Checks that a campaign can replace the stored one: the same but for more runs.
-/// @throws StoreError naming what differs.
-void check_extension(const Database& database, const Campaign& campaign);
-
-/// Stores number of runs, definition and the table values of the new runs. @pre check_extension().
+/// Stores number of runs, definition and the table values of the new runs.
+/// @pre It is the stored campaign. @throws StoreError if that has more runs.
 void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition);
 
 /// How the campaign is served: columns of `campaign`.

@@ -116,29 +116,6 @@ const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name
                              .phase = wire::CampaignPhase::cancelled,
                              .created_utc = "2024-02-29T12:00:10Z"};
 
-TEST(ListingText, FitsATerminal) {
-  const std::string text = terminal_text(listing_table({&extreme, 1}), {.line_width_max = 80});
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
-  EXPECT_THAT(text, HasSubstr("… "));
-  EXPECT_THAT(text, HasSubstr(" cancell… "));
-  EXPECT_THAT(text, HasSubstr(" 18446744073709551615 2024-02-29\n"));
-}
-
-TEST(ListingJson, IsComplete) {
-  const ListedCampaign damaged{.file = "b.db", .problem = "is damaged"};
-  const std::vector<ListedCampaign> campaigns{extreme, damaged};
-  const auto json = nlohmann::json::parse(listing_json(campaigns))["campaigns"];
-  EXPECT_EQ(json[0]["file"], "/some/where/a-file-with-a-rather-long-name.db");
-  EXPECT_TRUE(json[0]["problem"].is_null());
-  EXPECT_EQ(json[0]["seed"], "18446744073709551615");
-  EXPECT_EQ(json[0]["phase"], "cancelled");
-  EXPECT_EQ(json[0]["num_runs"], 1'000'000'000);
-  EXPECT_EQ(json[0]["num_finished"], 999'999'999);
-  EXPECT_EQ(json[0]["created_utc"], "2024-02-29T12:00:10Z");
-  EXPECT_EQ(json[1], nlohmann::json({{"file", "b.db"}, {"problem", "is damaged"}}));
-}
-
 using ::testing::ThrowsMessage;
 
 std::vector<RunIndex> chosen_runs(const std::vector<RunRange>& runs, double fraction) {

@@ -1,5 +1,3 @@
-#include "coordinator/query/draw_table.hpp"
-
 #include <fmt/format.h>
 
 #include "coordinator/query/aggregates.hpp"
@@ -65,6 +63,22 @@ TEST_F(DrawTable, HasTheBitsOfTheSimulationsDraws) {
     }
   }
   EXPECT_GT(num_rejected, 10u);
+}
+
+// SQLite looks at each row itself where a column stands in an expression.
+TEST_F(DrawTable, OfSomeRunsHasTheRowsThatAreAskedFor) {
+  make_file(campaign_of(7));
+  const std::string rows = "SELECT run_index FROM draw WHERE quantity = '" + drawn_names()[3] + "'";
+  for (const std::string bound :
+       {"-9223372036854775808", "-1e300", "-1", "-0.5", "0", "0.5", "3", "5.999", "6", "6.5", "7",
+        "8", "1e300", "9223372036854775807", "NULL"}) {
+    for (const std::string comparison : {"=", ">", ">=", "<", "<="}) {
+      EXPECT_EQ(rows_of(rows + " AND run_index " + comparison + bound),
+                rows_of(rows + " AND +run_index " + comparison + bound))
+          << comparison << bound;
+    }
+  }
+  EXPECT_THAT(rows_of("SELECT * FROM draw WHERE quantity = 'nothing'"), IsEmpty());
 }
 
 /// The aggregates as window functions.
@@ -142,76 +156,3 @@ TEST_F(Window, PassesOnWhatAFunctionSays) {
 
 }  // namespace
 }  // namespace proofmass::test
-
-namespace proofmass::coordinator {
-namespace {
-
-constexpr std::uint64_t num_runs = 7;
-constexpr std::array comparisons{RunComparison::equal, RunComparison::above,
-                                 RunComparison::at_least, RunComparison::below,
-                                 RunComparison::at_most};
-
-template <typename Number>
-bool holds(std::uint64_t run, RunComparison comparison, Number bound) {
-  const auto value = static_cast<long double>(run);
-  const auto limit = static_cast<long double>(bound);
-  switch (comparison) {
-    case RunComparison::equal:
-      return value == limit;
-    case RunComparison::above:
-      return value > limit;
-    case RunComparison::at_least:
-      return value >= limit;
-    case RunComparison::below:
-      return value < limit;
-    case RunComparison::at_most:
-      return value <= limit;
-  }
-  return false;
-}
-
-template <typename Number>
-DrawScan narrowed(RunComparison comparison, Number bound) {
-  DrawScan scan{.first_run = 0, .end_run = num_runs, .quantity = {}};
-  scan.narrow(comparison, bound);
-  return scan;
-}
-
-bool is_in(const DrawScan& scan, std::uint64_t run) {
-  return run >= scan.first_run && run < scan.end_run;
-}
-
-TEST(DrawScan, HoldsJustTheRunsThatSatisfyAnInteger) {
-  constexpr auto limits = std::numeric_limits<std::int64_t>();
-  for (const std::int64_t bound :
-       {limits.min(), limits.min() + 1, std::int64_t{-1}, std::int64_t{0}, std::int64_t{3},
-        std::int64_t{6}, std::int64_t{7}, std::int64_t{8}, limits.max() - 1, limits.max()}) {
-    for (const RunComparison comparison : comparisons) {
-      for (std::uint64_t run = 0; run < num_runs; ++run) {
-        EXPECT_EQ(is_in(narrowed(comparison, bound), run), holds(run, comparison, bound))
-            << run << " " << static_cast<int>(comparison) << " " << bound;
-      }
-    }
-  }
-}
-
-TEST(DrawScan, HoldsAllRunsThatSatisfyADoubleAndAtMostOneMore) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  for (const double bound :
-       {-infinity, -1e300, -0.5, 0.0, 0.5, 3.0, 5.999, 6.0, 6.5, 1e300, infinity}) {
-    for (const RunComparison comparison : comparisons) {
-      int num_more = 0;
-      for (std::uint64_t run = 0; run < num_runs; ++run) {
-        const bool is_wanted = holds(run, comparison, bound);
-        const bool is_scanned = is_in(narrowed(comparison, bound), run);
-        EXPECT_TRUE(is_scanned || !is_wanted)
-            << run << " " << static_cast<int>(comparison) << " " << bound;
-        num_more += is_scanned && !is_wanted ? 1 : 0;
-      }
-      EXPECT_LE(num_more, 1) << static_cast<int>(comparison) << " " << bound;
-    }
-  }
-}
-
-}  // namespace
-}  // namespace proofmass::coordinator

@@ -21,11 +21,6 @@ std::string as_xml(std::string html) {
 
 class ReviewHtml : public test::ReviewTest {};
 
-TEST_F(ReviewHtml, IsWellFormed) {
-  const Store store = store_with(60);
-  EXPECT_EQ(test::malformed_part(as_xml(review_html(review_of(store, 60)))), "");
-}
-
 TEST_F(ReviewHtml, ShowsTextOfStrangersAsText) {
   const Store store = store_with(20);
   Review review = review_of(store, 20,
@@ -118,23 +113,6 @@ TEST_F(ReviewHtml, ShowsTheSpectraOfTheWorstRun) {
   review.spectra->sessions.clear();
   const std::string reasons = review_html(review);
   EXPECT_THAT(reasons, AllOf(HasSubstr("&lt;script&gt;"), Not(HasSubstr("bit for bit"))));
-}
-
-// One line of measured densities, one of what is left, one of the model; lines of the estimate and
-// others apart.
-TEST_F(ReviewHtml, DrawsASpectrumInFiveLayers) {
-  const std::vector<Chart> charts = spectrum_charts(some_spectra());
-  ASSERT_EQ(charts.size(), 1U);
-  ASSERT_EQ(charts[0].layers.size(), 5U);
-  for (const std::size_t i : {0U, 1U, 2U}) {
-    EXPECT_EQ(std::get<Line>(charts[0].layers[i]).points.size(), 97U);
-  }
-  const auto& used = std::get<Markers>(charts[0].layers[3]);
-  const auto& others = std::get<Markers>(charts[0].layers[4]);
-  ASSERT_EQ(used.points.size(), 1U);
-  ASSERT_EQ(others.points.size(), 1U);
-  EXPECT_EQ(used.points[0].y, 4e-7);
-  EXPECT_EQ(others.points[0].x, 5e-3);
 }
 
 TEST_F(ReviewHtml, KnowsTheWorstRun) {
@@ -296,14 +274,6 @@ std::vector<RunResult> some_results(std::uint64_t count) {
 
 StatedRequirement stated(const std::string& requirement) {
   return {.id = "R", .text = "", .requirement = requirement};
-}
-
-TEST(VerificationMatrix, CountsRunsThatWereGivenUp) {
-  const RequirementAnswer row =
-      answers_to({stated("k2c < 10 for 95% with 90%")}, some_results(60), 3)[0];
-  EXPECT_EQ(row.check.num_runs, 63U);
-  EXPECT_EQ(row.check.num_exceedances, 3U);
-  EXPECT_EQ(row.check.num_without_estimate, 3U);
 }
 
 TEST(VerificationMatrix, HasNoFiguresOfNoRuns) {

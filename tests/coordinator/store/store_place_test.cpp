@@ -13,7 +13,7 @@ class StorePlace : public test::WriterTest {
  protected:
   /// Hands results over and waits until the writer has tried to store them.
   void deliver(StoreWriter& writer, std::uint64_t first, std::uint64_t end) const {
-    for (std::uint64_t run = first; run < end; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = first; run < end; ++run) writer.write(id, delivery_of(run));
     writer.flush();
   }
   /// What a reader finds in a file: that many results, and all in order.

@@ -197,18 +197,18 @@ TEST_F(StoreRest, NoWriteLeavesACopyThatPassesAsWholeAndIsNot) {
 TEST_F(StoreRest, TheWriterBringsAFileToRestOnceAllIsWritten) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
-  for (std::uint64_t run = 0; run < 100; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < 100; ++run) writer.write(id, delivery_of(run));
   writer.rest(id);
   writer.flush();
   EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 100u);
   // An event is written, and the file comes to rest again.
-  writer.record_event(id, {.kind = "later", .text = ""});
-  writer.record_event({}, {.kind = "for those not at rest", .text = ""});
+  writer.write(id, EventEntry{.kind = "later", .text = ""});
+  writer.write({}, EventEntry{.kind = "for those not at rest", .text = ""});
   writer.flush();
   const std::filesystem::path alone = copy();
   EXPECT_EQ(test::event_kinds_in(alone), "later");
   EXPECT_EQ(test::text_in(alone, "SELECT is_log_needed FROM campaign"), "0");
-  EXPECT_THAT(take_completions(), Not(Contains("log kept")));
+  EXPECT_THAT(take_completions(), Not(Contains("write_ahead_log_kept")));
 }
 
 TEST_F(StoreRest, TheWriterSaysThatAReaderKeepsTheLogAndWhenItIsFolded) {
@@ -219,12 +219,12 @@ TEST_F(StoreRest, TheWriterSaysThatAReaderKeepsTheLogAndWhenItIsFolded) {
   writer.open(id, create(100));
   {
     const Reader reader(file());
-    writer.deliver(id, delivery_of(1));
+    writer.write(id, delivery_of(1));
     writer.rest(id);
-    wait_for("log kept");
+    wait_for("write_ahead_log_kept");
   }
-  const std::vector<std::string> texts = wait_for("log folded");
-  EXPECT_THAT(texts, Not(Contains("log kept")));
+  const std::vector<std::string> texts = wait_for("write_ahead_log_folded");
+  EXPECT_THAT(texts, Not(Contains("write_ahead_log_kept")));
   EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 1u);
 }
 
@@ -233,8 +233,8 @@ TEST_F(StoreRest, EndsForTheWriterWithTheNextResult) {
   writer.open(id, create(100));
   writer.rest(id);
   writer.flush();
-  writer.deliver(id, delivery_of(1));
-  writer.record_event({}, {.kind = "for those not at rest", .text = ""});
+  writer.write(id, delivery_of(1));
+  writer.write({}, EventEntry{.kind = "for those not at rest", .text = ""});
   writer.flush();
   const std::filesystem::path alone = copy();
   EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone));

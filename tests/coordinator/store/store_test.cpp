@@ -125,24 +125,6 @@ TEST_F(StoreTest, KeepsHealthAndWhereARunWasLost) {
   EXPECT_EQ(database.integer("SELECT num_lost FROM campaign_progress"), 1);
 }
 
-TEST_F(StoreTest, KeepsThatARunWasLostInAnySession) {
-  std::vector<Delivery> deliveries;
-  for (std::size_t i = 0; i < num_session_targets; ++i) {
-    RunResult result = result_of(i, RunStatus::lost);
-    result.loss = test::loss_of(LossCause::attitude, static_cast<SessionTarget>(i + 1));
-    deliveries.push_back({result, session_1, {1}, 1.0});
-  }
-  Store store = create(num_session_targets);
-  EXPECT_EQ(store.commit(deliveries).num_new, num_session_targets);
-  const Database database(file(), Access::read_only);
-  for (std::size_t i = 0; i < num_session_targets; ++i) {
-    EXPECT_EQ(results_in(store)[i].loss, deliveries[i].result.loss);
-    EXPECT_EQ(database.text("SELECT loss_session FROM loop_health WHERE run_index = " +
-                            std::to_string(i)),
-              name_of(static_cast<SessionTarget>(i + 1)));
-  }
-}
-
 TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
   std::vector<Delivery> deliveries;
   for (const auto status : {RunStatus::completed, RunStatus::not_converged, RunStatus::not_finite,
@@ -231,36 +213,6 @@ TEST_F(StoreTest, ExtendsToMoreRunsAndTheirTableValues) {
   const std::vector<double> first_column = store.table_columns()[0];
   EXPECT_THAT(first_column, ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0, 3.0 + 3.0 / 7.0));
   EXPECT_EQ(store.commit(deliveries_of(0, 4)).num_new, 2u);
-}
-
-TEST_F(StoreTest, RefusesToExtendToAnotherCampaign) {
-  Store store = Store::create(file(), campaign_with_data(3), "");
-  const auto error_after = [&](const std::function<void(MicroscopeCampaign&)>& change) {
-    MicroscopeCampaign campaign = campaign_with_data(3);
-    change(campaign);
-    return store_error_of([&] { store.extend(campaign, ""); });
-  };
-  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.name = "other"; }),
-            "campaign.name = other (the campaign database has hardy2013)");
-  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.seed = 2; }),
-            "campaign.seed = 2 (the campaign database has 1)");
-  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.num_runs = 2; }),
-            "campaign.runs = 2 (must be at least 3, as in the campaign database)");
-  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) {
-              campaign.environment_file = "e.csv";
-              campaign.environment_table[0].linear_m_s2[0] *= 2.0;
-            }),
-            "environment.file = e.csv (its rows are not those of the campaign database)");
-  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.table_columns[1][2] = 0.5; }),
-            "dispersion." + drawn_names()[17] +
-                " = 0.5 (for run 2 the campaign database has 17.285714285714285)");
-  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) {
-              campaign.dispersions[18] = campaign.dispersions[17];
-              campaign.table_columns.push_back(campaign.table_columns[1]);
-            }),
-            "dispersion." + drawn_names()[18] +
-                " = table (the campaign database holds no values for it)");
-  EXPECT_EQ(error_after([](Campaign&) {}), "");
 }
 
 TEST_F(StoreTest, KeepsTheDigestOfItsTables) {

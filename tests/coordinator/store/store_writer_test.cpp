@@ -20,7 +20,7 @@ using StoreWriterTest = test::WriterTest;
 TEST_F(StoreWriterTest, NamesResultsOnceTheyAreStored) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
-  for (const std::uint64_t run : {4u, 2u, 3u}) writer.deliver(id, delivery_of(run));
+  for (const std::uint64_t run : {4u, 2u, 3u}) writer.write(id, delivery_of(run));
   EXPECT_THAT(take_completions(), IsEmpty());
   writer.flush();
   EXPECT_THAT(take_completions(), ElementsAre("committed 4 2 3"));
@@ -34,7 +34,7 @@ TEST_F(StoreWriterTest, CommitsAsSoonAsEnoughResultsWait) {
   config.commit_runs_max = 3;
   StoreWriter& writer = start(config);
   writer.open(id, create(100));
-  for (std::uint64_t run = 0; run < 3; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < 3; ++run) writer.write(id, delivery_of(run));
   wait_for("committed 0 1 2");
 }
 
@@ -43,7 +43,7 @@ TEST_F(StoreWriterTest, CommitsAFewResultsAfterAWhile) {
   config.commit_after = std::chrono::milliseconds(1);
   StoreWriter& writer = start(config);
   writer.open(id, create(100));
-  writer.deliver(id, delivery_of(7));
+  writer.write(id, delivery_of(7));
   wait_for("committed 7");
 }
 
@@ -51,7 +51,7 @@ TEST_F(StoreWriterTest, CommitsAtOnceWhatNoMoreResultsFollow) {
   StoreWriter& writer = start(patient_config());
   writer.open(id, create(100));
   writer.hurry(id);
-  writer.deliver(id, delivery_of(7));
+  writer.write(id, delivery_of(7));
   EXPECT_THAT(take_completions(), IsEmpty()) << "there was nothing to hurry with";
   writer.hurry(id);
   wait_for("committed 7");
@@ -61,7 +61,7 @@ TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
   constexpr std::uint64_t num_runs = 20'000;
   StoreWriter& writer = start();
   writer.open(id, create(num_runs));
-  for (std::uint64_t run = 0; run < num_runs; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < num_runs; ++run) writer.write(id, delivery_of(run));
   writer.flush();
   std::uint64_t next = 0;
   for (const Completion& completion : writer.take_completions()) {
@@ -73,9 +73,9 @@ TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
 TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
-  writer.deliver(id, delivery_of(1));
-  writer.compare(id, delivery_of(1));
-  writer.compare(id, wrong_delivery_of(1));
+  writer.write(id, delivery_of(1));
+  writer.write(id, SecondDelivery{delivery_of(1)});
+  writer.write(id, SecondDelivery{wrong_delivery_of(1)});
   writer.flush();
   EXPECT_THAT(take_completions(),
               ElementsAre("committed 1", "compared 1 equal", "compared 1 different"));
@@ -84,20 +84,20 @@ TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
 TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
-  writer.record_worker_joined(id, worker_1());
-  writer.record_loss(id, {.runs = {RunIndex{3}, 1},
-                          .attempt = {1},
-                          .worker = test::session_1,
-                          .reason = wire::LossReason::crashed,
-                          .is_blamed = true});
-  writer.record_loss(id, {.runs = {RunIndex{4}, 1},
-                          .attempt = {1},
-                          .worker = test::session_1,
-                          .reason = wire::LossReason::crashed,
-                          .is_blamed = true});
-  writer.give_up(id, RunIndex{4});
-  writer.record_event(id, {.kind = "note", .text = "text"});
-  writer.set_control(id, {.phase = wire::CampaignPhase::paused, .priority = 3});
+  writer.write(id, worker_1());
+  writer.write(id, ReturnedRuns{.runs = {RunIndex{3}, 1},
+                                .attempt = {1},
+                                .worker = test::session_1,
+                                .reason = wire::LossReason::crashed,
+                                .is_blamed = true});
+  writer.write(id, ReturnedRuns{.runs = {RunIndex{4}, 1},
+                                .attempt = {1},
+                                .worker = test::session_1,
+                                .reason = wire::LossReason::crashed,
+                                .is_blamed = true});
+  writer.write(id, GivenUpRun{RunIndex{4}});
+  writer.write(id, EventEntry{.kind = "note", .text = "text"});
+  writer.write(id, CampaignControl{.phase = wire::CampaignPhase::paused, .priority = 3});
   const Store store = writer.close(id);
 
   EXPECT_THAT(store.attached_sessions(), ElementsAre(test::session_1));
@@ -115,10 +115,10 @@ TEST_F(StoreWriterTest, TellsOnlyTheFilesThatKnowAWorkerOfIt) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
   writer.open(other, Store::create(other_file, campaign_of(100), ""));
-  writer.record_worker_joined(id, worker_1());
-  writer.record_worker_joined(id, {.session = {2}, .name = "gone", .host = "node-2"});
+  writer.write(id, worker_1());
+  writer.write(id, WorkerJoined{.session = {2}, .name = "gone", .host = "node-2"});
   writer.flush();
-  writer.record_worker_ended({.session = {2}, .reason = wire::LossReason::drained});
+  writer.write({}, WorkerEnded{.session = {2}, .reason = wire::LossReason::drained});
   EXPECT_THAT(writer.close(id).attached_sessions(), ElementsAre(test::session_1));
   const Store untouched = writer.close(other);
   EXPECT_EQ(untouched.log_size(), 0u);
@@ -129,11 +129,11 @@ TEST_F(StoreWriterTest, TellsAFileOfTheEndOfAWorkerThatItKnewBefore) {
   start().open(id, create(100));
   StoreWriter& first = start();
   first.open(id, Store::open(file()));
-  first.record_worker_joined(id, worker_1());
+  first.write(id, worker_1());
   end();
   StoreWriter& writer = start();
   writer.open(id, Store::open(file()));
-  writer.record_worker_ended({.session = test::session_1, .reason = wire::LossReason::silent});
+  writer.write({}, WorkerEnded{.session = test::session_1, .reason = wire::LossReason::silent});
   EXPECT_THAT(writer.close(id).attached_sessions(), IsEmpty());
 }
 
@@ -144,16 +144,16 @@ TEST_F(StoreWriterTest, LetsRecordsWaitLongerThanResults) {
   config.commit_after = std::chrono::milliseconds(1);
   StoreWriter& writer = start(config);
   writer.open(id, create(100));
-  writer.record_event(id, {.kind = "early", .text = ""});
-  writer.deliver(id, delivery_of(7));
+  writer.write(id, EventEntry{.kind = "early", .text = ""});
+  writer.write(id, delivery_of(7));
   wait_for("committed 7");
   EXPECT_EQ(text("SELECT group_concat(kind) FROM event"), "early");
   config.record_after = std::chrono::milliseconds(1);
   config.commit_after = std::chrono::hours(1);
   StoreWriter& hasty = start(config);
   hasty.open(id, Store::open(file()));
-  hasty.deliver(id, delivery_of(8));
-  hasty.record_event(id, {.kind = "late", .text = ""});
+  hasty.write(id, delivery_of(8));
+  hasty.write(id, EventEntry{.kind = "late", .text = ""});
   wait_for("committed 8");
 }
 
@@ -162,10 +162,10 @@ TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
   writer.open(other, Store::create(directory() / "other.db", campaign_of(100), ""));
-  writer.deliver(id, delivery_of(1));
-  writer.deliver(other, delivery_of(2));
-  writer.record_event(other, {.kind = "one", .text = ""});
-  writer.record_event({}, {.kind = "all", .text = ""});
+  writer.write(id, delivery_of(1));
+  writer.write(other, delivery_of(2));
+  writer.write(other, EventEntry{.kind = "one", .text = ""});
+  writer.write({}, EventEntry{.kind = "all", .text = ""});
   writer.flush();
   EXPECT_THAT(take_completions(), ElementsAre("committed 1", "committed 2"));
   const std::string kinds = "SELECT group_concat(kind) FROM event";
@@ -176,13 +176,13 @@ TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
 TEST_F(StoreWriterTest, GivesTheFileBackWithAllThatWasHandedOver) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
-  writer.deliver(id, delivery_of(5));
+  writer.write(id, delivery_of(5));
   {
     Store store = writer.close(id);
     EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{5}, 1}));
     writer.open(id, std::move(store));
   }
-  writer.deliver(id, delivery_of(6));
+  writer.write(id, delivery_of(6));
   writer.flush();
   EXPECT_THAT(take_completions(), ElementsAre("committed 5", "committed 6"));
 }
@@ -190,16 +190,16 @@ TEST_F(StoreWriterTest, GivesTheFileBackWithAllThatWasHandedOver) {
 TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
   StoreWriter& writer = start();
   writer.open(id, create(100));
-  writer.deliver(id, delivery_of(99));
+  writer.write(id, delivery_of(99));
   writer.access(id, [](Store& store) {
     EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{99}, 1}));
     store.extend(campaign_of(200), "");
   });
-  writer.deliver(id, delivery_of(199));
+  writer.write(id, delivery_of(199));
   EXPECT_EQ(test::store_error_of([&] {
               writer.access(id, [](Store& store) { store.extend(campaign_of(150), ""); });
             }),
-            "campaign.runs = 150 (must be at least 200, as in the campaign database)");
+            message("has 200 runs, and was to have 150"));
   EXPECT_THAT(take_completions(), ElementsAre("committed 99", "committed 199"));
 }
 
@@ -209,29 +209,29 @@ TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
   config.log_size_max = 8'000'000;
   StoreWriter& writer = start(config);
   writer.open(id, create(50'000));
-  for (std::uint64_t run = 0; run < 10'000; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < 10'000; ++run) writer.write(id, delivery_of(run));
   writer.flush();
-  EXPECT_THAT(take_completions(), ::testing::Not(::testing::Contains("log grown")));
+  EXPECT_THAT(take_completions(), ::testing::Not(::testing::Contains("write_ahead_log_grown")));
   {
     const Database reader(file(), Access::read_only);
     detail::Statement select = reader.prepare("SELECT * FROM run_result");
     ASSERT_TRUE(select.step());
-    for (std::uint64_t run = 10'000; run < 50'000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = 10'000; run < 50'000; ++run) writer.write(id, delivery_of(run));
     writer.flush();
     for (int i = 0; i < 3; ++i) {
-      writer.record_event(id, {.kind = "note", .text = ""});
+      writer.write(id, EventEntry{.kind = "note", .text = ""});
       writer.flush();
     }
     const std::vector<std::string> texts = take_completions();
-    EXPECT_EQ(std::ranges::count(texts, "log grown"), 1);
-    EXPECT_THAT(texts, ::testing::Not(::testing::Contains("log shrunk")));
+    EXPECT_EQ(std::ranges::count(texts, "write_ahead_log_grown"), 1);
+    EXPECT_THAT(texts, ::testing::Not(::testing::Contains("write_ahead_log_shrunk")));
   }
   // One commit puts all that is in the log into the file, the next one begins the log anew.
   for (int i = 0; i < 2; ++i) {
-    writer.record_event(id, {.kind = "note", .text = ""});
+    writer.write(id, EventEntry{.kind = "note", .text = ""});
     writer.flush();
   }
-  EXPECT_THAT(take_completions(), ElementsAre("log shrunk"));
+  EXPECT_THAT(take_completions(), ElementsAre("write_ahead_log_shrunk"));
   const Store store = writer.close(id);
   EXPECT_LT(store.log_size(), config.log_size_max);
   EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 50'000}));
@@ -241,7 +241,7 @@ TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {
   start().open(id, create(100));
   StoreWriter& writer = start();  // The file of the first one is free.
   writer.open(id, Store::open(file()));
-  for (std::uint64_t run = 0; run < 50; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < 50; ++run) writer.write(id, delivery_of(run));
   end();
   EXPECT_EQ(results_in(Store::open(file())).size(), 50u);
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
@@ -256,7 +256,7 @@ TEST_F(StoreWriterTest, NamesNothingThatAKilledProcessLoses) {
     config.commit_runs_max = 10;
     StoreWriter& writer = start(config);
     writer.open(id, create(2000));
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
     for (std::uint64_t num_told = 0; num_told < 500;) {
       for (const Completion& completion : writer.take_completions()) {
         for (const RunIndex run : std::get<Committed>(completion).runs) {
@@ -299,11 +299,11 @@ TEST_F(StoreWriterDisk, KeepsEverythingThroughAFailureAndReportsItOnce) {
   writer.open(id, create(5000));
   {
     const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
-    writer.compare(id, wrong_delivery_of(1999));
+    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
+    writer.write(id, SecondDelivery{wrong_delivery_of(1999)});
     writer.flush();
     EXPECT_THAT(take_completions(), ElementsAre(failed(io_error)));
-    writer.deliver(id, delivery_of(2000));
+    writer.write(id, delivery_of(2000));
     writer.flush();
     EXPECT_THAT(take_completions(), IsEmpty());
     EXPECT_THAT(Store::open_read_only(file()).finished_runs(), IsEmpty());
@@ -323,7 +323,7 @@ TEST_F(StoreWriterDisk, TriesAgainByItself) {
   writer.open(id, create(5000));
   {
     const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
     wait_for(failed(io_error));
   }
   wait_for("recovered");
@@ -337,10 +337,10 @@ TEST_F(StoreWriterDisk, DropsRecordsThatNobodyWaitsForBeyondALimit) {
   writer.open(id, create(5000));
   {
     const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
     writer.flush();
     for (const std::string kind : {"a", "b", "c", "d", "e"}) {
-      writer.record_event(id, {.kind = kind, .text = ""});
+      writer.write(id, EventEntry{.kind = kind, .text = ""});
     }
     writer.flush();
   }
@@ -353,7 +353,7 @@ TEST_F(StoreWriterDisk, DropsRecordsThatNobodyWaitsForBeyondALimit) {
 TEST_F(StoreWriterDisk, ReportsWhatNoDiskIsToBlameFor) {
   StoreWriter& writer = start();
   writer.open(id, create(5));
-  writer.deliver(id, delivery_of(5));
+  writer.write(id, delivery_of(5));
   writer.flush();
   EXPECT_THAT(take_completions(),
               ElementsAre("failed run_result.run_index = 5 (must be below num_runs = 5)"));
@@ -364,8 +364,8 @@ TEST_F(StoreWriterDisk, ServesOtherFilesWhileOneFails) {
   StoreWriter& writer = start();
   writer.open(id, create(5));
   writer.open(other, Store::create(directory() / "other.db", campaign_of(100), ""));
-  writer.deliver(id, delivery_of(5));
-  writer.deliver(other, delivery_of(5));
+  writer.write(id, delivery_of(5));
+  writer.write(other, delivery_of(5));
   writer.flush();
   EXPECT_THAT(take_completions(), Contains("committed 5"));
   EXPECT_THAT(Store::open_read_only(file()).finished_runs(), IsEmpty());
@@ -375,7 +375,7 @@ TEST_F(StoreWriterDisk, GivesBackAFileThatCannotBeWritten) {
   StoreWriter& writer = start();
   writer.open(id, create(5000));
   const FileSizeLimit limit(small_size);
-  for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
   const Store store = writer.close(id);
   EXPECT_THAT(store.finished_runs(), IsEmpty());
   EXPECT_THAT(take_completions(), ElementsAre(failed(io_error)));
@@ -386,7 +386,7 @@ TEST_F(StoreWriterDisk, EndsWithoutWaitingForIt) {
   writer.open(id, create(5000));
   {
     const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
     end();
   }
   EXPECT_THAT(Store::open(file()).finished_runs(), IsEmpty());
@@ -422,7 +422,7 @@ TEST_F(StoreWriterDisk, GoesOnWhenSpaceIsFreedOnAFullOne) {
   writer.open(id, Store::create(mount / "campaign.db", campaign_of(5000), ""));
   std::ofstream ballast(mount / "ballast");
   ballast << std::string(700'000, 'x') << std::flush;
-  for (std::uint64_t run = 0; run < 1000; ++run) writer.deliver(id, delivery_of(run));
+  for (std::uint64_t run = 0; run < 1000; ++run) writer.write(id, delivery_of(run));
   writer.flush();
   EXPECT_THAT(take_completions(),
               ElementsAre("failed campaign database = " + (mount / "campaign.db").string() +

@@ -85,10 +85,9 @@ class WriterTest : public StoreTest {
     return (failed.is_abandoned ? "abandoned " : "failed ") + failed.text;
   }
   static std::string text_of(const coordinator::StoreRecovered&) { return "recovered"; }
-  static std::string text_of(const coordinator::LogGrown&) { return "log grown"; }
-  static std::string text_of(const coordinator::LogShrunk&) { return "log shrunk"; }
-  static std::string text_of(const coordinator::LogKept&) { return "log kept"; }
-  static std::string text_of(const coordinator::LogFolded&) { return "log folded"; }
+  static std::string text_of(const coordinator::FileEvent& happened) {
+    return std::string(happened.event.kind);
+  }
 
   std::mutex mutex_;
   std::condition_variable woken_;

@@ -31,22 +31,6 @@ TEST(Intervals, OfTooFewValuesAreEmpty) {
   EXPECT_FALSE(deviation_interval(moments(one_to(5)), 1.0 - 1e-9).has_value());  // z = 6.
 }
 
-TEST(Intervals, RefuseAConfidenceOutsideItsRange) {
-  const Moments about = moments(one_to(5));
-  const std::string expected = "confidence = 95 (must be in (0, 1))";
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)mean_interval(about, 95.0); }), expected);
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)deviation_interval(about, 95.0); }),
-            expected);
-  EXPECT_EQ(
-      test::message_of<InvalidArgument>([] { (void)percentile_interval(one_to(5), 0.5, 95.0); }),
-      expected);
-  EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)probability_interval(1, 2, 95.0); }),
-            expected);
-  EXPECT_EQ(
-      test::message_of<InvalidArgument>([] { (void)percentile_interval(one_to(5), 1.0, 0.95); }),
-      "level = 1 (must be in (0, 1))");
-}
-
 // An upper bound exists if 0.99ⁿ ≤ 0.025, n ≥ 367.04.
 TEST(PercentileInterval, IsEmptyWithTooFewValues) {
   EXPECT_FALSE(percentile_interval(one_to(367), 0.99, 0.95).has_value());
@@ -108,16 +92,6 @@ TEST(BootstrapDeviationInterval, CountsResamplesThatEqualTheEstimateByHalves) {
 TEST(BootstrapDeviationInterval, NeedsThreeValues) {
   EXPECT_FALSE(bootstrap_deviation_interval(std::vector<double>{1.0, 2.0}, 0.95).has_value());
   EXPECT_TRUE(bootstrap_deviation_interval(std::vector<double>{1.0, 2.0, 4.0}, 0.95).has_value());
-}
-
-TEST(BootstrapDeviationInterval, RefusesWhatItCannotWorkWith) {
-  const std::vector<double> values{1.0, 2.0, std::numeric_limits<double>::infinity()};
-  EXPECT_EQ(
-      test::message_of<InvalidArgument>([&] { (void)bootstrap_deviation_interval(values, 0.95); }),
-      "values[2] = inf (must be finite)");
-  EXPECT_EQ(
-      test::message_of<InvalidArgument>([&] { (void)bootstrap_deviation_interval(values, 0.0); }),
-      "confidence = 0 (must be in (0, 1))");
 }
 
 // A campaign database may hold errors whose cubes no double can hold.
@@ -255,17 +229,6 @@ TEST(CompareUnpaired, AsksBothTestsBelowAHundredValues) {
     EXPECT_EQ(few.p_value, few.law_p_value);
     EXPECT_LT(few.mean_p_value, few.law_p_value);
   }
-}
-
-TEST(Comparisons, RefuseWhatTheyCannotWorkWith) {
-  const Values two{1, 2};
-  EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)rank_test_p_value({}); }),
-            "differences = 0 values (must be at least 1)");
-  EXPECT_EQ(
-      test::message_of<InvalidArgument>([&] { (void)compare_unpaired(two, Values{1}, 0.95); }),
-      "second = 1 value (must be at least 2)");
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)compare_unpaired(two, two, 1.0); }),
-            "confidence = 1 (must be in (0, 1))");
 }
 
 }  // namespace

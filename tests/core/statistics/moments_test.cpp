@@ -1,8 +1,10 @@
 #include "core/statistics/moments.hpp"
 
 #include "core/error.hpp"
+#include "core/statistics/comparison.hpp"
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/distribution.hpp"
+#include "core/statistics/interval.hpp"
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/test.hpp"
@@ -50,17 +52,6 @@ TEST(Moments, HaveNoKurtosisBeyondTheRangeOfDoubles) {
   }
 }
 
-TEST(Moments, RefuseNoValues) {
-  EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)moments({}); }),
-            "values = 0 values (must be at least 1)");
-}
-
-TEST(Moments, RefuseAValueThatIsNotFinite) {
-  const std::vector<double> values{1.0, std::numeric_limits<double>::quiet_NaN()};
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)moments(values); }),
-            "values[1] = nan (must be finite)");
-}
-
 // A plain sum of these returns 0: the first 1 drowns in 1e16, and with it goes all that is left.
 TEST(CompensatedSum, KeepsWhatAPlainSumLoses) {
   const std::vector<double> terms{1.0, 1e16, 1.0, -1e16};
@@ -68,17 +59,6 @@ TEST(CompensatedSum, KeepsWhatAPlainSumLoses) {
   for (const double term : terms) plain += term;
   EXPECT_EQ(compensated_sum(terms), 2.0);
   EXPECT_EQ(plain, 0.0);
-}
-
-TEST(Percentile, RefusesALevelOutsideItsRange) {
-  const std::vector<double> values{1.0, 2.0};
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)percentile(values, 1.5); }),
-            "level = 1.5 (must be in [0, 1])");
-}
-
-TEST(Percentile, RefusesNoValues) {
-  EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)percentile({}, 0.5); }),
-            "values = 0 values (must be at least 1)");
 }
 
 TEST(AscendingOrder, KeepsTheOrderOfEqualValues) {
@@ -133,15 +113,34 @@ TEST(Correlations, AreEmptyWithoutVariationOrValues) {
   EXPECT_FALSE(rank_correlation(Values{1, 2, 3}, Values{3, 1, 2}).has_value());
 }
 
-TEST(Correlations, RefuseWhatTheyCannotWorkWith) {
-  const Values x{1, 2, 3, 4};
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] {
-              (void)linear_correlation(x, Values{1, 2});
-            }),
-            "y = 2 values (must be as many as the others, 4)");
+TEST(Statistics, RefuseWhatTheyCannotWorkWith) {
+  const Values two{1, 2}, four{1, 2, 3, 4};
   const Values broken{1, 2, std::numeric_limits<double>::quiet_NaN(), 4};
-  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)rank_correlation(x, broken); }),
-            "y[2] = nan (must be finite)");
+  const Moments about = moments(four);
+  const std::string not_a_fraction = "confidence = 95 (must be in (0, 1))";
+  const std::vector<std::pair<std::function<void()>, std::string>> cases{
+      {[&] { (void)moments({}); }, "values = 0 values (must be at least 1)"},
+      {[&] { (void)moments(broken); }, "values[2] = nan (must be finite)"},
+      {[&] { (void)percentile({}, 0.5); }, "values = 0 values (must be at least 1)"},
+      {[&] { (void)percentile(two, 1.5); }, "level = 1.5 (must be in [0, 1])"},
+      {[&] { (void)linear_correlation(four, two); },
+       "y = 2 values (must be as many as the others, 4)"},
+      {[&] { (void)rank_correlation(four, broken); }, "y[2] = nan (must be finite)"},
+      {[&] { (void)rank_test_p_value({}); }, "differences = 0 values (must be at least 1)"},
+      {[&] { (void)compare_unpaired(two, Values{1}, 0.95); },
+       "second = 1 value (must be at least 2)"},
+      {[&] { (void)compare_unpaired(two, two, 95.0); }, not_a_fraction},
+      {[&] { (void)mean_interval(about, 95.0); }, not_a_fraction},
+      {[&] { (void)deviation_interval(about, 95.0); }, not_a_fraction},
+      {[&] { (void)percentile_interval(four, 0.5, 95.0); }, not_a_fraction},
+      {[&] { (void)percentile_interval(four, 1.0, 0.95); }, "level = 1 (must be in (0, 1))"},
+      {[&] { (void)probability_interval(1, 2, 95.0); }, not_a_fraction},
+      {[&] { (void)bootstrap_deviation_interval(broken, 0.95); },
+       "values[2] = nan (must be finite)"},
+      {[&] { (void)bootstrap_deviation_interval(four, 95.0); }, not_a_fraction}};
+  for (const auto& [call, message] : cases) {
+    EXPECT_EQ(test::message_of<InvalidArgument>(call), message);
+  }
 }
 
 }  // namespace

@@ -50,17 +50,6 @@ TEST_F(DatabaseTest, RollsBackATransactionThatIsNotCommitted) {
   EXPECT_FALSE(database_.in_transaction());
 }
 
-TEST_F(DatabaseTest, ReportsAFullDiskAndKeepsWhatWasCommitted) {
-  database_.execute("INSERT INTO t VALUES (1, '')");
-  database_.execute("PRAGMA max_page_count = 10");
-  Transaction transaction(database_);
-  Statement insert = database_.prepare("INSERT INTO t VALUES (?, ?)");
-  EXPECT_EQ(
-      store_error_of([&] { insert.run(std::int64_t{2}, std::string(100'000, 'x')); }),
-      message("the disk is full; what was committed before is safe, free space and try again"));
-  EXPECT_EQ(database_.integer("SELECT count(*) FROM t"), 1);
-}
-
 TEST_F(DatabaseTest, ReportsALockOfAnotherProgram) {
   Database other(file(), Access::read_write);
   other.execute("PRAGMA busy_timeout = 0");
@@ -129,35 +118,6 @@ TEST_F(DatabaseDeathTest, RefusesANumberThatSqliteCannotHold) {
 
 using SchemaTest = test::StoreTest;
 
-TEST_F(SchemaTest, MarksTheFileAsACampaign) {
-  Database database(file(), Access::create);
-  database.execute(migrations()[0]);
-  EXPECT_EQ(database.integer("PRAGMA application_id"), application_id);
-  database.execute(
-      "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
-      " VALUES (1, 'a', '1', 1, '', 'm', '')");
-  check_campaign_file(database);
-}
-
-// What is asked of the file by others: each parameter with its unit.
-TEST_F(SchemaTest, HasThreeColumnsForEachParameterAndThoseOfHealth) {
-  Database database(file(), Access::create);
-  database.execute(migrations()[0]);
-  std::string expected = "run_index,status,num_draws,num_rounds";
-  for (const std::string kind : {"truth", "estimate", "error"}) {
-    for (const test::ParameterInfo& info : test::parameter_infos()) {
-      expected += "," + kind + "_" + std::string(info.name) + std::string(info.unit_suffix);
-    }
-  }
-  for (const HealthValue& value : health_values()) {
-    expected +=
-        ",health_" + std::string(value.quantity.name) + std::string(value.quantity.unit_suffix);
-  }
-  expected += ",loss_cause,loss_session";
-  EXPECT_EQ(database.text("SELECT group_concat(name) FROM pragma_table_xinfo('run_result')"),
-            expected);
-}
-
 TEST_F(SchemaTest, HasStrictTablesOnly) {
   Database database(file(), Access::create);
   database.execute(migrations()[0]);
@@ -191,30 +151,6 @@ using std::chrono::seconds;
 constexpr TimePoint start{};
 
 EventEntry event(const std::string& kind) { return {.kind = kind, .text = ""}; }
-
-ReturnedRuns loss() {
-  return {.runs = {RunIndex{0}, 1}, .attempt = {1}, .worker = test::session_1};
-}
-
-std::vector<std::string> kinds_of(const std::vector<Entry>& entries) {
-  std::vector<std::string> kinds;
-  for (const Entry& entry : entries) {
-    const auto* found = std::get_if<EventEntry>(&entry);
-    kinds.push_back(found == nullptr ? "other" : found->kind);
-  }
-  return kinds;
-}
-
-TEST(WaitingEntries, AreTakenInTheOrderInWhichTheyCame) {
-  WaitingEntries waiting(10);
-  for (const std::string kind : {"a", "b", "c"}) waiting.add(event(kind), start);
-  std::vector<Entry> taken;
-  waiting.take(2, taken, start);
-  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("a", "b"));
-  waiting.take(2, taken, start);
-  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("a", "b", "c"));
-  EXPECT_EQ(waiting.size(), 0u);
-}
 
 TEST(WaitingEntries, KnowHowManyResultsWaitAndSinceWhen) {
   WaitingEntries waiting(10);
@@ -251,42 +187,7 @@ TEST(WaitingEntries, KnowSinceWhenSomethingUrgentWaits) {
   EXPECT_EQ(waiting.waiting_since(), start + seconds(7));
 }
 
-TEST(WaitingEntries, DropLossesAndEventsBeyondTheLimitAndSaySo) {
-  WaitingEntries waiting(2);
-  waiting.add(event("a"), start);
-  waiting.add(loss(), start);
-  waiting.add(event("dropped"), start);
-  waiting.add(loss(), start);
-  waiting.add(delivery_of(0), start);  // Never dropped, like all that somebody waits for.
-  waiting.add(GivenUpRun{RunIndex{1}}, start);
-  waiting.add(test::worker_1(), start);
-  waiting.add(CampaignControl{}, start);
-
-  std::vector<Entry> taken;
-  waiting.take(100, taken, start);
-  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("a", "other", "other", "other", "other",
-                                                      "other", "records_dropped"));
-  EXPECT_EQ(std::get<EventEntry>(taken.back()).text,
-            "losses_and_events=2 (the disk did not take them for too long)");
-
-  waiting.add(event("b"), start);
-  taken.clear();
-  waiting.take(100, taken, start);
-  EXPECT_THAT(kinds_of(taken), ::testing::ElementsAre("b"));
-}
-
 using FileSystemTest = test::StoreTest;
-
-// Types from statfs(2).
-TEST(NetworkFileSystemName, KnowsThoseThatClustersUse) {
-  EXPECT_EQ(network_file_system_name(0x6969), "NFS");
-  EXPECT_EQ(network_file_system_name(0x517b), "SMB");
-  EXPECT_EQ(network_file_system_name(0xfe534d42), "SMB2");
-  EXPECT_EQ(network_file_system_name(0xff534d42), "CIFS");
-  EXPECT_EQ(network_file_system_name(0x0bd00bd0), "Lustre");
-  EXPECT_EQ(network_file_system_name(0x47504653), "GPFS");
-  EXPECT_EQ(network_file_system_name(0x00c36400), "Ceph");
-}
 
 TEST(NetworkFileSystemName, IsEmptyForLocalOnes) {
   EXPECT_EQ(network_file_system_name(0xef53), "");      // ext2, ext3, ext4
