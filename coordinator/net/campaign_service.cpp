@@ -102,17 +102,18 @@ void CampaignService::take_hold(CampaignId id) {
   served.is_held = true;
 }
 
-void CampaignService::change(CampaignId id, const Change& change) {
+void CampaignService::change(CampaignId id, std::shared_ptr<const Campaign> definition,
+                             const StopPlan& plan, const proto::SubmitRequest& wishes) {
   Served& served = served_.at(id);
   served.is_held = false;
-  extend(id, change.definition);
-  if (change.plan != served.plan) {
-    served.plan = change.plan;
+  extend(id, std::move(definition));
+  if (plan != served.plan) {
+    served.plan = plan;
     served.is_decided = false;
   }
   const CampaignState& campaign = state_.campaigns.at(id);
-  on_control(state_, id, change.priority.value_or(campaign.priority),
-             change.audit_fraction.value_or(campaign.audit_fraction));
+  on_control(state_, id, wishes.has_priority() ? wishes.priority() : campaign.priority,
+             wishes.has_audit_fraction() ? wishes.audit_fraction() : campaign.audit_fraction);
   resume(id);
   review();
 }
@@ -237,7 +238,8 @@ void CampaignService::review_summary(CampaignId id, Served& served) {
 }
 
 void CampaignService::take_summary(CampaignId id, Served& served) {
-  const auto [failure, num_runs] = served.summary.get();
+  std::optional<std::uint64_t> num_runs;
+  const std::string failure = failure_of([&] { num_runs = served.summary.get(); });
   const Campaign& definition = *state_.campaigns.at(id).definition;
   // A check that failed, or asks for runs that are not there yet, is made again.
   served.is_decided = failure.empty() && !num_runs;
@@ -295,10 +297,7 @@ void CampaignService::begin_summary(CampaignId id, Served& served) {
         const auto write = [&](const std::function<void(Store&)>& action) {
           writer_.access(id, action);
         };
-        Summarised summarised;
-        summarised.failure =
-            failure_of([&] { summarised.num_runs = files_->summarise(file, *definition, write); });
-        return summarised;
+        return files_->summarise(file, *definition, write);
       });
 }
 

@@ -46,14 +46,6 @@ namespace proofmass::coordinator {
 ///     gone      removed by somebody                         any if it comes back
 class CampaignService {
  public:
-  /// A served campaign as it is to be from now on.
-  struct Change {
-    std::shared_ptr<const Campaign> definition;
-    StopPlan plan;
-    std::optional<int> priority = {};  ///< Unset: as it is.
-    std::optional<double> audit_fraction = {};
-  };
-
   /// @param history  Told which campaigns are closed; outlives this object.
   CampaignService(const ServiceContext& context, WorkerHistory& history);
   ~CampaignService();  ///< Waits for statistics that are being computed.
@@ -86,7 +78,11 @@ class CampaignService {
   void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
   void let_go(CampaignId id) { served_.at(id).is_held = false; }
-  void change(CampaignId id, const Change& change);
+  /// Changes a served campaign.
+  /// @param definition  As its file has it now.
+  /// @param wishes      Priority and audit fraction are looked at; if unset, they stay.
+  void change(CampaignId id, std::shared_ptr<const Campaign> definition, const StopPlan& plan,
+              const proto::SubmitRequest& wishes);
   // Of a served campaign.
   [[nodiscard]] const StopPlan& plan_of(CampaignId id) const { return served_.at(id).plan; }
   [[nodiscard]] std::uint64_t num_runs_of(CampaignId id) const {
@@ -134,12 +130,6 @@ class CampaignService {
   [[nodiscard]] std::vector<ServedCampaign> close();
 
  private:
-  /// What came of bringing statistics up to date.
-  struct Summarised {
-    std::string failure;                    ///< Empty if nothing went wrong.
-    std::optional<std::uint64_t> num_runs;  ///< That the stop rule asks for next.
-  };
-
   /// What is known of a campaign beside the dispatch's state.
   struct Served {
     CampaignRecord record;  ///< Without what changes; see record_of().
@@ -162,7 +152,7 @@ class CampaignService {
     std::string summary_failure = {};    ///< Of the last statistics; empty if there was none.
     std::string extension_failure = {};  ///< Of the last extension by the stop rule.
     TimePoint summary_after = {};        ///< When statistics may be computed next.
-    std::future<Summarised> summary;
+    std::future<std::optional<std::uint64_t>> summary;  ///< See CampaignFiles::summarise().
   };
 
   /// What came of looking at the directory.
@@ -173,8 +163,6 @@ class CampaignService {
 
   // From state to state.
   void serve(FileLook look);
-  void list(CampaignRecord campaign);
-  void note_unserved(FileLook look);
   /// Takes a campaign from the list of those whose files are closed.
   void unlist(CampaignId id);
   [[nodiscard]] KnownCampaigns known() const;

@@ -190,13 +190,6 @@ wire::Epoch random_epoch() {
   return epoch;
 }
 
-CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version) {
-  return {.epoch = epoch,
-          .host = wire::host_name(),
-          .process_id = static_cast<std::uint64_t>(getpid()),
-          .version = version};
-}
-
 }  // namespace
 
 void KnownCampaigns::add(const CampaignRecord& campaign) {
@@ -257,23 +250,32 @@ std::vector<FileLook> look_at_all(const CampaignDirectory& directory, KnownCampa
   return looks;
 }
 
-Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
-                       const CampaignDirectory* directory, const std::string& version) {
-  Beginning beginning{
-      .start = coordinator_start(random_epoch(), version), .campaigns = {}, .attached = {}};
+CoordinatorStart coordinator_start(const std::string& version) {
+  return {.epoch = random_epoch(),
+          .host = wire::host_name(),
+          .process_id = static_cast<std::uint64_t>(getpid()),
+          .version = version};
+}
+
+std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
+                                         GivenUpRuns given_up, const CampaignDirectory* directory,
+                                         const CoordinatorStart& start) {
+  std::vector<FileLook> looks;
   KnownCampaigns known;
   for (ServedCampaign& campaign : campaigns) {
-    beginning.campaigns.push_back(prepare(std::move(campaign), given_up, beginning.start));
-    known.add(beginning.campaigns.back().record);
+    looks.push_back(prepare(std::move(campaign), given_up, start));
+    known.add(looks.back().record);
   }
   if (directory != nullptr) {
-    std::ranges::move(look_at_all(*directory, known, beginning.start),
-                      std::back_inserter(beginning.campaigns));
+    std::ranges::move(look_at_all(*directory, known, start), std::back_inserter(looks));
   }
-  for (const FileLook& look : beginning.campaigns) {
-    beginning.attached.insert(look.sessions.begin(), look.sessions.end());
-  }
-  return beginning;
+  return looks;
+}
+
+std::set<SessionId> sessions_of(const std::vector<FileLook>& looks) {
+  std::set<SessionId> sessions;
+  for (const FileLook& look : looks) sessions.insert(look.sessions.begin(), look.sessions.end());
+  return sessions;
 }
 
 std::uint64_t definition_size(const Campaign& campaign) {

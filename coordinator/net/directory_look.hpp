@@ -56,21 +56,22 @@ struct KnownCampaigns {
                                                 KnownCampaigns& known,
                                                 const CoordinatorStart& start);
 
-/// What a service begins with.
-struct Beginning {
-  CoordinatorStart start;
-  std::vector<FileLook> campaigns;  ///< Those that are handed over come first.
-  std::set<SessionId> attached;     ///< Workers that may come back.
-};
+/// A coordinator that starts now in this process.
+/// @param version  Of the program, for people.
+[[nodiscard]] CoordinatorStart coordinator_start(const std::string& version);
 
-/// Reads what must be known of the campaigns that are handed over and of those in the directory.
+/// Reads what must be known of the campaigns that are handed over, which come first, and of those
+/// in the directory.
 /// @param directory  Null if there is none.
-/// @param version    Of the program, for people.
 /// @throws Error, StoreError if a campaign that is handed over cannot be served, or the directory
 ///         cannot be read.
-[[nodiscard]] Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
-                                     const CampaignDirectory* directory,
-                                     const std::string& version);
+[[nodiscard]] std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
+                                                       GivenUpRuns given_up,
+                                                       const CampaignDirectory* directory,
+                                                       const CoordinatorStart& start);
+
+/// Workers that may come back to any of the campaigns.
+[[nodiscard]] std::set<SessionId> sessions_of(const std::vector<FileLook>& looks);
 
 /// Bytes that the tables of a campaign take.
 [[nodiscard]] std::uint64_t definition_size(const Campaign& campaign);

@@ -440,27 +440,24 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
   campaigns_.take_hold(id);
   const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
                      file = campaigns_.record_of(id).file]() -> Background::Finish {
-    const proto::SubmitRequest& sent = request->message.submit();
-    CampaignService::Change change{.definition = nullptr, .plan = plan};
-    if (sent.has_priority()) change.priority = sent.priority();
-    if (sent.has_audit_fraction()) change.audit_fraction = sent.audit_fraction();
+    std::shared_ptr<const Campaign> definition;
     const std::string failure = failure_of([&] {
       const std::unique_ptr<Campaign> wanted = request->campaign->clone();
       wanted->num_runs = num_runs;
       context_.config.files->require_same(file, *wanted);
       context_.writer.access(id, [&](Store& store) {
-        change.definition = context_.config.files->extend(store, *wanted);
+        definition = context_.config.files->extend(store, *wanted);
         if (has_new_plan) store.set_stop_plan(plan);
       });
     });
-    return [this, id, name = request->campaign->name, change, failure, respond] {
-      under_way_.erase(name);
+    return [this, id, request, plan, definition, failure, respond] {
+      under_way_.erase(request->campaign->name);
       if (!failure.empty()) {
         campaigns_.let_go(id);
         return respond(wire::error_reply(failure));
       }
       respond(outcome_of([&] {
-        campaigns_.change(id, change);
+        campaigns_.change(id, definition, plan, request->message.submit());
         return campaigns_.done_reply(id);
       }));
     };

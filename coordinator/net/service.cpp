@@ -42,14 +42,15 @@ constexpr int client_messages_per_turn_max = 16;
 
 class Service::Impl final : public Outbox {
  public:
-  Impl(Beginning beginning, const ServiceConfig& config, Log log)
+  Impl(const CoordinatorStart& start, std::vector<FileLook> campaigns, const ServiceConfig& config,
+       Log log)
       : config_(config),
         log_(std::move(log)),
-        start_(beginning.start),
+        start_(start),
         sockets_(config, log_),
-        state_(initial_state(config.dispatch, beginning.attached, now())),
+        state_(initial_state(config.dispatch, sessions_of(campaigns), now())),
         writer_([this] { sockets_.wake(); }, config.writer),
-        history_(state_, writer_, beginning.attached),
+        history_(state_, writer_, sessions_of(campaigns)),
         worker_gateway_(state_, start_.epoch, worker_callbacks()),
         context_{config_, start_, state_, writer_, background_, *this, [this] { return now(); }},
         campaign_service_(context_, history_),
@@ -57,7 +58,7 @@ class Service::Impl final : public Outbox {
         client_gateway_(background_, client_callbacks()),
         background_([this] { sockets_.wake(); }) {
     limit_workers();
-    for (FileLook& look : beginning.campaigns) begin_with(std::move(look));
+    for (FileLook& look : campaigns) begin_with(std::move(look));
   }
 
   /// For all that is measured here and in the dispatch.
@@ -386,10 +387,12 @@ class Service::Impl final : public Outbox {
   Background background_;  ///< Ends before all that its work uses.
 };
 
-Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
-    : impl_(std::make_unique<Impl>(
-          beginning_of(std::move(campaigns), config.given_up, config.directory, config.version),
-          config, std::move(log))) {}
+Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log) {
+  const CoordinatorStart start = coordinator_start(config.version);
+  std::vector<FileLook> looks =
+      looks_at_beginning(std::move(campaigns), config.given_up, config.directory, start);
+  impl_ = std::make_unique<Impl>(start, std::move(looks), config, std::move(log));
+}
 
 Service::~Service() = default;
 

@@ -41,7 +41,7 @@ void check(const proto::SubmitRequest& message) {
   const double fraction = message.audit_fraction();
   require(fraction >= 0.0 && fraction <= 1.0, "audit", fmt::format("{}", fraction),
           "must be in [0, 1]");
-  (void)detail::read_definition(message.definition());
+  detail::check_definition(message.definition());
   const std::string& rule = message.stop_rule();
   require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
           fmt::format("must be at most {}", stop_rule_size_max));

@@ -19,25 +19,24 @@ constexpr std::size_t definition_fields_max = 4096;
 
 using Values = google::protobuf::RepeatedField<double>;
 
-std::vector<double> finite_values(const Values& values, std::string_view field) {
+void check_finite(const Values& values, std::string_view field) {
   const auto bad = std::find_if_not(values.begin(), values.end(),
                                     [](double value) { return std::isfinite(value); });
-  detail::require(bad == values.end(), field, bad == values.end() ? "" : fmt::format("{}", *bad),
-                  "must be finite");
-  return {values.begin(), values.end()};
+  if (bad != values.end()) throw ConfigError(field, fmt::format("{}", *bad), "must be finite");
 }
 
-DataTable read_table(const proto::DataTable& message) {
+void check_table(const proto::DataTable& message) {
   detail::require_in(message.num_columns(), 1, columns_of_a_table_max,
                      "definition.tables.num_columns");
   const auto size = static_cast<std::uint64_t>(message.values_size());
   detail::require(size % message.num_columns() == 0, "definition.tables.values",
                   fmt::format("{} entries", size),
                   fmt::format("must be rows of {}", message.num_columns()));
-  return {.key = detail::checked_name(message.key(), "definition.tables.key"),
-          .num_columns = message.num_columns(),
-          .values = finite_values(message.values(), "definition.tables.values")};
+  (void)detail::checked_name(message.key(), "definition.tables.key");
+  check_finite(message.values(), "definition.tables.values");
 }
+
+std::vector<double> vector_of(const Values& values) { return {values.begin(), values.end()}; }
 
 std::string size_text(std::size_t size) {
   return fmt::format("definition size = {} bytes (must be at most {})", size, definition_size_max);
@@ -60,17 +59,25 @@ void write_definition(const Definition& definition, proto::Definition& message) 
   }
 }
 
-Definition read_definition(const proto::Definition& message) {
+void check_definition(const proto::Definition& message) {
   require_in(message.text().size(), 1, definition_text_size_max, "definition.text size");
   require_count(message.tables_size(), 0, definition_tables_max, "definition.tables");
   require_count(message.table_columns_size(), 0, table_columns_max, "definition.table_columns");
+  for (const proto::DataTable& table : message.tables()) check_table(table);
+  for (const proto::TableColumn& column : message.table_columns()) {
+    check_finite(column.values(), "definition.table_columns.values");
+  }
+}
+
+Definition read_definition(const proto::Definition& message) {
   Definition definition{.text = message.text()};
   for (const proto::DataTable& table : message.tables()) {
-    definition.tables.push_back(read_table(table));
+    definition.tables.push_back({.key = table.key(),
+                                 .num_columns = table.num_columns(),
+                                 .values = vector_of(table.values())});
   }
   for (const proto::TableColumn& column : message.table_columns()) {
-    definition.table_columns.push_back(
-        finite_values(column.values(), "definition.table_columns.values"));
+    definition.table_columns.push_back(vector_of(column.values()));
   }
   return definition;
 }
@@ -101,6 +108,7 @@ std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) 
                     bytes.size(), definition_fields_max)};
   }
   try {
+    detail::check_definition(message);
     return detail::read_definition(message);
   } catch (const Error& error) {
     return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
