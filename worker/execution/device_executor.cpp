@@ -35,9 +35,7 @@ bool are_same(const RunResult& a, const RunResult& b) {
 }
 
 /// Whether a run is one of those to be checked: as good as at random, and the same every time.
-bool is_checked(RunIndex run, double fraction) {
-  return fraction_of(mixed(run.value)) < fraction;
-}
+bool is_checked(RunIndex run, double fraction) { return fraction_of(mixed(run.value)) < fraction; }
 
 /// Computes some of a device's runs again, on a thread of its own so that the device goes on.
 class DeviceCheck {
