@@ -145,6 +145,9 @@ std::vector<int> allocated(const PlanOptions& options, const PlanStudy& study) {
                                  of_file.size()));
   }
   const bool is_for_budget = options.goal == "budget";
+  if (is_for_budget && !study.bound(of_file).mean_budget) {
+    throw UsageError("--for = budget (the campaign has no budget of errors)");
+  }
   return allocate(of_file.size(), {.num_steps = in_all, .minimum = options.minimum},
                   [&](std::span<const int> num_steps) {
                     const PlanBound bound = study.bound(num_steps);
@@ -165,7 +168,10 @@ int plan_campaign(const PlanOptions& options) {
   try {
     write_document(options.new_file, wire::IfThere::keep, study->campaign_file(plan.num_steps));
   } catch (const ConfigError& error) {
-    throw UsageError(fmt::format("--minimum = {} ({})", options.minimum, error.what()));
+    throw UsageError(
+        fmt::format("no campaign file can hold the best allocation: {}; choose another "
+                    "--{} or --minimum",
+                    error.what(), model().step_name()));
   }
   print_plan(options, plan);
   if (options.format == OutputFormat::text) {
@@ -181,22 +187,25 @@ void add_plan(CLI::App& app, Command& chosen) {
       app, chosen, "plan", "Predict the errors of a campaign, or plan it", plan_campaign);
   add_campaign_file(command, options.file);
   add_override_options(command, options.overrides);
-  command
-      .add_option("--optimise", options.new_file,
-                  "Allocate the time to the sessions as is best, and\nwrite the new campaign file")
-      ->type_name(campaign_file_type);
+  CLI::Option* const optimise = command.add_option(
+      "--optimise", options.new_file,
+      "Allocate the time to the sessions as is best, and\nwrite the new campaign file");
+  optimise->type_name(campaign_file_type);
   const std::string steps(model().step_name());
   command
       .add_option("--" + steps, options.num_steps,
                   "Number to allocate; by default that of the file")
-      ->check(wire::in_range(1, 1'000'000));
+      ->check(wire::in_range(1, 1'000'000))
+      ->needs(optimise);
   command.add_option("--minimum", options.minimum, "Least number of a session")
+      ->needs(optimise)
       ->check(wire::in_range(1, 10'000))
       ->capture_default_str();
   command
       .add_option("--for", options.goal,
                   "What is to be best: the chance that all objectives\nhold, or the mean budget")
       ->check(CLI::IsMember({"objectives", "budget"}))
+      ->needs(optimise)
       ->capture_default_str();
   add_json_flag(command, options.format);
 }

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/microscope/instrument/magnitude.hpp"
 #include "core/microscope/results/results.hpp"
 
 namespace proofmass {
@@ -74,6 +76,19 @@ MicroscopeCampaign hardy2013_campaign() {
   return campaign;
 }
 
+namespace {
+
+/// Whether expressions gave numbers of a sensible size; a quotient or a root may give none.
+bool are_in_range(const DispersionSet& dispersions, const DrawnValues& values) {
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    if (dispersions[i].law != Law::derived) continue;
+    if (!(std::fabs(values[i]) <= drawn_magnitude_max(i))) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
                              std::span<const double> table_values) {
   const RunIndex of_instrument{run.value / campaign.realisations};
@@ -81,8 +96,9 @@ AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
   while (draw.num_draws < num_draws_max) {
     draw.values = draw_values(campaign.dispersions, campaign.seed, of_instrument, draw.num_draws,
                               table_values);
-    const Instrument instrument = make_instrument(draw.values);
     ++draw.num_draws;
+    if (!are_in_range(campaign.dispersions, draw.values)) continue;
+    const Instrument instrument = make_instrument(draw.values);
     if (is_accepted(instrument, campaign.scenario.acceptance)) {
       draw.instrument = instrument;
       break;

@@ -13,6 +13,7 @@
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
+#include "core/microscope/instrument/magnitude.hpp"
 #include "core/model.hpp"
 #include "core/statistics/independence.hpp"
 
@@ -77,16 +78,12 @@ void check_environment_headings(CsvReader& reader) {
       fmt::format("{}the first line must be {}", text, fmt::join(environment_headings, ",")));
 }
 
-/// Values that a drawn quantity may have in a file: far beyond any instrument, and wide enough for
-/// any experiment with the model. An offcentring of 5 m is a slip of the pen.
+/// Values that a drawn quantity may have in a file.
 class MagnitudeCheck {
  public:
   explicit MagnitudeCheck(std::size_t drawn)
-      : path_(fmt::format("dispersion.{}", drawn_names()[drawn])) {
-    for (const DrawGroup& group : draw_groups()) {
-      if (drawn >= group.first) maximum_ = 1000.0 * group.bound;
-    }
-  }
+      : path_(fmt::format("dispersion.{}", drawn_names()[drawn])),
+        maximum_(drawn_magnitude_max(drawn)) {}
 
   void run(const Dispersion& law) const {
     check("minimum", law.minimum);
@@ -95,6 +92,13 @@ class MagnitudeCheck {
     check("standard_deviation", law.standard_deviation);
     check("value", law.value);
     for (const double value : law.values) check("values", value);
+  }
+
+  /// @param value  That its expression has in a run.
+  void run(const Dispersion& law, RunIndex run, double value) const {
+    if (is_in(value)) return;
+    throw ConfigError(path_ + ".expression", fmt::format("\"{}\"", law.expression),
+                      fmt::format("run {} would draw {}, {}", run.value, value, rule()));
   }
 
   /// @param column  The values of the quantity's table, one a run.
@@ -117,8 +121,26 @@ class MagnitudeCheck {
   }
 
   std::string path_;
-  double maximum_ = 0.0;
+  double maximum_;
 };
+
+/// Expressions are tried with the first draws.
+void check_derived(const MicroscopeCampaign& campaign) {
+  constexpr std::uint64_t num_tried = 256;
+  std::vector<std::size_t> derived;
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    if (campaign.dispersions[i].law == Law::derived) derived.push_back(i);
+  }
+  if (derived.empty()) return;
+  for (std::uint64_t i = 0; i < num_tried && i * campaign.realisations < campaign.num_runs; ++i) {
+    const RunIndex run{i * campaign.realisations};
+    const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, RunIndex{i}, 0,
+                                           campaign.table_values(run));
+    for (const std::size_t quantity : derived) {
+      MagnitudeCheck(quantity).run(campaign.dispersions[quantity], run, values[quantity]);
+    }
+  }
+}
 
 void check_magnitudes(const MicroscopeCampaign& campaign) {
   for (std::size_t i = 0; i < num_drawn; ++i) MagnitudeCheck(i).run(campaign.dispersions[i]);
@@ -126,6 +148,7 @@ void check_magnitudes(const MicroscopeCampaign& campaign) {
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     MagnitudeCheck(drawn[i]).run(campaign.dispersions[drawn[i]], campaign.table_columns[i]);
   }
+  check_derived(campaign);
 }
 
 /// @throws ConfigError if a column that is declared independent is none such.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -11,6 +12,7 @@
 
 #include "core/campaign/expression.hpp"
 #include "core/error.hpp"
+#include "core/microscope/instrument/magnitude.hpp"
 
 namespace proofmass {
 namespace {
@@ -257,19 +259,27 @@ void check_relations(const DispersionSet& dispersions) {
   }
 }
 
+double drawn_magnitude_max(std::size_t quantity) {
+  const auto after = std::ranges::upper_bound(draw_groups(), quantity, {}, &DrawGroup::first);
+  return 1000.0 * std::prev(after)->bound;
+}
+
 LawMoments sampled_moments(const DispersionSet& dispersions, std::size_t quantity) {
   constexpr std::uint64_t num_samples = 256, key = 1;
   DispersionSet known = dispersions;
   const DispersionSet nominal = nominal_dispersions();
   for (const std::size_t i : table_elements(dispersions)) known[i] = nominal[i];
-  double sum = 0.0, squares = 0.0;
+  double count = 0.0, sum = 0.0, squares = 0.0;
   for (std::uint64_t i = 0; i < num_samples; ++i) {
     const double value = draw_values(known, key, RunIndex{i}, 0, {})[quantity];
+    if (!(std::fabs(value) <= drawn_magnitude_max(quantity))) continue;  // It would be drawn again.
+    ++count;
     sum += value;
     squares += value * value;
   }
-  const double mean = sum / num_samples;
-  return {mean, std::sqrt(std::fmax(squares / num_samples - mean * mean, 0.0))};
+  if (count == 0.0) return {};
+  const double mean = sum / count;
+  return {mean, std::sqrt(std::fmax(squares / count - mean * mean, 0.0))};
 }
 
 DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed, RunIndex run,

@@ -185,6 +185,9 @@ class JointStudy final : public PlanStudy {
 }  // namespace
 
 std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign) {
+  if (campaign.scenario.noise.scale == 0.0) {
+    throw ConfigError("noise.scale", "0", "must be > 0: without noise estimates have no errors");
+  }
   return std::make_unique<JointStudy>(campaign);
 }
 

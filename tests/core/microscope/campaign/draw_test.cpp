@@ -271,5 +271,34 @@ TEST(DrawInstrument, GivesUpAfterAThousandDraws) {
   EXPECT_EQ(draw.num_draws, num_draws_max);
 }
 
+TEST(DrawInstrument, DrawsAgainIfAnExpressionHasNoValueInRange) {
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  const auto index = [](std::string_view name) {
+    return static_cast<std::size_t>(std::ranges::find(drawn_names(), name) - drawn_names().begin());
+  };
+  Dispersion& law = campaign.dispersions[index("offcentring_m.x")];
+  law = {
+      .law = Law::derived, .file = {}, .column = {}, .expression = "sqrt(offcentring_m.y) / 1e3"};
+  // The square root of half of the draws is none, so that the number of draws is geometric.
+  constexpr std::uint64_t num_instruments = 2000;
+  double num_draws = 0.0;
+  for (std::uint64_t run = 0; run < num_instruments; ++run) {
+    const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
+    ASSERT_TRUE(draw.instrument);
+    EXPECT_GE(draw.values[index("offcentring_m.y")], 0.0);
+    num_draws += draw.num_draws;
+  }
+  law.law = Law::fixed;
+  double num_accepted_alone = 0.0;
+  for (std::uint64_t run = 0; run < num_instruments; ++run) {
+    num_accepted_alone += draw_instrument(campaign, RunIndex{run}, {}).num_draws;
+  }
+  const double ratio = num_draws / num_accepted_alone;
+  const double standard_error = std::sqrt(2.0 / num_instruments);  // Of a geometric law with ½.
+  EXPECT_NEAR(ratio, 2.0, 5.0 * standard_error);
+  law = {.law = Law::derived, .file = {}, .column = {}, .expression = "offcentring_m.y / 0"};
+  EXPECT_FALSE(draw_instrument(campaign, RunIndex{0}, {}).instrument);
+}
+
 }  // namespace
 }  // namespace proofmass
