@@ -198,6 +198,7 @@ Table variance_table(const InstrumentStatistics& statistics) {
                   {"from", false, 6, noise},
                   {"to", false, 6, noise}},
       .notes = {count_text(statistics), "the unit of all intervals is the instrument",
+                "that of the share holds for normal errors that scatter alike in every instrument",
                 "noise: no choice of the instruments saves more than the inverse of its share"}};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     const proofmass::Quantity& quantity = model().results().quantities[i];

@@ -13,8 +13,9 @@ struct AllocationRule {
 };
 
 /// The steps of each part that make a value largest, by exchange of steps between two parts until
-/// no exchange of a single one is a gain. README.md says why that is the best allocation, to a
-/// step, of what grows with concave returns.
+/// no exchange of a single one is a gain. Of what grows smoothly with concave returns that is
+/// nearly the best allocation: several exchanges at once may still be a gain of the second order in
+/// a step.
 ///
 /// @param value  Of the steps of each part: an increasing function of a concave one.
 /// @throws InvalidArgument if the parts need more than `num_steps`.

@@ -172,8 +172,10 @@ class JointStudy final : public PlanStudy {
       return std::ranges::all_of(information.standard_errors(std::vector(measured_s_.size(), 1.0)),
                                  is_in_range);
     };
-    if (instruments_.empty() || !is_finite(instruments_.front())) {
-      throw Error("no bound: no instrument is accepted, or the loops are not stable");
+    if (instruments_.empty()) throw Error("no bound: no instrument is accepted");
+    if (!std::ranges::all_of(instruments_, is_finite)) {
+      throw Error(
+          "no bound: the sessions do not determine all parameters, or the loops are not stable");
     }
   }
 

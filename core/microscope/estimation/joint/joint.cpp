@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -351,11 +352,14 @@ ParameterArray JointInformation::standard_errors(std::span<const double> factors
   // parameters while the nuisances are free.
   constexpr auto num_wanted = static_cast<Eigen::Index>(num_parameters);
   const NormalMatrix reversed = matrix.reverse();
-  const NormalMatrix factor = Eigen::LLT<NormalMatrix>(reversed).matrixL();
+  const Eigen::LLT<NormalMatrix> decomposition(reversed);
+  ParameterArray errors;
+  errors.fill(std::numeric_limits<double>::infinity());
+  if (decomposition.info() != Eigen::Success) return errors;  // Something is not determined.
+  const NormalMatrix factor = decomposition.matrixL();
   using Square = Eigen::Matrix<double, num_wanted, num_wanted>;
   const Square last = factor.bottomRightCorner<num_wanted, num_wanted>();
   const Square inverse = last.triangularView<Eigen::Lower>().solve(Square::Identity());
-  ParameterArray errors;
   for (std::size_t i = 0; i < num_parameters; ++i) {
     errors[i] = units_[i] * inverse.col(num_wanted - 1 - static_cast<Eigen::Index>(i)).norm();
   }

@@ -153,6 +153,13 @@ TEST(PlanStudy, IsWhatTheEstimatorStates) {
   EXPECT_NEAR(chi_squared / freedom, 1.0, 5.0 * std::sqrt(2.0 / freedom) + 0.04);
 }
 
+TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
+  const auto study = study_plan(MicroscopeCampaign{});
+  const PlanBound bound = study->bound(std::vector<int>(study->num_steps().size(), 0));
+  for (const double error : bound.standard_errors) EXPECT_TRUE(std::isinf(error));
+  EXPECT_NEAR(bound.misses_any, 1.0, 1e-12);
+}
+
 TEST(PlanStudy, RefusesSessionsThatItsMethodCannotUse) {
   MicroscopeCampaign campaign;
   campaign.scenario.sessions[0].spin_rate_rad_s = 1e-3;
