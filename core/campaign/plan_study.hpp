@@ -22,6 +22,8 @@ class PlanStudy {
  public:
   virtual ~PlanStudy() = default;
 
+  /// Estimation method that the bound is of, whatever that of the campaign is.
+  [[nodiscard]] virtual std::string method() const = 0;
   [[nodiscard]] virtual std::vector<std::string> session_names() const = 0;
   /// Steps of each session in the campaign.
   [[nodiscard]] virtual std::vector<int> num_steps() const = 0;

@@ -42,13 +42,14 @@ struct Planned {
   PlanBound bound;
   std::vector<double> objectives;
   std::size_t num_instruments;
+  std::string method;
 };
 
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
   const int in_all = std::accumulate(num_steps.begin(), num_steps.end(), 0);
   PlanBound bound = study.bound(num_steps);
-  return {study.session_names(), std::move(num_steps),  in_all,
-          std::move(bound),      campaign.objectives(), study.num_instruments()};
+  return {study.session_names(), std::move(num_steps),    in_all,        std::move(bound),
+          campaign.objectives(), study.num_instruments(), study.method()};
 }
 
 /// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing.
@@ -80,9 +81,9 @@ Table bound_table(const Planned& plan) {
         {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});
   }
   table.notes.push_back(fmt::format(
-      "σ: standard error of the best estimates, mean of {} instruments; the errors of runs are "
-      "taken to be normal",
-      plan.num_instruments));
+      "σ: standard error of estimates by the method {}, mean of {} instruments; the errors of runs "
+      "are taken to be normal, and no run to be lost",
+      plan.method, plan.num_instruments));
   return table;
 }
 
@@ -105,10 +106,15 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
     return;
   }
   using Json = nlohmann::ordered_json;
-  Json json{{"file", options.file.string()},       {"num_steps", plan.num_steps_in_all},
-            {"step_name", model().step_name()},    {"num_instruments", plan.num_instruments},
-            {"misses_any", plan.bound.misses_any}, {"mean_budget", nullptr},
-            {"parameters", Json::array()},         {"sessions", Json::array()}};
+  Json json{{"file", options.file.string()},
+            {"method", plan.method},
+            {"num_steps", plan.num_steps_in_all},
+            {"step_name", model().step_name()},
+            {"num_instruments", plan.num_instruments},
+            {"misses_any", plan.bound.misses_any},
+            {"mean_budget", nullptr},
+            {"parameters", Json::array()},
+            {"sessions", Json::array()}};
   if (plan.bound.mean_budget) json["mean_budget"] = *plan.bound.mean_budget;
   const std::vector<Quantity>& quantities = model().results().quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {

@@ -98,6 +98,7 @@ class JointStudy final : public PlanStudy {
     add_instruments(record.phasors, input);
   }
 
+  [[nodiscard]] std::string method() const override { return std::string(joint_method.name); }
   [[nodiscard]] std::vector<std::string> session_names() const override {
     std::vector<std::string> names;
     for (const Session& session : campaign_.scenario.sessions) names.push_back(session.name);
