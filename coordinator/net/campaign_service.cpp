@@ -35,7 +35,7 @@ CampaignService::~CampaignService() = default;
 std::optional<CampaignRecord> CampaignService::find(std::string_view name) const {
   const auto has_name = [&](CampaignId id) {
     const auto served = served_.find(id);
-    return (served == served_.end() ? closed_.at(id) : served->second.record).status.name == name;
+    return (served == served_.end() ? closed_.at(id) : served->second.record).status.name() == name;
   };
   const auto found = std::ranges::find_if(order_, has_name);
   if (found == order_.end()) return std::nullopt;
@@ -58,27 +58,28 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   const Served& served = served_.at(id);
   CampaignRecord record = served.record;
   record.num_waiting = campaign.delivered.size();
-  wire::CampaignStatus& status = record.status;
-  status.phase = phase_of(id);
-  status.priority = campaign.priority;
-  status.num_runs = campaign.definition->num_runs;
-  status.num_done = campaign.committed.size();
-  status.num_without_estimate = campaign.num_without_estimate;
-  status.num_given_up = campaign.given_up.size();
-  status.num_lent = campaign.lent.size();
-  status.num_duplicates = campaign.num_duplicates;
-  status.num_audited = campaign.num_audited;
-  status.num_mismatches = campaign.num_mismatches;
-  status.rate_hz = served.rate.rate_hz(context_.now());
-  status.remaining_s = remaining_s(campaign, status.rate_hz);
-  status.storage_failure = campaign.storage_failure;
+  proto::CampaignStatus& status = record.status;
+  status.set_phase(wire::message_value(phase_of(id)));
+  status.set_priority(campaign.priority);
+  status.set_num_runs(campaign.definition->num_runs);
+  status.set_num_done(campaign.committed.size());
+  status.set_num_without_estimate(campaign.num_without_estimate);
+  status.set_num_given_up(campaign.given_up.size());
+  status.set_num_lent(campaign.lent.size());
+  status.set_num_duplicates(campaign.num_duplicates);
+  status.set_num_audited(campaign.num_audited);
+  status.set_num_mismatches(campaign.num_mismatches);
+  status.set_rate_hz(served.rate.rate_hz(context_.now()));
+  const std::optional<double> left_s = remaining_s(campaign, status.rate_hz());
+  if (left_s) status.set_remaining_s(*left_s);
+  status.set_storage_failure(campaign.storage_failure);
   return record;
 }
 
 CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
-    if (served.record.status.owner != owner) continue;
+    if (served.record.status.owner() != owner) continue;
     const Holdings one = holdings_of(id);
     holdings.num_campaigns += one.num_campaigns;
     holdings.size += one.size;
@@ -97,7 +98,7 @@ void CampaignService::take_hold(CampaignId id) {
   Served& served = served_.at(id);
   if (served.is_held) {
     throw Error(fmt::format("campaign = {} (is being changed by another request; try again)",
-                            served.record.status.name));
+                            served.record.status.name()));
   }
   served.is_held = true;
 }
@@ -326,7 +327,7 @@ void CampaignService::tell(const Served& served, CampaignNotice::Kind kind,
                            std::string reason) const {
   if (!context_.config.on_notice) return;
   context_.config.on_notice({.kind = kind,
-                             .campaign = served.record.status.name,
+                             .campaign = served.record.status.name(),
                              .file = served.record.file,
                              .reason = std::move(reason)});
 }
@@ -349,9 +350,10 @@ bool CampaignService::is_all_told() const {
 }
 
 proto::ReplyEnvelope CampaignService::done_reply(CampaignId id) const {
-  const wire::CampaignStatus status = record_of(id).status;
-  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
-                                      wire::phase_name(status), status.num_runs, status.num_done));
+  const proto::CampaignStatus status = record_of(id).status;
+  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name(),
+                                      wire::phase_name(status), status.num_runs(),
+                                      status.num_done()));
 }
 
 }  // namespace proofmass::coordinator

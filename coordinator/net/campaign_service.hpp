@@ -21,7 +21,7 @@
 #include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "coordinator/store/store_writer.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -113,9 +113,8 @@ class CampaignService {
   [[nodiscard]] std::vector<CampaignRecord> records(
       std::size_t first = 0, std::size_t count_max = std::numeric_limits<std::size_t>::max()) const;
   [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
-  [[nodiscard]] std::size_t num_unserved() const { return unserved_.size(); }
-  /// By name, at most so many.
-  [[nodiscard]] std::vector<wire::UnservedFile> unserved(std::size_t count_max) const;
+  /// Adds the files that cannot be served for now, by name, as many as a reply may have.
+  void add_unserved(proto::StatusReply& reply) const;
 
   /// True if nobody waits to be told of the end of a campaign, see ServiceConfig::on_notice.
   [[nodiscard]] bool is_all_told() const;

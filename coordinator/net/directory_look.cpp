@@ -55,18 +55,17 @@ FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
 
 FileLook ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek,
                         const std::optional<FileStamp>& stamp) {
-  return {.record = {.id = peek.id,
-                     .file = file,
-                     .status = {.name = peek.name,
-                                .phase = peek.phase,
-                                .priority = peek.priority,
-                                .num_runs = peek.num_runs,
-                                .num_done = peek.num_finished,
-                                .num_given_up = peek.num_given_up,
-                                .owner = peek.owner},
-                     .is_closed = true,
-                     .stamp = stamp},
-          .created_utc = peek.created_utc};
+  FileLook look{.record = {.id = peek.id, .file = file, .is_closed = true, .stamp = stamp},
+                .created_utc = peek.created_utc};
+  proto::CampaignStatus& status = look.record.status;
+  status.set_name(peek.name);
+  status.set_phase(wire::message_value(peek.phase));
+  status.set_priority(peek.priority);
+  status.set_num_runs(peek.num_runs);
+  status.set_num_done(peek.num_finished);
+  status.set_num_given_up(peek.num_given_up);
+  status.set_owner(peek.owner);
+  return look;
 }
 
 /// How many of the files that are looked at hold a campaign, by its name.
@@ -195,13 +194,13 @@ wire::Epoch random_epoch() {
 void KnownCampaigns::add(const CampaignRecord& campaign) {
   files.insert(campaign.file);
   ids.insert(campaign.id);
-  names.insert(campaign.status.name);
+  names.insert(campaign.status.name());
 }
 
 void KnownCampaigns::remove(const CampaignRecord& campaign) {
   files.erase(campaign.file);
   ids.erase(campaign.id);
-  names.erase(campaign.status.name);
+  names.erase(campaign.status.name());
 }
 
 std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
@@ -216,15 +215,15 @@ std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
 FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const CoordinatorStart& start) {
   wire::kill_point(wire::KillPoint::after_open);
   Store& store = campaign.store;
-  FileLook look{.record = {.id = store.id(),
-                           .file = campaign.file,
-                           .status = {.name = campaign.definition->name, .owner = store.owner()}},
+  FileLook look{.record = {.id = store.id(), .file = campaign.file},
                 .created_utc = store.created_utc(),
                 .stored = stored_campaign_of(campaign, given_up),
                 .plan = store.stop_plan(),
                 .num_failures = store.num_without_estimate(),
                 .sessions = store.attached_sessions()};
-  require_shown(campaign.file, look.record.status.name, look.record.status.owner,
+  look.record.status.set_name(campaign.definition->name);
+  look.record.status.set_owner(store.owner());
+  require_shown(campaign.file, campaign.definition->name, store.owner(),
                 look.stored.control.priority);
   store.begin_coordinator(start);
   look.store = std::move(store);

@@ -17,7 +17,7 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/store_writer.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -118,7 +118,7 @@ class Service {
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn);
 
   /// The campaigns, in the order in which they came.
-  [[nodiscard]] std::vector<wire::CampaignStatus> campaigns() const;
+  [[nodiscard]] std::vector<proto::CampaignStatus> campaigns() const;
   /// Everything about it now, for other threads. To be called in its own thread.
   [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) const;
   /// True if every campaign is finished or cancelled, and no file waits to be served.

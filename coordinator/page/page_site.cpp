@@ -99,7 +99,7 @@ HttpAnswer PageSite::about_campaign(const PageRequest& request,
   const auto& campaigns = snapshot.campaigns;
   const auto found = std::ranges::find(
       campaigns, name,
-      [](const CampaignRecord& one) -> const std::string& { return one.status.name; });
+      [](const CampaignRecord& one) -> const std::string& { return one.status.name(); });
   if (found == campaigns.end()) return not_found();
   const TimePoint now = sources_.now();
   // The page shows what has been read, and the rest two seconds later.
