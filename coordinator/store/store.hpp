@@ -148,7 +148,7 @@ class Store {
   [[nodiscard]] std::uint64_t num_without_estimate() const;
 
   /// How the runs were computed. Takes 0.1 s for a million runs.
-  [[nodiscard]] Execution execution() const;
+  [[nodiscard]] CampaignExecution execution() const;
 
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;
