@@ -204,9 +204,8 @@ void CampaignService::review_failures(CampaignId id, const Served& served) {
       served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
   if (num_failures <= *served.plan.failures_max) return;
   on_cancel(state_, id, outbox_);
-  tell(served, CampaignNotice::Kind::failed,
-       fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
-                   *served.plan.failures_max));
+  tell(served, fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
+                           *served.plan.failures_max));
   outbox_.log(
       {.severity = Severity::error,
        .kind = "too_many_failures",
@@ -308,28 +307,23 @@ void CampaignService::review_notices(CampaignId id, Served& served) {
   if (!served.is_end_told && is_finished_and_settled(id, served)) {
     served.is_end_told = true;
     const bool has_failed = wire::has_failed(record_of(id).status);
-    tell(served, has_failed ? CampaignNotice::Kind::failed : CampaignNotice::Kind::finished,
-         has_failed ? "most of its runs were given up" : "");
+    tell(served, has_failed ? "most of its runs were given up" : "");
   }
   const bool has_failed = !campaign.storage_failure.empty();
-  if (has_failed && !served.is_storage_failure_told) {
-    tell(served, CampaignNotice::Kind::failed, campaign.storage_failure);
-  }
+  if (has_failed && !served.is_storage_failure_told) tell(served, campaign.storage_failure);
   served.is_storage_failure_told = has_failed;
   if (campaign.num_mismatches > served.num_mismatches_told) {
-    tell(served, CampaignNotice::Kind::failed,
+    tell(served,
          fmt::format("{} runs were computed again with another result", campaign.num_mismatches));
   }
   served.num_mismatches_told = campaign.num_mismatches;
 }
 
-void CampaignService::tell(const Served& served, CampaignNotice::Kind kind,
-                           std::string reason) const {
+void CampaignService::tell(const Served& served, std::string failure) const {
   if (!context_.config.on_notice) return;
-  context_.config.on_notice({.kind = kind,
-                             .campaign = served.record.status.name(),
+  context_.config.on_notice({.campaign = served.record.status.name(),
                              .file = served.record.file,
-                             .reason = std::move(reason)});
+                             .failure = std::move(failure)});
 }
 
 bool CampaignService::is_all_done() const {

@@ -178,7 +178,8 @@ class CampaignService {
   void review_failures(CampaignId id, const Served& served);
   void review_control(CampaignId id, Served& served);
   void review_notices(CampaignId id, Served& served);
-  void tell(const Served& served, CampaignNotice::Kind kind, std::string reason) const;
+  /// @param failure  Empty if the campaign is finished.
+  void tell(const Served& served, std::string failure) const;
   void review_summary(CampaignId id, Served& served);
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);

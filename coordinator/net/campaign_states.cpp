@@ -13,7 +13,7 @@
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/outcome.hpp"
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -62,20 +62,21 @@ void CampaignService::serve(FileLook look) {
 
 void CampaignService::take(FileLook look) {
   const std::filesystem::path file = look.record.file;
-  if (look.failure.empty()) {
+  if (look.record.problem.empty()) {
     const std::string failure = failure_of([&] { add(std::move(look)); });
     if (failure.empty()) {
       if (unserved_.erase(file) == 0) return;
       return outbox_.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
     }
-    look = {.record = {.file = file}, .failure = failure};
+    look = {.record = {.file = file, .problem = failure}};
   }
   const auto known = unserved_.find(file);
-  const bool is_news = known == unserved_.end() || known->second.failure != look.failure;
+  const bool is_news =
+      known == unserved_.end() || known->second.record.problem != look.record.problem;
   if (is_news) {
     outbox_.log({.severity = Severity::error,
                  .kind = "campaign_not_served",
-                 .fields = {Field::reason(look.failure)}});
+                 .fields = {Field::reason(look.record.problem)}});
   }
   unserved_.insert_or_assign(file, std::move(look));
 }
@@ -130,7 +131,7 @@ CampaignService::Findings CampaignService::look(const CampaignDirectory& directo
   // Without a file: that of the directory itself.
   if (!failure.empty()) {
     findings = {};
-    findings.looks.emplace_back().failure = failure;
+    findings.looks.emplace_back().record.problem = failure;
   }
   return findings;
 }
@@ -177,7 +178,7 @@ void CampaignService::add_unserved(proto::StatusReply& reply) const {
        unserved_ | std::views::take(wire::unserved_files_per_reply_max)) {
     proto::UnservedFile& unserved = *reply.add_unserved_files();
     unserved.set_file(file.string());
-    unserved.set_reason(look.failure);
+    unserved.set_reason(look.record.problem);
   }
 }
 

@@ -19,10 +19,8 @@ namespace proofmass::coordinator {
 
 /// What a look at a campaign database found.
 struct FileLook {
-  CampaignRecord record = {};       ///< Has nothing but the file if that cannot be served.
-  std::string created_utc = {};     ///< As in `2024-02-29T12:00:10Z`.
-  std::string failure = {};         ///< Why it cannot be served for now; empty if it can.
-  bool is_copy = false;             ///< Why not: its campaign is served from another file.
+  CampaignRecord record = {};
+  bool is_copy = false;             ///< It is not served as another file of its campaign is.
   std::optional<Store> store = {};  ///< To be served; none if the campaign has ended, as the rest.
   StoredCampaign stored = {};       ///< For the dispatch.
   StopPlan plan = {};
@@ -30,10 +28,7 @@ struct FileLook {
   std::vector<SessionId> sessions = {};  ///< Workers that may come back.
 };
 
-/// Nothing if there is no such file.
-[[nodiscard]] std::optional<FileStamp> stamp_of(const std::filesystem::path& file);
-
-/// What tells the campaigns that a service has already from others.
+/// Finds out whether a service has a file, or the campaign of a file, already.
 struct KnownCampaigns {
   std::set<std::filesystem::path> files;
   std::set<CampaignId> ids;

@@ -14,7 +14,7 @@
 
 #include "coordinator/dispatch/workers.hpp"
 #include "coordinator/net/service_snapshot.hpp"
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"

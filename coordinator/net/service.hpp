@@ -37,17 +37,14 @@ enum class ServiceEnd : std::uint8_t {
   when_done,
 };
 
-/// What a coordinator's operator may want to be told about a campaign.
+/// What a coordinator's operator may want to be told about a campaign: it is finished, or failed.
 struct CampaignNotice {
-  enum class Kind : std::uint8_t {
-    finished,  ///< All runs are stored or given up, and the statistics are in the file.
-    failed,    ///< It was cancelled by its own limit, its storage failed, or two computations of a
-               ///< run differ.
-  };
-  Kind kind = Kind::finished;
   std::string campaign;        ///< Name.
   std::filesystem::path file;  ///< Its database.
-  std::string reason = {};     ///< Of a failure.
+  /// Why it failed: it was cancelled by its own limit, its storage failed, two computations of a
+  /// run differ, or most of its runs were given up. Empty if all runs are stored or given up and
+  /// the statistics are in the file.
+  std::string failure = {};
 };
 
 /// Settings of a service.

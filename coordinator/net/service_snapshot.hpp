@@ -3,12 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
-#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -31,25 +30,6 @@ struct RegisteredWorker {
   proto::WorkerStatus status = {};
   WorkerActivity activity = WorkerActivity::idle;
   double registered_s = 0.0;  ///< Since it registered with this coordinator.
-};
-
-/// Tells whether a file is still the one that it was, with the same content.
-struct FileStamp {
-  std::uint64_t inode = 0;
-  std::int64_t size = 0;
-  std::int64_t written_ns = 0;
-
-  bool operator==(const FileStamp&) const = default;
-};
-
-/// A campaign of a coordinator as it stands: served, or ended and its file closed.
-struct CampaignRecord {
-  wire::CampaignId id = {};         ///< Another campaign of the same name has another one.
-  std::filesystem::path file = {};  ///< Its database.
-  proto::CampaignStatus status = {};
-  std::uint64_t num_waiting = 0;        ///< Results that were delivered and are not stored yet.
-  bool is_closed = false;               ///< It has ended, and its file is closed and complete.
-  std::optional<FileStamp> stamp = {};  ///< Of a closed file that was looked at since.
 };
 
 /// Everything about a service at one instant. It refers to nothing of the service, so that another

@@ -26,6 +26,8 @@ class Database;
 
 namespace proofmass::coordinator {
 
+struct CampaignRecord;
+
 /// Results of a campaign database, one after the other, of one state of the file. The Store that
 /// made it outlives it.
 class ResultReader {
@@ -102,6 +104,8 @@ class Store {
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
 
+  /// What a few rows tell: all but the file, the stamp and the numbers of runs with a result.
+  [[nodiscard]] CampaignRecord record() const;
   /// A random number since the file was made; not 0, and below 2⁶³.
   [[nodiscard]] wire::CampaignId id() const;
   [[nodiscard]] std::string name() const;

@@ -2,7 +2,7 @@
 
 #include <sqlite3.h>
 
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"
