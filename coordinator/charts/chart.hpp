@@ -37,7 +37,7 @@ struct Point {
 
 /// A histogram.
 struct Bars {
-  std::string name = {};             ///< In the legend; empty: it is not listed there. So below.
+  std::string name = {};             ///< In the legend; if empty, it is not listed there.
   std::vector<double> edges = {};    ///< Ascending; one more than there are heights.
   std::vector<double> heights = {};  ///< ≥ 0.
   Ink ink = Ink::first;
@@ -46,14 +46,14 @@ struct Bars {
 /// Points joined by straight lines. A point that is not finite, or not above 0 on a logarithmic
 /// axis, ends the line; the next one begins it anew.
 struct Line {
-  std::string name = {};
+  std::string name = {};  ///< In the legend; if empty, it is not listed there.
   std::vector<Point> points = {};
   Ink ink = Ink::first;
   Dash dash = Dash::solid;
 };
 
 struct Markers {
-  std::string name = {};
+  std::string name = {};  ///< In the legend; if empty, it is not listed there.
   std::vector<Point> points = {};
   Ink ink = Ink::first;
   Shape shape = Shape::triangle;

@@ -139,7 +139,8 @@ class CampaignService {
     bool is_decided = false;                ///< The stop rule was checked with the runs of now.
     std::uint64_t num_failures_before = 0;  ///< Runs without an estimate, when it came.
     bool is_at_rest = false;                ///< Nothing is expected: the log is folded in.
-    bool is_end_told = false;               ///< See ServiceConfig::on_notice; as the next two.
+    // What ServiceConfig::on_notice was called with.
+    bool is_end_told = false;
     bool is_storage_failure_told = false;
     std::uint64_t num_mismatches_told = 0;
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
@@ -205,7 +206,7 @@ class CampaignService {
   CampaignFiles* files_;
   std::map<CampaignId, Served> served_;
   std::map<CampaignId, CampaignRecord> closed_;
-  std::vector<CampaignId> order_;  ///< Of both.
+  std::vector<CampaignId> order_;  ///< Of served and closed campaigns, as they came.
   std::map<std::filesystem::path, FileLook> unserved_;
   TimePoint looked_at_;  ///< At the directory.
   bool is_looking_ = false;

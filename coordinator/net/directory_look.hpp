@@ -20,9 +20,10 @@ namespace proofmass::coordinator {
 /// What a look at a campaign database found.
 struct FileLook {
   CampaignRecord record = {};
-  bool is_copy = false;             ///< It is not served as another file of its campaign is.
-  std::optional<Store> store = {};  ///< To be served; none if the campaign has ended, as the rest.
-  StoredCampaign stored = {};       ///< For the dispatch.
+  bool is_copy = false;  ///< It is not served as another file of its campaign is.
+  // Of a campaign that is to be served. One that has ended has neither store nor what follows.
+  std::optional<Store> store = {};
+  StoredCampaign stored = {};  ///< For the dispatch.
   StopPlan plan = {};
   std::uint64_t num_failures = 0;        ///< Finished runs without an estimate.
   std::vector<SessionId> sessions = {};  ///< Workers that may come back.
@@ -44,7 +45,7 @@ struct KnownCampaigns {
                                const CoordinatorStart& start);
 
 /// Looks at the files of a directory that are not known and adds their campaigns to those that are.
-/// Tells of them in the order in which the campaigns were made. Opens a file only if something is
+/// Lists them in the order in which the campaigns were made. Opens a file only if something is
 /// left to do with it: a campaign that has ended costs no lock, no descriptor and no write.
 /// @throws Error if the directory cannot be read.
 [[nodiscard]] std::vector<FileLook> look_at_all(const CampaignDirectory& directory,

@@ -147,7 +147,7 @@ std::vector<double> stat_fields() {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const std::size_t end = text.rfind(") ");
   if (end == std::string::npos) return {};
-  std::istringstream words(text.substr(end + 4));  // Behind the state as well.
+  std::istringstream words(text.substr(end + 4));  // Behind the name and the state.
   return {std::istream_iterator<double>(words), {}};
 }
 

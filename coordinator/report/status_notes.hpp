@@ -11,8 +11,8 @@
 
 namespace proofmass::coordinator {
 
-// What is told of a coordinator and its campaigns: their counts, and what is out of the ordinary,
-// in lines for people: visible text.
+// What people are shown of a coordinator and its campaigns: the counts, and a line of visible text
+// for everything that is out of the ordinary.
 
 /// A number of runs or results in CampaignStatus.
 struct CampaignCounter {

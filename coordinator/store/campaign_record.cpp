@@ -1,8 +1,9 @@
+#include "coordinator/store/campaign_record.hpp"
+
 #include <sys/stat.h>
 
 #include <system_error>
 
-#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/file_place.hpp"

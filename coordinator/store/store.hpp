@@ -220,9 +220,9 @@ class Store {
   [[nodiscard]] ResultReader results(RunRange runs) const;  ///< Of some of the runs.
 
   /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
-  /// @param budget   Of the campaign.
-  /// @param digests   Of the same results.
-  /// @param warnings  The same; rows of `run_warning`.
+  /// @param budget    Of the campaign.
+  /// @param digests   Of the results that the statistics were computed from.
+  /// @param warnings  Of these results; rows of `run_warning`.
   void write_statistics(const CampaignStatistics& statistics,
                         const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
                         std::span<const RunWarning> warnings = {});

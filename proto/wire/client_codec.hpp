@@ -13,15 +13,15 @@
 
 namespace proofmass::wire {
 
-// What clients and coordinator exchange: the envelopes of client.proto, and their bytes. What a
-// peer may send is told here and by the checks of client_message_reader.cpp; the comments of
-// client.proto name these limits.
+// What clients and coordinator exchange: the envelopes of client.proto, and their bytes. The limits
+// below, which the comments of client.proto name, and the checks in client_message_reader.cpp
+// define what a peer may send.
 
-/// Size limits, bytes. A SubmitRequest may be as large as the first, any other as the second.
-inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;
-inline constexpr std::size_t request_size_max = std::size_t{64} << 10;
-inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;
-/// Of one message: a larger request travels as RequestParts with slices of at most the first.
+inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;   ///< Of a submission, bytes.
+inline constexpr std::size_t request_size_max = std::size_t{64} << 10;  ///< Of others, bytes.
+inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;     ///< Bytes.
+/// A larger request travels as several messages, each a RequestPart with a slice of at most
+/// request_part_size_max bytes.
 inline constexpr std::size_t request_part_size_max = std::size_t{256} << 10;
 inline constexpr std::size_t request_message_size_max = request_part_size_max + 1024;
 
