@@ -16,17 +16,13 @@
 namespace proofmass::coordinator {
 namespace {
 
-ListedCampaign listed(const std::filesystem::path& file) {
+CampaignRecord listed(const std::filesystem::path& file) {
   try {
     const Store store = Store::open_read_only(file);
-    return {.file = file,
-            .problem = "",
-            .name = store.name(),
-            .seed = store.seed(),
-            .num_runs = store.num_runs(),
-            .num_finished = num_runs_in(store.finished_runs()),
-            .phase = store.control().phase,
-            .created_utc = store.created_utc()};
+    CampaignRecord record = store.record();
+    record.file = file;
+    record.status.set_num_done(num_runs_in(store.finished_runs()));
+    return record;
   } catch (const StoreError& error) {
     return {.file = file, .problem = error.what()};
   }
@@ -54,23 +50,23 @@ std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const ListedCampaign& campaign) {
+Json json_of(const CampaignRecord& campaign) {
   const std::string file = campaign.file.string();
   if (!campaign.problem.empty()) return {{"file", file}, {"problem", campaign.problem}};
   return {{"file", file},
           {"problem", nullptr},
-          {"name", campaign.name},
+          {"name", campaign.status.name()},
           {"seed", std::to_string(campaign.seed)},
-          {"phase", wire::name_of(campaign.phase)},
-          {"num_runs", campaign.num_runs},
-          {"num_finished", campaign.num_finished},
+          {"phase", wire::name_of(wire::phase_of(campaign.status))},
+          {"num_runs", campaign.status.num_runs()},
+          {"num_finished", campaign.status.num_done()},
           {"created_utc", campaign.created_utc}};
 }
 
 }  // namespace
 
-std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path> places) {
-  std::vector<ListedCampaign> campaigns;
+std::vector<CampaignRecord> list_campaigns(std::span<const std::filesystem::path> places) {
+  std::vector<CampaignRecord> campaigns;
   for (const std::filesystem::path& place : places) {
     std::error_code ignored;
     if (std::filesystem::is_directory(place, ignored)) {
@@ -84,7 +80,7 @@ std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path
   return campaigns;
 }
 
-Table listing_table(std::span<const ListedCampaign> campaigns) {
+Table listing_table(std::span<const CampaignRecord> campaigns) {
   if (campaigns.empty()) return {.remarks = {{"no campaigns"}}};
   constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
   Table table{.columns = {{"file", true, 18},
@@ -94,25 +90,26 @@ Table listing_table(std::span<const ListedCampaign> campaigns) {
                           {"runs", false, 9},
                           {"seed", false, 9},
                           {"created", false, 11}}};
-  for (const ListedCampaign& campaign : campaigns) {
+  for (const CampaignRecord& campaign : campaigns) {
     const std::string file = campaign.file.filename().string();
     if (!campaign.problem.empty()) {
       table.rows.push_back({file, "", "", "-", "-", "-", "-"});
       table.remarks.push_back({campaign.problem, Tone::bad});
       continue;
     }
-    table.rows.push_back({file, campaign.name, wire::name_of(campaign.phase),
-                          std::to_string(campaign.num_finished), std::to_string(campaign.num_runs),
+    const proto::CampaignStatus& status = campaign.status;
+    table.rows.push_back({file, status.name(), wire::name_of(wire::phase_of(status)),
+                          std::to_string(status.num_done()), std::to_string(status.num_runs()),
                           std::to_string(campaign.seed),
                           campaign.created_utc.substr(0, date_size)});
   }
   return table;
 }
 
-std::string listing_json(std::span<const ListedCampaign> campaigns) {
+std::string listing_json(std::span<const CampaignRecord> campaigns) {
   constexpr int indent = 2;
   Json json{{"campaigns", Json::array()}};
-  for (const ListedCampaign& campaign : campaigns) json["campaigns"].push_back(json_of(campaign));
+  for (const CampaignRecord& campaign : campaigns) json["campaigns"].push_back(json_of(campaign));
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

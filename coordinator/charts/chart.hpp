@@ -21,7 +21,7 @@ enum class Shape : std::uint8_t { triangle, diamond };
 
 enum class Scale : std::uint8_t { linear, logarithmic };
 
-struct Axis {
+struct ChartAxis {
   std::string label = {};  ///< With its unit: `|error|, nm`.
   Scale scale = Scale::linear;
   /// Ends of the axis; an end that is not given is that of the data, rounded outwards. Ends that
@@ -37,7 +37,7 @@ struct Point {
 
 /// A histogram.
 struct Bars {
-  std::string name = {};             ///< In the legend; empty: it is not listed there. So below.
+  std::string name = {};             ///< In the legend; if empty, it is not listed there.
   std::vector<double> edges = {};    ///< Ascending; one more than there are heights.
   std::vector<double> heights = {};  ///< ≥ 0.
   Ink ink = Ink::first;
@@ -46,14 +46,14 @@ struct Bars {
 /// Points joined by straight lines. A point that is not finite, or not above 0 on a logarithmic
 /// axis, ends the line; the next one begins it anew.
 struct Line {
-  std::string name = {};
+  std::string name = {};  ///< In the legend; if empty, it is not listed there.
   std::vector<Point> points = {};
   Ink ink = Ink::first;
   Dash dash = Dash::solid;
 };
 
 struct Markers {
-  std::string name = {};
+  std::string name = {};  ///< In the legend; if empty, it is not listed there.
   std::vector<Point> points = {};
   Ink ink = Ink::first;
   Shape shape = Shape::triangle;
@@ -94,8 +94,8 @@ struct ChartText {
 /// Layers over two axes, drawn in their order.
 struct Chart {
   ChartText text;
-  Axis x = {};
-  Axis y = {};
+  ChartAxis x = {};
+  ChartAxis y = {};
   std::vector<Layer> layers = {};
   double plot_height = 190.0;  ///< Of the area between the axes, of a picture 480 wide.
 };
@@ -110,7 +110,7 @@ struct BarSeries {
 /// Horizontal bars, a group a category, with their values as text at their ends.
 struct BarChart {
   ChartText text;
-  Axis x;  ///< Of the values. Bars begin at the left end of the axis.
+  ChartAxis x;  ///< Of the values. Bars begin at the left end of the axis.
   std::vector<std::string> categories;
   std::vector<BarSeries> series;  ///< Values in the order of the categories.
 };
@@ -159,7 +159,7 @@ struct TimelineLane {
 /// is cut off.
 struct Timeline {
   ChartText text;
-  Axis x;
+  ChartAxis x;
   std::vector<TimelineLane> lanes;
 };
 

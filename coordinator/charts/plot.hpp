@@ -58,14 +58,14 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
                    SvgWriter& writer);
 
 /// Grid lines and labels of ticks below the box, and the axis' label.
-void draw_x_axis(const AxisMap& x, const Axis& axis, const Box& box, SvgWriter& writer);
+void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer);
 /// Grid lines and labels of ticks on the left of the box; the label is not drawn.
 void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer);
 
 inline constexpr double x_axis_height = 42.0;  ///< Of the ticks and label below a plot.
 
 /// The axis between two ends of the data; a range of its own if there is none.
-[[nodiscard]] AxisRange range_of(const Axis& axis, std::optional<double> from,
+[[nodiscard]] AxisRange range_of(const ChartAxis& axis, std::optional<double> from,
                                  std::optional<double> to, std::size_t num_ticks_max);
 
 /// Draws a layer into the box between the axes.

@@ -112,7 +112,7 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
   return place.y - corner.y + 8.0;
 }
 
-AxisRange range_of(const Axis& axis, std::optional<double> from, std::optional<double> to,
+AxisRange range_of(const ChartAxis& axis, std::optional<double> from, std::optional<double> to,
                    std::size_t num_ticks_max) {
   const bool is_linear = axis.scale == Scale::linear;
   const double lower = from.value_or(is_linear ? 0.0 : 1.0);
@@ -121,7 +121,7 @@ AxisRange range_of(const Axis& axis, std::optional<double> from, std::optional<d
                    : logarithmic_range(axis, lower, upper, num_ticks_max);
 }
 
-void draw_x_axis(const AxisMap& x, const Axis& axis, const Box& box, SvgWriter& writer) {
+void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer) {
   FreeSpace space;
   for (const Tick& tick : x.range.ticks) {
     const double at = x.at(tick.value);

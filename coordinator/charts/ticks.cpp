@@ -147,7 +147,7 @@ std::string unit_text(std::string_view unit) {
          std::string(unit.substr(end));
 }
 
-AxisRange linear_range(const Axis& axis, double from, double to, std::size_t num_ticks_max) {
+AxisRange linear_range(const ChartAxis& axis, double from, double to, std::size_t num_ticks_max) {
   const bool has_from = is_end(axis.from, Scale::linear);
   const bool has_to = is_end(axis.to, Scale::linear);
   AxisRange range{.from = has_from ? *axis.from : from, .to = has_to ? *axis.to : to, .ticks = {}};
@@ -168,7 +168,8 @@ AxisRange linear_range(const Axis& axis, double from, double to, std::size_t num
   return range;
 }
 
-AxisRange logarithmic_range(const Axis& axis, double from, double to, std::size_t num_ticks_max) {
+AxisRange logarithmic_range(const ChartAxis& axis, double from, double to,
+                            std::size_t num_ticks_max) {
   AxisRange range{
       .from = is_end(axis.from, Scale::logarithmic) ? *axis.from : round_outwards(from, false),
       .to = is_end(axis.to, Scale::logarithmic) ? *axis.to : round_outwards(to, true),

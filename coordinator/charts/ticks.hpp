@@ -33,7 +33,7 @@ struct AxisRange {
 /// @param axis      Of a linear scale. An end that it does not give is moved outwards to a tick.
 /// @param from, to  Of the data. If they are equal, the range is made wider.
 /// @param num_ticks_max  2 or more.
-[[nodiscard]] AxisRange linear_range(const Axis& axis, double from, double to,
+[[nodiscard]] AxisRange linear_range(const ChartAxis& axis, double from, double to,
                                      std::size_t num_ticks_max);
 
 /// Ticks are 1, 2 and 5 times powers of ten over less than two of these, and if they are few
@@ -41,7 +41,7 @@ struct AxisRange {
 /// @param axis      Of a logarithmic scale. An end that it does not give is moved outwards to 1, 2
 ///                  or 5 times a power of ten.
 /// @param from, to  Of the data, above 0.
-[[nodiscard]] AxisRange logarithmic_range(const Axis& axis, double from, double to,
+[[nodiscard]] AxisRange logarithmic_range(const ChartAxis& axis, double from, double to,
                                           std::size_t num_ticks_max);
 
 }  // namespace proofmass::coordinator

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -24,12 +23,6 @@ namespace {
 
 constexpr double timeout_s_min = 0.01;
 constexpr double timeout_s_max = 86400.0;
-
-template <typename Row>
-void append(std::vector<Row>& rows, std::vector<Row>& further) {
-  rows.insert(rows.end(), std::make_move_iterator(further.begin()),
-              std::make_move_iterator(further.end()));
-}
 
 }  // namespace
 
@@ -84,33 +77,35 @@ proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& requ
 }
 
 // Campaigns are only ever added to the end of a coordinator's list.
-wire::StatusReply whole_status(const Ask& ask) {
+proto::StatusReply whole_status(const Ask& ask) {
   const auto page_from = [&](std::uint64_t first_campaign) {
     proto::RequestEnvelope request;
     request.mutable_status()->set_first_campaign(first_campaign);
-    return wire::read(reply_of(ask, request, proto::ReplyEnvelope::kStatus).status());
+    return reply_of(ask, request, proto::ReplyEnvelope::kStatus).status();
   };
-  wire::StatusReply status = page_from(0);
-  while (status.campaigns.size() < status.num_campaigns) {
-    wire::StatusReply page = page_from(status.campaigns.size());
-    if (page.campaigns.empty()) break;  // It has fewer now: it was started again.
-    append(status.campaigns, page.campaigns);
+  proto::StatusReply status = page_from(0);
+  const auto num_read = [&] { return static_cast<std::uint64_t>(status.campaigns_size()); };
+  while (num_read() < status.num_campaigns()) {
+    const proto::StatusReply page = page_from(num_read());
+    if (page.campaigns().empty()) break;  // It has fewer now: it was started again.
+    status.mutable_campaigns()->MergeFrom(page.campaigns());
   }
   return status;
 }
 
-wire::WorkersReply all_workers(const Ask& ask) {
+proto::WorkersReply all_workers(const Ask& ask) {
   const auto page_after = [&](std::uint64_t worker_id) {
     proto::RequestEnvelope request;
     request.mutable_workers()->set_after_worker_id(worker_id);
-    return wire::read(reply_of(ask, request, proto::ReplyEnvelope::kWorkers).workers());
+    return reply_of(ask, request, proto::ReplyEnvelope::kWorkers).workers();
   };
-  wire::WorkersReply workers = page_after(0);
-  bool is_more = workers.workers.size() < workers.num_workers && !workers.workers.empty();
+  proto::WorkersReply workers = page_after(0);
+  bool is_more = !workers.workers().empty() &&
+                 static_cast<std::uint64_t>(workers.workers_size()) < workers.num_workers();
   while (is_more) {
-    wire::WorkersReply page = page_after(workers.workers.back().id.value);
-    is_more = !page.workers.empty();
-    append(workers.workers, page.workers);
+    const proto::WorkersReply page = page_after(workers.workers().rbegin()->worker_id());
+    is_more = !page.workers().empty();
+    workers.mutable_workers()->MergeFrom(page.workers());
   }
   return workers;
 }

@@ -44,11 +44,11 @@ using Ask = std::function<proto::ReplyEnvelope(const proto::RequestEnvelope&)>;
 
 /// All campaigns, which a coordinator tells in several replies if they are too many for one.
 /// @throws Error if the coordinator refuses.
-[[nodiscard]] wire::StatusReply whole_status(const Ask& ask);
+[[nodiscard]] proto::StatusReply whole_status(const Ask& ask);
 
 /// All workers, asked for page by page.
 /// @throws Error if the coordinator refuses.
-[[nodiscard]] wire::WorkersReply all_workers(const Ask& ask);
+[[nodiscard]] proto::WorkersReply all_workers(const Ask& ask);
 
 /// The name. @throws UsageError unless a campaign may have it.
 [[nodiscard]] std::string checked_campaign_name(const std::string& name);

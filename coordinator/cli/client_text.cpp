@@ -19,57 +19,55 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::CampaignPhase;
-using wire::CampaignStatus;
-using wire::WorkerStatus;
+using proto::CampaignStatus;
 
 std::string time_left(const CampaignStatus& campaign) {
-  const bool is_known = campaign.remaining_s && !is_over(campaign);
-  return is_known ? duration_text(*campaign.remaining_s) : "-";
+  const bool is_known = campaign.has_remaining_s() && !is_over(campaign);
+  return is_known ? duration_text(campaign.remaining_s()) : "-";
 }
 
 std::string rate(const CampaignStatus& campaign) {
-  return campaign.rate_hz > 0.0 ? measured_figure(campaign.rate_hz) : "-";
+  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "-";
 }
 
-void add_further(std::uint64_t count, std::size_t num_shown, std::string_view thing,
+void add_further(std::uint64_t count, int num_shown, std::string_view thing,
                  std::vector<Remark>& remarks) {
   const std::string note = further_note(count, num_shown, thing);
   if (!note.empty()) remarks.push_back({note});
 }
 
-Table campaigns_table(const wire::StatusReply& status) {
+Table campaigns_table(const proto::StatusReply& status) {
   Table table;
-  if (status.campaigns.empty()) table.remarks.push_back({"no campaigns"});
-  if (!status.campaigns.empty()) {
+  if (status.campaigns().empty()) table.remarks.push_back({"no campaigns"});
+  if (!status.campaigns().empty()) {
     table.columns = {{"campaign", true, 17}, {"phase", true, 10},     {"prio", false, 5},
                      {"done", false, 11},    {"runs", false, 11},     {"%", false, 5},
                      {"runs/s", false, 8},   {"time left", false, 12}};
   }
-  for (const CampaignStatus& campaign : status.campaigns) {
-    table.rows.push_back({campaign.name, wire::phase_name(campaign),
-                          std::to_string(campaign.priority), std::to_string(campaign.num_done),
-                          std::to_string(campaign.num_runs), std::to_string(percent_done(campaign)),
-                          rate(campaign), time_left(campaign)});
+  for (const CampaignStatus& campaign : status.campaigns()) {
+    table.rows.push_back(
+        {campaign.name(), wire::phase_name(campaign), std::to_string(campaign.priority()),
+         std::to_string(campaign.num_done()), std::to_string(campaign.num_runs()),
+         std::to_string(percent_done(campaign)), rate(campaign), time_left(campaign)});
     for (Remark note : notes_about(campaign)) {
-      note.text = fmt::format("{}: {}", campaign.name, note.text);
+      note.text = fmt::format("{}: {}", campaign.name(), note.text);
       table.remarks.push_back(std::move(note));
     }
   }
-  add_further(status.num_campaigns, status.campaigns.size(), "more campaign", table.remarks);
+  add_further(status.num_campaigns(), status.campaigns_size(), "more campaign", table.remarks);
   for (Remark& note : service_notes(status)) table.remarks.push_back(std::move(note));
   return table;
 }
 
-std::string service_lines(const wire::StatusReply& status, std::size_t line_width_max) {
+std::string service_lines(const proto::StatusReply& status, std::size_t line_width_max) {
   std::uint64_t num_lent = 0;
-  for (const CampaignStatus& campaign : status.campaigns) num_lent += campaign.num_lent;
+  for (const CampaignStatus& campaign : status.campaigns()) num_lent += campaign.num_lent();
   const std::size_t width = line_width_max;
-  const std::string service = fmt::format("Proofmass {}, model {}, up {}", status.version,
-                                          status.model_version, duration_text(status.uptime_s));
+  const std::string service = fmt::format("Proofmass {}, model {}, up {}", status.version(),
+                                          status.model_version(), duration_text(status.uptime_s()));
   const std::string workers =
-      fmt::format("{} with {}, {} lent", counted(status.num_workers, "worker"),
-                  counted(status.num_slots, "slot"), counted(num_lent, "run"));
+      fmt::format("{} with {}, {} lent", counted(status.num_workers(), "worker"),
+                  counted(status.num_slots(), "slot"), counted(num_lent, "run"));
   return fmt::format("{}\n{}\n\n", shortened(wire::visible_text(service), width),
                      shortened(workers, width));
 }
@@ -93,16 +91,17 @@ std::string ago(double seconds) {
 }  // namespace
 
 bool is_over(const CampaignStatus& campaign) {
-  return campaign.phase == CampaignPhase::finished || campaign.phase == CampaignPhase::cancelled;
+  return campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED ||
+         campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED;
 }
 
-std::string status_text(const wire::StatusReply& status, const TerminalStyle& style) {
+std::string status_text(const proto::StatusReply& status, const TerminalStyle& style) {
   return service_lines(status, style.line_width_max) +
          terminal_text(campaigns_table(status), style);
 }
 
-Table workers_table(const wire::WorkersReply& workers) {
-  if (workers.workers.empty()) return {.remarks = {{"no workers"}}};
+Table workers_table(const proto::WorkersReply& workers) {
+  if (workers.workers().empty()) return {.remarks = {{"no workers"}}};
   Table table{.columns = {{"id", false, 8},
                           {"  worker", true, 17},
                           {"host", true, 14},
@@ -111,28 +110,28 @@ Table workers_table(const wire::WorkersReply& workers) {
                           {"lent", false, 8},
                           {"results", false, 9},
                           {"heard", false, 9}}};
-  for (const WorkerStatus& worker : workers.workers) {
-    table.rows.push_back({count_cell(worker.id.value), "  " + worker.name, worker.host,
-                          count_cell(worker.process_id), count_cell(worker.num_slots),
-                          count_cell(worker.num_lent), count_cell(worker.num_results),
-                          ago(worker.silent_s)});
-    if (!worker.is_quarantined) continue;
+  for (const proto::WorkerStatus& worker : workers.workers()) {
+    table.rows.push_back({count_cell(worker.worker_id()), "  " + worker.name(), worker.host(),
+                          count_cell(worker.process_id()), count_cell(worker.num_slots()),
+                          count_cell(worker.num_lent()), count_cell(worker.num_results()),
+                          ago(worker.silent_s())});
+    if (!worker.is_quarantined()) continue;
     table.remarks.push_back(
-        {fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}", worker.id.value,
-                     worker.host),
+        {fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}",
+                     worker.worker_id(), worker.host()),
          Tone::bad});
   }
-  add_further(workers.num_workers, workers.workers.size(), "more worker", table.remarks);
+  add_further(workers.num_workers(), workers.workers_size(), "more worker", table.remarks);
   return table;
 }
 
 std::string campaign_line(const CampaignStatus& campaign) {
   std::string text =
-      fmt::format("{} {}: {} of {}, {} %", campaign.name, wire::phase_name(campaign),
-                  campaign.num_done, counted(campaign.num_runs, "run"), percent_done(campaign));
+      fmt::format("{} {}: {} of {}, {} %", campaign.name(), wire::phase_name(campaign),
+                  campaign.num_done(), counted(campaign.num_runs(), "run"), percent_done(campaign));
   if (!is_over(campaign)) {
-    if (campaign.rate_hz > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
-    if (campaign.remaining_s) text += fmt::format(", {} left", time_left(campaign));
+    if (campaign.rate_hz() > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
+    if (campaign.has_remaining_s()) text += fmt::format(", {} left", time_left(campaign));
   }
   for (const Remark& note : notes_about(campaign)) text += "; " + note.text;
   return text;

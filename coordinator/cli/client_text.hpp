@@ -13,16 +13,16 @@ namespace proofmass::coordinator {
 // What a coordinator replied.
 
 /// True if it is finished or cancelled.
-[[nodiscard]] bool is_over(const wire::CampaignStatus& campaign);
+[[nodiscard]] bool is_over(const proto::CampaignStatus& campaign);
 
 /// Two lines about the coordinator, a row a campaign, and lines about what is out of the ordinary.
-[[nodiscard]] std::string status_text(const wire::StatusReply& status, const TerminalStyle& style);
+[[nodiscard]] std::string status_text(const proto::StatusReply& status, const TerminalStyle& style);
 
 /// A row a worker, and lines about those that are lent nothing.
-[[nodiscard]] Table workers_table(const wire::WorkersReply& workers);
+[[nodiscard]] Table workers_table(const proto::WorkersReply& workers);
 
 /// `mine active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
-[[nodiscard]] std::string campaign_line(const wire::CampaignStatus& campaign);
+[[nodiscard]] std::string campaign_line(const proto::CampaignStatus& campaign);
 
 /// What a client asked for.
 struct ActionTaken {

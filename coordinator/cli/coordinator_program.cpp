@@ -62,9 +62,9 @@ struct ServeOptions {
 };
 
 std::string status_of(const Service& service) {
-  const std::vector<wire::CampaignStatus> campaigns = service.campaigns();
+  const std::vector<proto::CampaignStatus> campaigns = service.campaigns();
   const auto num_active =
-      std::ranges::count(campaigns, wire::CampaignPhase::active, &wire::CampaignStatus::phase);
+      std::ranges::count(campaigns, proto::CAMPAIGN_PHASE_ACTIVE, &proto::CampaignStatus::phase);
   return fmt::format("{} campaigns to compute", num_active);
 }
 
@@ -155,9 +155,9 @@ bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
 }
 
 bool has_given_up_runs(const Service& service) {
-  const std::vector<wire::CampaignStatus> campaigns = service.campaigns();
+  const std::vector<proto::CampaignStatus> campaigns = service.campaigns();
   return std::any_of(campaigns.begin(), campaigns.end(),
-                     [](const wire::CampaignStatus& one) { return one.num_given_up > 0; });
+                     [](const proto::CampaignStatus& one) { return one.num_given_up() > 0; });
 }
 
 /// Serves all campaigns of a directory to the workers that connect.

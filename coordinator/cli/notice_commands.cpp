@@ -19,18 +19,18 @@ std::vector<std::string> environment_for(const CampaignNotice& notice) {
     variables.emplace_back(*variable);
   variables.push_back("PROOFMASS_CAMPAIGN=" + notice.campaign);
   variables.push_back("PROOFMASS_DATABASE=" + std::filesystem::absolute(notice.file).string());
-  variables.push_back("PROOFMASS_REASON=" + notice.reason);
+  variables.push_back("PROOFMASS_REASON=" + notice.failure);
   return variables;
 }
 
 std::string_view option_of(const CampaignNotice& notice) {
-  return notice.kind == CampaignNotice::Kind::finished ? "on-finish" : "on-failure";
+  return notice.failure.empty() ? "on-finish" : "on-failure";
 }
 
 }  // namespace
 
 const std::string& NoticeCommands::command_of(const CampaignNotice& notice) const {
-  return notice.kind == CampaignNotice::Kind::finished ? config_.on_finish : config_.on_failure;
+  return notice.failure.empty() ? config_.on_finish : config_.on_failure;
 }
 
 void NoticeCommands::take(const CampaignNotice& notice) {

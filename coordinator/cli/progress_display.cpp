@@ -21,42 +21,42 @@ std::string rate_text(double rate_hz) {
   return fmt::format("  {:.2f} runs/min", 60.0 * rate_hz);
 }
 
-std::string left_text(const wire::CampaignStatus& status) {
-  if (!status.remaining_s || status.num_done >= status.num_runs) return "";
-  return fmt::format("  {} left", duration_text(*status.remaining_s));
+std::string left_text(const proto::CampaignStatus& status) {
+  if (!status.has_remaining_s() || status.num_done() >= status.num_runs()) return "";
+  return fmt::format("  {} left", duration_text(status.remaining_s()));
 }
 
-std::string figures(const wire::CampaignStatus& status) {
-  if (!status.storage_failure.empty()) {
+std::string figures(const proto::CampaignStatus& status) {
+  if (!status.storage_failure().empty()) {
     return fmt::format("{:3} %  nothing can be stored", percent_done(status));
   }
-  if (status.num_done == 0 && status.num_lent > 0) {
-    return fmt::format("{:3} %  computing the first {}", percent_done(status), status.num_lent);
+  if (status.num_done() == 0 && status.num_lent() > 0) {
+    return fmt::format("{:3} %  computing the first {}", percent_done(status), status.num_lent());
   }
-  return fmt::format("{:3} %{}{}", percent_done(status), rate_text(status.rate_hz),
+  return fmt::format("{:3} %{}{}", percent_done(status), rate_text(status.rate_hz()),
                      left_text(status));
 }
 
 }  // namespace
 
-wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs) {
-  if (num_runs <= status.num_runs) return status;
-  status.num_runs = num_runs;
-  if (status.rate_hz > 0.0) {
-    status.remaining_s = static_cast<double>(num_runs - status.num_done) / status.rate_hz;
+proto::CampaignStatus out_of(proto::CampaignStatus status, std::uint64_t num_runs) {
+  if (num_runs <= status.num_runs()) return status;
+  status.set_num_runs(num_runs);
+  if (status.rate_hz() > 0.0) {
+    status.set_remaining_s(static_cast<double>(num_runs - status.num_done()) / status.rate_hz());
   }
   return status;
 }
 
-wire::CampaignStatus of_part(wire::CampaignStatus status, std::uint64_t num_runs,
-                             std::uint64_t num_done_beside) {
-  status.num_runs = num_runs;
-  status.num_done -= num_done_beside;
+proto::CampaignStatus of_part(proto::CampaignStatus status, std::uint64_t num_runs,
+                              std::uint64_t num_done_beside) {
+  status.set_num_runs(num_runs);
+  status.set_num_done(status.num_done() - num_done_beside);
   return status;
 }
 
-std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max) {
-  const std::string left = fmt::format("{}/{} runs [", status.num_done, status.num_runs);
+std::string progress_bar(const proto::CampaignStatus& status, std::size_t columns_max) {
+  const std::string left = fmt::format("{}/{} runs [", status.num_done(), status.num_runs());
   const std::string right = fmt::format("] {}", figures(status));
   const std::size_t used = left.size() + right.size();
   const std::size_t width = columns_max > used ? columns_max - used : 1;
@@ -66,8 +66,8 @@ std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns
   return line.substr(0, columns_max);
 }
 
-std::string progress_line(const wire::CampaignStatus& status) {
-  return fmt::format("{}/{} runs  {}", status.num_done, status.num_runs, figures(status));
+std::string progress_line(const proto::CampaignStatus& status) {
+  return fmt::format("{}/{} runs  {}", status.num_done(), status.num_runs(), figures(status));
 }
 
 DisplayMode display_mode_for(std::FILE* stream) {
@@ -81,11 +81,11 @@ ProgressDisplay::~ProgressDisplay() {
   if (has_bar_) wire::say_on(stream_, "\n");
 }
 
-void ProgressDisplay::update(const wire::CampaignStatus& status) {
+void ProgressDisplay::update(const proto::CampaignStatus& status) {
   if (mode_ == DisplayMode::bar) return show_bar(status);
   if (mode_ == DisplayMode::quiet) return;
   const std::uint64_t tenths = percent_done(status) / 10;
-  const bool has_failed = !status.storage_failure.empty();
+  const bool has_failed = !status.storage_failure().empty();
   const bool is_further = !tenths_shown_ || tenths > *tenths_shown_;
   if (!is_further && has_failed == is_failure_shown_) return;
   is_failure_shown_ = has_failed;
@@ -93,7 +93,7 @@ void ProgressDisplay::update(const wire::CampaignStatus& status) {
   wire::say_on(stream_, progress_line(status) + "\n");
 }
 
-void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
+void ProgressDisplay::show_bar(const proto::CampaignStatus& status) {
   std::string line = progress_bar(status, screen_size_of(stream_).columns - 1);
   if (has_bar_ && line == shown_) return;
   // The longer line before it is wiped by the erasure to the end of the line.

@@ -10,7 +10,7 @@
 
 #include "coordinator/table/figures.hpp"
 #include "coordinator/table/table.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/client.pb.h"
 
 namespace proofmass::coordinator {
 
@@ -23,20 +23,21 @@ enum class DisplayMode : std::uint8_t {
 /// The progress of a campaign with a stop rule, which asks for more runs at each check, towards the
 /// most that it may take: so it never goes back.
 /// @param num_runs  The most; without a stop rule those of the campaign.
-[[nodiscard]] wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs);
+[[nodiscard]] proto::CampaignStatus out_of(proto::CampaignStatus status, std::uint64_t num_runs);
 
 /// The progress of a part of a campaign.
 /// @param num_runs          Of the part.
 /// @param num_done_beside   Runs that were done already and are not of the part.
-[[nodiscard]] wire::CampaignStatus of_part(wire::CampaignStatus status, std::uint64_t num_runs,
-                                           std::uint64_t num_done_beside);
+[[nodiscard]] proto::CampaignStatus of_part(proto::CampaignStatus status, std::uint64_t num_runs,
+                                            std::uint64_t num_done_beside);
 
 /// A line of at most `columns_max` columns: runs done, percent, rate, time left; or that nothing
 /// can be stored. Before the first run is done, how many the workers have.
-[[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max);
+[[nodiscard]] std::string progress_bar(const proto::CampaignStatus& status,
+                                       std::size_t columns_max);
 
 /// The text of progress_bar() without the bar.
-[[nodiscard]] std::string progress_line(const wire::CampaignStatus& status);
+[[nodiscard]] std::string progress_line(const proto::CampaignStatus& status);
 
 /// Shows a campaign's progress and notes beside it.
 class ProgressDisplay {
@@ -48,12 +49,12 @@ class ProgressDisplay {
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
   /// May be called as often as one likes.
-  void update(const wire::CampaignStatus& status);
+  void update(const proto::CampaignStatus& status);
   /// A line of its own that stays.
   void note(std::string_view text, Tone tone = Tone::plain);
 
  private:
-  void show_bar(const wire::CampaignStatus& status);
+  void show_bar(const proto::CampaignStatus& status);
 
   DisplayMode mode_;
   std::FILE* stream_;

@@ -25,7 +25,7 @@ constexpr std::string_view first_name = "local-1";
 
 std::uint64_t num_done(const Service& service) {
   std::uint64_t count = 0;
-  for (const wire::CampaignStatus& campaign : service.campaigns()) count += campaign.num_done;
+  for (const proto::CampaignStatus& campaign : service.campaigns()) count += campaign.num_done();
   return count;
 }
 

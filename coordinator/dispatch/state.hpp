@@ -73,7 +73,8 @@ struct DispatchConfig {
   /// less than two rounds: what two take at this rate, or `uncommitted_max`. Results that arrive
   /// faster than they can be stored delay heartbeats, and workers send them again.
   double results_per_s_max = 30'000.0;
-  double run_time_s_expected = 5.0;  ///< Until a campaign's first result, for the same.
+  /// Assumed time of a run until a campaign's first result says what a run takes.
+  double run_time_s_expected = 5.0;
   /// A batch that finishes no step for this many times the usual time of one, and for at least
   /// `hung_after_min`, hangs.
   double hung_after_steps = 50.0;
@@ -107,13 +108,13 @@ struct Worker {
   SessionId session;
   std::string name;
   HostId host;
-  std::string host_name;  ///< As it says.
+  std::string host_name;  ///< As the worker gave it.
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
   TimePoint registered_at;
   TimePoint heard_at;                    ///< Last message of any kind.
-  std::uint64_t heartbeat_sequence = 0;  ///< Of the newest heartbeat ...
-  TimePoint heartbeat_at;                ///< ... which arrived then.
+  std::uint64_t heartbeat_sequence = 0;  ///< Of the newest heartbeat.
+  TimePoint heartbeat_at;                ///< When the newest heartbeat arrived.
   std::uint32_t num_runs_max = 0;  ///< Its credit: most unfinished runs that it wants to hold.
   std::uint64_t num_lent = 0;      ///< Runs on its leases, as far as the coordinator knows.
   std::uint64_t num_slots_lent_for = 0;  ///< Of its leases; more than slots if runs wait there.
@@ -239,8 +240,8 @@ struct CampaignState {
   std::uint64_t num_committed_here = 0;    ///< Without those that were finished before.
   std::uint64_t num_without_estimate = 0;  ///< Delivered here, with a status that has none.
   std::uint64_t num_duplicates = 0;        ///< Results that were there already.
-  std::uint64_t num_audited = 0;           ///< Results compared with the stored ones ...
-  std::uint64_t num_mismatches = 0;        ///< ... and found different.
+  std::uint64_t num_audited = 0;           ///< Results that were compared with the stored ones.
+  std::uint64_t num_mismatches = 0;        ///< Compared results that differ from the stored ones.
 };
 
 /// A campaign as the store has it when the coordinator starts.
@@ -294,12 +295,12 @@ struct State {
   std::map<LeaseId, Lease> leases;
   std::uint64_t next_lease = 1;
   std::uint64_t num_slots = 0;           ///< Of all workers.
-  std::uint64_t num_eligible_slots = 0;  ///< Of eligible workers ...
-  std::uint64_t num_idle_slots = 0;      ///< ... and those among them that are idle.
+  std::uint64_t num_eligible_slots = 0;  ///< Of eligible workers.
+  std::uint64_t num_idle_slots = 0;      ///< Slots of eligible workers that are idle.
   std::uint64_t num_slots_expected = 0;  ///< Of workers that are still to come.
   LentSlots lately_lent;      ///< What was longer ago than half of a run takes may be missing.
   std::set<WorkerId> hungry;  ///< Workers that were lent less than they would take.
-  WorkerId fed_last;          ///< The one of these that was last lent some.
+  WorkerId fed_last;          ///< The hungry worker that was last lent runs.
   std::map<HostId, Host> hosts;
   /// Hosts that are lent nothing until then, but for one round to workers that have delivered.
   std::map<HostId, TimePoint> quarantined;

@@ -165,22 +165,24 @@ std::optional<std::string> reason_to_pause(const FactoryState& state) {
   return std::nullopt;
 }
 
-wire::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
-                              const FactoryView& view, FactoryTime now) {
-  wire::FactoryReport report{.name = config.name, .batch_system = {}};
-  report.num_wanted = wanted_workers(config, view, state.rate_per_worker_hz);
-  report.num_registered =
+proto::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
+                               const FactoryView& view, FactoryTime now) {
+  proto::FactoryReport report;
+  report.set_name(config.name);
+  report.set_phase(proto::FACTORY_PHASE_ACTIVE);
+  report.set_num_wanted(wanted_workers(config, view, state.rate_per_worker_hz));
+  report.set_num_registered(
       static_cast<std::uint64_t>(std::ranges::count_if(state.allocations, [&](const auto& entry) {
         return view.workers.contains(worker_name(config, entry.first));
-      }));
-  report.num_queued = num_coming(state);
+      })));
+  report.set_num_queued(num_coming(state));
   if (const auto reason = reason_to_pause(state)) {
-    report.phase = wire::FactoryPhase::paused;
-    report.reason = *reason;
+    report.set_phase(proto::FACTORY_PHASE_PAUSED);
+    report.set_reason(*reason);
   } else if (now < state.next_submission) {
-    report.phase = wire::FactoryPhase::waiting;
-    report.wait_s = std::chrono::duration<double>(state.next_submission - now).count();
-    report.reason = state.failure;
+    report.set_phase(proto::FACTORY_PHASE_WAITING);
+    report.set_wait_s(std::chrono::duration<double>(state.next_submission - now).count());
+    report.set_reason(state.failure);
   }
   return report;
 }

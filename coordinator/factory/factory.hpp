@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "proto/client.pb.h"
 #include "proto/text/event.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -97,7 +97,7 @@ void on_submission_failed(FactoryState& state, const std::string& reason, Factor
 [[nodiscard]] std::optional<std::string> reason_to_pause(const FactoryState& state);
 
 /// What the factory tells the coordinator after a look; without batch system and interval.
-[[nodiscard]] wire::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
-                                            const FactoryView& view, FactoryTime now);
+[[nodiscard]] proto::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
+                                             const FactoryView& view, FactoryTime now);
 
 }  // namespace proofmass::coordinator

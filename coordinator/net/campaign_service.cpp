@@ -35,7 +35,7 @@ CampaignService::~CampaignService() = default;
 std::optional<CampaignRecord> CampaignService::find(std::string_view name) const {
   const auto has_name = [&](CampaignId id) {
     const auto served = served_.find(id);
-    return (served == served_.end() ? closed_.at(id) : served->second.record).status.name == name;
+    return (served == served_.end() ? closed_.at(id) : served->second.record).status.name() == name;
   };
   const auto found = std::ranges::find_if(order_, has_name);
   if (found == order_.end()) return std::nullopt;
@@ -58,27 +58,28 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   const Served& served = served_.at(id);
   CampaignRecord record = served.record;
   record.num_waiting = campaign.delivered.size();
-  wire::CampaignStatus& status = record.status;
-  status.phase = phase_of(id);
-  status.priority = campaign.priority;
-  status.num_runs = campaign.definition->num_runs;
-  status.num_done = campaign.committed.size();
-  status.num_without_estimate = campaign.num_without_estimate;
-  status.num_given_up = campaign.given_up.size();
-  status.num_lent = campaign.lent.size();
-  status.num_duplicates = campaign.num_duplicates;
-  status.num_audited = campaign.num_audited;
-  status.num_mismatches = campaign.num_mismatches;
-  status.rate_hz = served.rate.rate_hz(context_.now());
-  status.remaining_s = remaining_s(campaign, status.rate_hz);
-  status.storage_failure = campaign.storage_failure;
+  proto::CampaignStatus& status = record.status;
+  status.set_phase(wire::message_value(phase_of(id)));
+  status.set_priority(campaign.priority);
+  status.set_num_runs(campaign.definition->num_runs);
+  status.set_num_done(campaign.committed.size());
+  status.set_num_without_estimate(campaign.num_without_estimate);
+  status.set_num_given_up(campaign.given_up.size());
+  status.set_num_lent(campaign.lent.size());
+  status.set_num_duplicates(campaign.num_duplicates);
+  status.set_num_audited(campaign.num_audited);
+  status.set_num_mismatches(campaign.num_mismatches);
+  status.set_rate_hz(served.rate.rate_hz(context_.now()));
+  const std::optional<double> left_s = remaining_s(campaign, status.rate_hz());
+  if (left_s) status.set_remaining_s(*left_s);
+  status.set_storage_failure(campaign.storage_failure);
   return record;
 }
 
 CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
-    if (served.record.status.owner != owner) continue;
+    if (served.record.status.owner() != owner) continue;
     const Holdings one = holdings_of(id);
     holdings.num_campaigns += one.num_campaigns;
     holdings.size += one.size;
@@ -97,7 +98,7 @@ void CampaignService::take_hold(CampaignId id) {
   Served& served = served_.at(id);
   if (served.is_held) {
     throw Error(fmt::format("campaign = {} (is being changed by another request; try again)",
-                            served.record.status.name));
+                            served.record.status.name()));
   }
   served.is_held = true;
 }
@@ -203,9 +204,8 @@ void CampaignService::review_failures(CampaignId id, const Served& served) {
       served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
   if (num_failures <= *served.plan.failures_max) return;
   on_cancel(state_, id, outbox_);
-  tell(served, CampaignNotice::Kind::failed,
-       fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
-                   *served.plan.failures_max));
+  tell(served, fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
+                           *served.plan.failures_max));
   outbox_.log(
       {.severity = Severity::error,
        .kind = "too_many_failures",
@@ -307,28 +307,23 @@ void CampaignService::review_notices(CampaignId id, Served& served) {
   if (!served.is_end_told && is_finished_and_settled(id, served)) {
     served.is_end_told = true;
     const bool has_failed = wire::has_failed(record_of(id).status);
-    tell(served, has_failed ? CampaignNotice::Kind::failed : CampaignNotice::Kind::finished,
-         has_failed ? "most of its runs were given up" : "");
+    tell(served, has_failed ? "most of its runs were given up" : "");
   }
   const bool has_failed = !campaign.storage_failure.empty();
-  if (has_failed && !served.is_storage_failure_told) {
-    tell(served, CampaignNotice::Kind::failed, campaign.storage_failure);
-  }
+  if (has_failed && !served.is_storage_failure_told) tell(served, campaign.storage_failure);
   served.is_storage_failure_told = has_failed;
   if (campaign.num_mismatches > served.num_mismatches_told) {
-    tell(served, CampaignNotice::Kind::failed,
+    tell(served,
          fmt::format("{} runs were computed again with another result", campaign.num_mismatches));
   }
   served.num_mismatches_told = campaign.num_mismatches;
 }
 
-void CampaignService::tell(const Served& served, CampaignNotice::Kind kind,
-                           std::string reason) const {
+void CampaignService::tell(const Served& served, std::string failure) const {
   if (!context_.config.on_notice) return;
-  context_.config.on_notice({.kind = kind,
-                             .campaign = served.record.status.name,
+  context_.config.on_notice({.campaign = served.record.status.name(),
                              .file = served.record.file,
-                             .reason = std::move(reason)});
+                             .failure = std::move(failure)});
 }
 
 bool CampaignService::is_all_done() const {
@@ -349,9 +344,10 @@ bool CampaignService::is_all_told() const {
 }
 
 proto::ReplyEnvelope CampaignService::done_reply(CampaignId id) const {
-  const wire::CampaignStatus status = record_of(id).status;
-  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
-                                      wire::phase_name(status), status.num_runs, status.num_done));
+  const proto::CampaignStatus status = record_of(id).status;
+  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name(),
+                                      wire::phase_name(status), status.num_runs(),
+                                      status.num_done()));
 }
 
 }  // namespace proofmass::coordinator

@@ -21,7 +21,7 @@
 #include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "coordinator/store/store_writer.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -113,9 +113,8 @@ class CampaignService {
   [[nodiscard]] std::vector<CampaignRecord> records(
       std::size_t first = 0, std::size_t count_max = std::numeric_limits<std::size_t>::max()) const;
   [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
-  [[nodiscard]] std::size_t num_unserved() const { return unserved_.size(); }
-  /// By name, at most so many.
-  [[nodiscard]] std::vector<wire::UnservedFile> unserved(std::size_t count_max) const;
+  /// Adds the files that cannot be served for now, by name, as many as a reply may have.
+  void add_unserved(proto::StatusReply& reply) const;
 
   /// True if nobody waits to be told of the end of a campaign, see ServiceConfig::on_notice.
   [[nodiscard]] bool is_all_told() const;
@@ -140,7 +139,8 @@ class CampaignService {
     bool is_decided = false;                ///< The stop rule was checked with the runs of now.
     std::uint64_t num_failures_before = 0;  ///< Runs without an estimate, when it came.
     bool is_at_rest = false;                ///< Nothing is expected: the log is folded in.
-    bool is_end_told = false;               ///< See ServiceConfig::on_notice; as the next two.
+    // What ServiceConfig::on_notice was called with.
+    bool is_end_told = false;
     bool is_storage_failure_told = false;
     std::uint64_t num_mismatches_told = 0;
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
@@ -179,7 +179,8 @@ class CampaignService {
   void review_failures(CampaignId id, const Served& served);
   void review_control(CampaignId id, Served& served);
   void review_notices(CampaignId id, Served& served);
-  void tell(const Served& served, CampaignNotice::Kind kind, std::string reason) const;
+  /// @param failure  Empty if the campaign is finished.
+  void tell(const Served& served, std::string failure) const;
   void review_summary(CampaignId id, Served& served);
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);
@@ -205,7 +206,7 @@ class CampaignService {
   CampaignFiles* files_;
   std::map<CampaignId, Served> served_;
   std::map<CampaignId, CampaignRecord> closed_;
-  std::vector<CampaignId> order_;  ///< Of both.
+  std::vector<CampaignId> order_;  ///< Of served and closed campaigns, as they came.
   std::map<std::filesystem::path, FileLook> unserved_;
   TimePoint looked_at_;  ///< At the directory.
   bool is_looking_ = false;

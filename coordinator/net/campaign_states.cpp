@@ -6,13 +6,14 @@
 #include <chrono>
 #include <exception>
 #include <memory>
+#include <ranges>
 #include <set>
 #include <utility>
 
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/outcome.hpp"
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -28,17 +29,17 @@ std::string not_at_rest(std::string_view campaign) {
 
 void CampaignService::add(FileLook look) {
   const CampaignRecord& campaign = look.record;
-  const std::optional<CampaignRecord> same_name = find(campaign.status.name);
+  const std::optional<CampaignRecord> same_name = find(campaign.status.name());
   const bool is_again =
       look.store && closed_.contains(campaign.id) && same_name && same_name->id == campaign.id;
   const bool is_there = same_name || served_.contains(campaign.id) || closed_.contains(campaign.id);
   if (is_there && !is_again) {
     throw Error(fmt::format("campaign = {} in {} (is served already, from another file)",
-                            campaign.status.name, campaign.file.string()));
+                            campaign.status.name(), campaign.file.string()));
   }
   if (!is_again) order_.push_back(campaign.id);
   if (look.store) return serve(std::move(look));
-  on_ended(state_, campaign.id, campaign.status.num_runs);
+  on_ended(state_, campaign.id, campaign.status.num_runs());
   closed_.emplace(campaign.id, campaign);
 }
 
@@ -61,20 +62,21 @@ void CampaignService::serve(FileLook look) {
 
 void CampaignService::take(FileLook look) {
   const std::filesystem::path file = look.record.file;
-  if (look.failure.empty()) {
+  if (look.record.problem.empty()) {
     const std::string failure = failure_of([&] { add(std::move(look)); });
     if (failure.empty()) {
       if (unserved_.erase(file) == 0) return;
       return outbox_.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
     }
-    look = {.record = {.file = file}, .failure = failure};
+    look = {.record = {.file = file, .problem = failure}};
   }
   const auto known = unserved_.find(file);
-  const bool is_news = known == unserved_.end() || known->second.failure != look.failure;
+  const bool is_news =
+      known == unserved_.end() || known->second.record.problem != look.record.problem;
   if (is_news) {
     outbox_.log({.severity = Severity::error,
                  .kind = "campaign_not_served",
-                 .fields = {Field::reason(look.failure)}});
+                 .fields = {Field::reason(look.record.problem)}});
   }
   unserved_.insert_or_assign(file, std::move(look));
 }
@@ -129,7 +131,7 @@ CampaignService::Findings CampaignService::look(const CampaignDirectory& directo
   // Without a file: that of the directory itself.
   if (!failure.empty()) {
     findings = {};
-    findings.looks.emplace_back().failure = failure;
+    findings.looks.emplace_back().record.problem = failure;
   }
   return findings;
 }
@@ -170,13 +172,14 @@ bool CampaignService::is_all_served() const {
   return std::ranges::all_of(unserved_, [](const auto& item) { return item.second.is_copy; });
 }
 
-std::vector<wire::UnservedFile> CampaignService::unserved(std::size_t count_max) const {
-  std::vector<wire::UnservedFile> files;
-  for (const auto& [file, look] : unserved_) {
-    if (files.size() == count_max) break;
-    files.push_back({.file = file.string(), .reason = look.failure});
+void CampaignService::add_unserved(proto::StatusReply& reply) const {
+  reply.set_num_unserved_files(unserved_.size());
+  for (const auto& [file, look] :
+       unserved_ | std::views::take(wire::unserved_files_per_reply_max)) {
+    proto::UnservedFile& unserved = *reply.add_unserved_files();
+    unserved.set_file(file.string());
+    unserved.set_reason(look.record.problem);
   }
-  return files;
 }
 
 // From served to closed.
@@ -248,38 +251,40 @@ void CampaignService::close_ended(CampaignId id) {
   CampaignRecord closed = record_of(id);
   closed.is_closed = true;
   closed.num_waiting = 0;
-  closed.status.rate_hz = 0.0;
-  closed.status.remaining_s.reset();
+  closed.status.set_rate_hz(0.0);
+  closed.status.clear_remaining_s();
   const std::filesystem::path file = closed.file;
   history_.note_closed(id);
   on_removed(state_, id, outbox_);
-  on_ended(state_, id, closed.status.num_runs);
+  on_ended(state_, id, closed.status.num_runs());
   served_.erase(id);
   closed_.emplace(id, std::move(closed));
-  context_.background.post_next([this, id, file,
-                                 epoch = context_.start.epoch]() -> Background::Finish {
-    std::optional<std::string> reason;
-    const std::string failure = failure_of([&] {
-      Store store = writer_.close(id);
-      std::vector<Entry> entries;
-      for (const SessionId session : store.attached_sessions()) {
-        entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
-      }
-      if (!entries.empty()) (void)store.write(entries);
-      store.end_coordinator(epoch);
-      reason = store.rest();
-    });
-    if (!failure.empty()) reason = failure;
-    // The stamp of no file has a file looked at again, which serves one whose log is still needed.
-    const std::optional<FileStamp> stamp = reason ? FileStamp{} : stamp_of(file);
-    return [this, id, stamp, reason] {
-      const auto found = closed_.find(id);
-      if (found == closed_.end()) return;
-      found->second.stamp = stamp;
-      if (reason) return say_not_closed(*reason);
-      outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name}}});
-    };
-  });
+  context_.background.post_next(
+      [this, id, file, epoch = context_.start.epoch]() -> Background::Finish {
+        std::optional<std::string> reason;
+        const std::string failure = failure_of([&] {
+          Store store = writer_.close(id);
+          std::vector<Entry> entries;
+          for (const SessionId session : store.attached_sessions()) {
+            entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
+          }
+          if (!entries.empty()) (void)store.write(entries);
+          store.end_coordinator(epoch);
+          reason = store.rest();
+        });
+        if (!failure.empty()) reason = failure;
+        // The stamp of no file has a file looked at again, which serves one whose log is still
+        // needed.
+        const std::optional<FileStamp> stamp = reason ? FileStamp{} : stamp_of(file);
+        return [this, id, stamp, reason] {
+          const auto found = closed_.find(id);
+          if (found == closed_.end()) return;
+          found->second.stamp = stamp;
+          if (reason) return say_not_closed(*reason);
+          outbox_.log(
+              {.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name()}}});
+        };
+      });
 }
 
 void CampaignService::archive(CampaignId id, const Respond& respond) {
@@ -292,19 +297,20 @@ void CampaignService::archive(CampaignId id, const Respond& respond) {
   if (found == served_.end()) return move_to_archive(id, respond);
   if (!is_settled(id, found->second)) {
     throw Error(fmt::format("campaign = {} (something is still to be stored; try again)",
-                            found->second.record.status.name));
+                            found->second.record.status.name()));
   }
-  begin_closing(id, [this, id, respond, name = found->second.record.status.name](bool is_closing) {
-    if (is_closing) return move_to_archive(id, respond);
-    respond(wire::error_reply(not_at_rest(name)));
-  });
+  begin_closing(id,
+                [this, id, respond, name = found->second.record.status.name()](bool is_closing) {
+                  if (is_closing) return move_to_archive(id, respond);
+                  respond(wire::error_reply(not_at_rest(name)));
+                });
 }
 
 // What closes the file was posted before.
 void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
   const CampaignRecord& campaign = closed_.at(id);
   context_.background.post_next([this, id, respond, file = campaign.file,
-                                 name = campaign.status.name]() -> Background::Finish {
+                                 name = campaign.status.name()]() -> Background::Finish {
     std::filesystem::path place;
     const std::string failure = failure_of([&] {
       // A log that is left behind has results, and nobody could use the name again.

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/random.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,7 +16,7 @@
 #include <string>
 #include <utility>
 
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/runs.hpp"
@@ -43,7 +42,7 @@ StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns gi
 }
 
 FileLook failed_look(const std::filesystem::path& file, const std::string& failure) {
-  return {.record = {.file = file}, .failure = failure};
+  return {.record = {.file = file, .problem = failure}};
 }
 
 FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
@@ -53,42 +52,18 @@ FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
   return look;
 }
 
-FileLook ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek,
-                        const std::optional<FileStamp>& stamp) {
-  return {.record = {.id = peek.id,
-                     .file = file,
-                     .status = {.name = peek.name,
-                                .phase = peek.phase,
-                                .priority = peek.priority,
-                                .num_runs = peek.num_runs,
-                                .num_done = peek.num_finished,
-                                .num_given_up = peek.num_given_up,
-                                .owner = peek.owner},
-                     .is_closed = true,
-                     .stamp = stamp},
-          .created_utc = peek.created_utc};
-}
-
 /// How many of the files that are looked at hold a campaign, by its name.
 using NumFiles = std::map<std::string, int>;
 
-/// Of which campaign a file is.
-struct Identity {
-  CampaignId id;
-  std::string name;
-};
-
 /// Empty if the file cannot be read; why is said when it is looked at.
-std::optional<Identity> identity_of(const std::filesystem::path& file) {
+std::optional<CampaignRecord> record_of(const std::filesystem::path& file) {
   try {
-    const CampaignPeek peek = peek_campaign(file);
-    return Identity{.id = peek.id, .name = peek.name};
+    return peek_campaign(file);
   } catch (const std::exception&) {
     if (!has_journal(file)) return std::nullopt;
   }
   try {
-    const Store store = Store::open_read_only(file);
-    return Identity{.id = store.id(), .name = store.name()};
+    return Store::open_read_only(file).record();
   } catch (const std::exception&) {
     return std::nullopt;
   }
@@ -121,12 +96,12 @@ NumFiles order_files(std::vector<std::filesystem::path>& files, const KnownCampa
   std::map<CampaignId, std::vector<std::size_t>> places;
   std::map<CampaignId, std::string> names;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const std::optional<Identity> identity = identity_of(files[i]);
-    if (!identity) continue;
-    ++num_files[identity->name];
-    if (known.ids.contains(identity->id)) continue;
-    places[identity->id].push_back(i);
-    names[identity->id] = identity->name;
+    const std::optional<CampaignRecord> record = record_of(files[i]);
+    if (!record) continue;
+    ++num_files[record->status.name()];
+    if (known.ids.contains(record->id)) continue;
+    places[record->id].push_back(i);
+    names[record->id] = record->status.name();
   }
   for (const auto& [id, indices] : places) {
     if (indices.size() == 1) continue;
@@ -140,7 +115,7 @@ NumFiles order_files(std::vector<std::filesystem::path>& files, const KnownCampa
 
 /// By its bytes and without its log: it may be a file that is served under another name. Nothing
 /// if that does not tell, as a coordinator that was killed while it folded its log in leaves it.
-std::optional<CampaignPeek> peek_without_log(const std::filesystem::path& file) {
+std::optional<CampaignRecord> peek_without_log(const std::filesystem::path& file) {
   try {
     return peek_campaign(file);
   } catch (const StoreError&) {
@@ -150,10 +125,10 @@ std::optional<CampaignPeek> peek_without_log(const std::filesystem::path& file) 
 }
 
 /// Any program may have written the file, and clients refuse a list in which one name is wrong.
-void require_shown(const std::filesystem::path& file, std::string_view name, std::string_view owner,
-                   int priority) {
-  const bool has_names = wire::is_name(name) && (owner.empty() || wire::is_name(owner));
-  if (has_names && std::abs(std::int64_t{priority}) <= wire::priority_max) return;
+void require_shown(const std::filesystem::path& file, const proto::CampaignStatus& status) {
+  const bool has_names =
+      wire::is_name(status.name()) && (status.owner().empty() || wire::is_name(status.owner()));
+  if (has_names && std::abs(std::int64_t{status.priority()}) <= wire::priority_max) return;
   throw Error(fmt::format(
       "campaign database = {} (its name, owner or priority breaks the rules of a campaign file)",
       file.string()));
@@ -163,15 +138,17 @@ FileLook opened(const CampaignDirectory& directory, const std::filesystem::path&
                 const KnownCampaigns& known, const NumFiles& num_files,
                 const CoordinatorStart& start) {
   const std::optional<FileStamp> stamp = stamp_of(file);  // Before anything is read.
-  if (const std::optional<CampaignPeek> peek = peek_without_log(file)) {
-    require_shown(file, peek->name, peek->owner, peek->priority);
-    const bool is_known = known.ids.contains(peek->id) || known.names.contains(peek->name);
-    const auto found = num_files.find(peek->name);
+  if (std::optional<CampaignRecord> record = peek_without_log(file)) {
+    require_shown(file, record->status);
+    const std::string& name = record->status.name();
+    const bool is_known = known.ids.contains(record->id) || known.names.contains(name);
+    const auto found = num_files.find(name);
     const bool has_rival = is_known || found == num_files.end() || found->second > 1;
     // Of several files a damaged one must not stand for the campaign.
     if (has_rival && !has_journal(file)) (void)peek_campaign(file, PeekDepth::pages);
-    if (is_known) return copy_of(file, peek->name);
-    if (peek->is_at_rest) return ended_campaign(file, *peek, stamp);
+    if (is_known) return copy_of(file, name);
+    record->stamp = stamp;
+    if (record->is_closed) return {.record = std::move(*record)};
   }
   ServedCampaign campaign = directory.load(file);
   if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
@@ -195,37 +172,26 @@ wire::Epoch random_epoch() {
 void KnownCampaigns::add(const CampaignRecord& campaign) {
   files.insert(campaign.file);
   ids.insert(campaign.id);
-  names.insert(campaign.status.name);
+  names.insert(campaign.status.name());
 }
 
 void KnownCampaigns::remove(const CampaignRecord& campaign) {
   files.erase(campaign.file);
   ids.erase(campaign.id);
-  names.erase(campaign.status.name);
-}
-
-std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
-  struct stat status {};
-  if (::stat(file.c_str(), &status) != 0) return std::nullopt;
-  constexpr std::int64_t ns_per_s = 1'000'000'000;
-  return FileStamp{.inode = status.st_ino,
-                   .size = status.st_size,
-                   .written_ns = status.st_mtim.tv_sec * ns_per_s + status.st_mtim.tv_nsec};
+  names.erase(campaign.status.name());
 }
 
 FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const CoordinatorStart& start) {
   wire::kill_point(wire::KillPoint::after_open);
   Store& store = campaign.store;
-  FileLook look{.record = {.id = store.id(),
-                           .file = campaign.file,
-                           .status = {.name = campaign.definition->name, .owner = store.owner()}},
-                .created_utc = store.created_utc(),
+  FileLook look{.record = store.record(),
                 .stored = stored_campaign_of(campaign, given_up),
                 .plan = store.stop_plan(),
                 .num_failures = store.num_without_estimate(),
                 .sessions = store.attached_sessions()};
-  require_shown(campaign.file, look.record.status.name, look.record.status.owner,
-                look.stored.control.priority);
+  look.record.file = campaign.file;
+  look.record.status.set_name(campaign.definition->name);
+  require_shown(campaign.file, look.record.status);
   store.begin_coordinator(start);
   look.store = std::move(store);
   return look;
@@ -243,10 +209,10 @@ std::vector<FileLook> look_at_all(const CampaignDirectory& directory, KnownCampa
     } catch (const std::exception& error) {
       looks.push_back(failed_look(file, error.what()));
     }
-    if (looks.back().failure.empty()) known.add(looks.back().record);
+    if (looks.back().record.problem.empty()) known.add(looks.back().record);
   }
   // The order of submission, which `status` shows and in which campaigns of one priority are lent.
-  std::ranges::stable_sort(looks, {}, &FileLook::created_utc);
+  std::ranges::stable_sort(looks, {}, [](const FileLook& look) { return look.record.created_utc; });
   return looks;
 }
 

@@ -19,21 +19,17 @@ namespace proofmass::coordinator {
 
 /// What a look at a campaign database found.
 struct FileLook {
-  CampaignRecord record = {};       ///< Has nothing but the file if that cannot be served.
-  std::string created_utc = {};     ///< As in `2024-02-29T12:00:10Z`.
-  std::string failure = {};         ///< Why it cannot be served for now; empty if it can.
-  bool is_copy = false;             ///< Why not: its campaign is served from another file.
-  std::optional<Store> store = {};  ///< To be served; none if the campaign has ended, as the rest.
-  StoredCampaign stored = {};       ///< For the dispatch.
+  CampaignRecord record = {};
+  bool is_copy = false;  ///< It is not served as another file of its campaign is.
+  // Of a campaign that is to be served. One that has ended has neither store nor what follows.
+  std::optional<Store> store = {};
+  StoredCampaign stored = {};  ///< For the dispatch.
   StopPlan plan = {};
   std::uint64_t num_failures = 0;        ///< Finished runs without an estimate.
   std::vector<SessionId> sessions = {};  ///< Workers that may come back.
 };
 
-/// Nothing if there is no such file.
-[[nodiscard]] std::optional<FileStamp> stamp_of(const std::filesystem::path& file);
-
-/// What tells the campaigns that a service has already from others.
+/// Finds out whether a service has a file, or the campaign of a file, already.
 struct KnownCampaigns {
   std::set<std::filesystem::path> files;
   std::set<CampaignId> ids;
@@ -49,7 +45,7 @@ struct KnownCampaigns {
                                const CoordinatorStart& start);
 
 /// Looks at the files of a directory that are not known and adds their campaigns to those that are.
-/// Tells of them in the order in which the campaigns were made. Opens a file only if something is
+/// Lists them in the order in which the campaigns were made. Opens a file only if something is
 /// left to do with it: a campaign that has ended costs no lock, no descriptor and no write.
 /// @throws Error if the directory cannot be read.
 [[nodiscard]] std::vector<FileLook> look_at_all(const CampaignDirectory& directory,

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -17,14 +17,14 @@ class FactoryReports {
   /// Replaces the report of the same name and owner.
   /// @param owner  Name of the key that reports; empty without keys.
   /// @throws Error if the limit of known factories is reached.
-  void take(const wire::FactoryReport& report, const std::string& owner, TimePoint now);
+  void take(const proto::FactoryReport& report, const std::string& owner, TimePoint now);
 
   /// By name, at most wire::factories_max.
-  [[nodiscard]] std::vector<wire::FactoryStatus> current(TimePoint now) const;
+  [[nodiscard]] std::vector<proto::FactoryStatus> current(TimePoint now) const;
 
  private:
   struct Known {
-    wire::FactoryReport report;
+    proto::FactoryReport report;
     TimePoint heard_at;
   };
 

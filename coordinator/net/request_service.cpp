@@ -7,17 +7,19 @@
 #include <exception>
 #include <filesystem>
 #include <optional>
+#include <ranges>
 #include <set>
 #include <string_view>
 #include <utility>
 
 #include "coordinator/dispatch/workers.hpp"
 #include "coordinator/net/service_snapshot.hpp"
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -32,19 +34,20 @@ std::set<std::string> quarantined_hosts(const State& state) {
 /// @throws Error if the action can have no effect. A finished campaign can only be archived or
 /// retried, the latter only if runs were given up; a cancelled one must be resumed before it is
 /// retried or gets a priority; one that is neither cannot be archived.
-void require_possible(const wire::CampaignStatus& campaign, wire::ControlAction action) {
+void require_possible(const proto::CampaignStatus& campaign, wire::ControlAction action) {
   const auto refuse = [&](std::string_view why) {
-    throw Error(fmt::format("campaign = {} ({})", campaign.name, why));
+    throw Error(fmt::format("campaign = {} ({})", campaign.name(), why));
   };
   const bool is_retry = action == wire::ControlAction::retry;
   const bool needs_resume = is_retry || action == wire::ControlAction::set_priority;
   if (action == wire::ControlAction::archive) {
-    if (!has_ended(campaign.phase)) refuse("is not finished; cancel it first");
+    if (!has_ended(wire::phase_of(campaign))) refuse("is not finished; cancel it first");
     return;
   }
-  if (campaign.phase == Phase::finished && !is_retry) refuse("is finished");
-  if (campaign.phase == Phase::cancelled && needs_resume) refuse("is cancelled; resume it first");
-  if (is_retry && campaign.num_given_up == 0) refuse("has no run that was given up");
+  if (campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED && !is_retry) refuse("is finished");
+  if (campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED && needs_resume)
+    refuse("is cancelled; resume it first");
+  if (is_retry && campaign.num_given_up() == 0) refuse("has no run that was given up");
 }
 
 StopPlan plan_of(const Request& request) {
@@ -84,30 +87,26 @@ void require_own_file(const CampaignRecord& campaign) {
 }  // namespace
 
 RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
-    : context_(context),
-      campaigns_(campaigns),
-      began_at_(context.now()),
-      paths_(context.config.answer_directory.parent_path()),
-      answers_(context) {}
+    : context_(context), campaigns_(campaigns), began_at_(context.now()), answers_(context) {}
 
-wire::StatusReply RequestService::service_status() const {
+proto::StatusReply RequestService::service_status() const {
   const State& state = context_.state;
   const TimePoint now = context_.now();
-  wire::StatusReply reply{.version = context_.config.version,
-                          .model_version = std::string(model().version()),
-                          .uptime_s = seconds(now - began_at_),
-                          .num_workers = state.workers.size(),
-                          .num_slots = state.num_slots,
-                          .campaigns = {},
-                          .num_campaigns = campaigns_.num_campaigns(),
-                          .unserved_files = campaigns_.unserved(wire::unserved_files_per_reply_max),
-                          .num_unserved_files = campaigns_.num_unserved(),
-                          .factories = factories_.current(now)};
+  proto::StatusReply reply;
+  reply.set_version(context_.config.version);
+  reply.set_model_version(std::string(model().version()));
+  reply.set_uptime_s(seconds(now - began_at_));
+  reply.set_num_workers(state.workers.size());
+  reply.set_num_slots(state.num_slots);
+  reply.set_num_campaigns(campaigns_.num_campaigns());
+  campaigns_.add_unserved(reply);
   const std::set<std::string> hosts = quarantined_hosts(state);
-  reply.num_quarantined_hosts = hosts.size();
-  for (const std::string& host : hosts) {
-    if (reply.quarantined_hosts.size() == wire::quarantined_hosts_per_reply_max) break;
-    reply.quarantined_hosts.push_back(host);
+  reply.set_num_quarantined_hosts(hosts.size());
+  for (const std::string& host : hosts | std::views::take(wire::quarantined_hosts_per_reply_max)) {
+    reply.add_quarantined_hosts(host);
+  }
+  for (proto::FactoryStatus& factory : factories_.current(now)) {
+    *reply.add_factories() = std::move(factory);
   }
   return reply;
 }
@@ -121,7 +120,7 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
     require_right(asker, Right::submit);
     throw Error(fmt::format("campaign = {} (is not served)", name));
   }
-  require_control(asker, name, campaign->status.owner);
+  require_control(asker, name, campaign->status.owner());
   require_possible(campaign->status, action);
   if (action == wire::ControlAction::archive) {
     if (under_way_.contains(name)) refuse_as_under_way(name);
@@ -138,29 +137,29 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
 }
 
 proto::ReplyEnvelope RequestService::status(const proto::StatusRequest& request) const {
-  wire::StatusReply status = service_status();
+  proto::ReplyEnvelope reply;
+  proto::StatusReply& status = *reply.mutable_status();
+  status = service_status();
   for (CampaignRecord& campaign :
        campaigns_.records(request.first_campaign(), wire::campaigns_per_reply_max)) {
-    status.campaigns.push_back(std::move(campaign.status));
+    *status.add_campaigns() = std::move(campaign.status);
   }
-  paths_.hide_in(status);
-  proto::ReplyEnvelope reply;
-  wire::write(status, *reply.mutable_status());
   return reply;
 }
 
 proto::ReplyEnvelope RequestService::workers(const proto::WorkersRequest& request) const {
   const State& state = context_.state;
   const TimePoint now = context_.now();
-  wire::WorkersReply workers{.workers = {}, .num_workers = state.workers.size()};
+  proto::ReplyEnvelope reply;
+  proto::WorkersReply& workers = *reply.mutable_workers();
+  workers.set_num_workers(state.workers.size());
   for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id()});
-       item != state.workers.end() && workers.workers.size() < wire::workers_per_reply_max;
+       item != state.workers.end() &&
+       static_cast<std::size_t>(workers.workers_size()) < wire::workers_per_reply_max;
        ++item) {
     const auto& [id, worker] = *item;
-    workers.workers.push_back(record_of(state, id, worker, now).status);
+    *workers.add_workers() = record_of(state, id, worker, now).status;
   }
-  proto::ReplyEnvelope reply;
-  wire::write(workers, *reply.mutable_workers());
   return reply;
 }
 
@@ -179,9 +178,9 @@ void RequestService::ask(const proto::AnswerRequest& request, const Asker& asker
   answers_.ask(request, campaign->file, asker, respond);
 }
 
-proto::ReplyEnvelope RequestService::take(const wire::FactoryReport& report, const Asker& asker) {
+proto::ReplyEnvelope RequestService::take(const proto::FactoryReport& report, const Asker& asker) {
   factories_.take(report, asker.name, context_.now());
-  return wire::done_reply(fmt::format("factory {}: noted", report.name));
+  return wire::done_reply(fmt::format("factory {}: noted", report.name()));
 }
 
 void RequestService::carry_out(Request request, const Asker& asker, Respond respond) {
@@ -211,7 +210,7 @@ void RequestService::carry_out(Request request, const Asker& asker, Respond resp
       return respond(answers_.part(message.answer_part(), asker));
     case proto::RequestEnvelope::kFactoryReport:
       may_observe();
-      return respond(take(wire::read(message.factory_report()), asker));
+      return respond(take(message.factory_report(), asker));
     case proto::RequestEnvelope::REQUEST_NOT_SET:
       break;
   }
@@ -231,7 +230,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
   }
   const std::optional<CampaignRecord> entry = campaigns_.find(name);
   if (entry) {
-    require_control(asker, name, entry->status.owner);
+    require_control(asker, name, entry->status.owner());
   } else {
     require_right(asker, Right::submit);
   }
@@ -240,7 +239,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
     return;
   }
-  UnderWay under_way{.owner = entry ? entry->status.owner : asker.name,
+  UnderWay under_way{.owner = entry ? entry->status.owner() : asker.name,
                      .added = added_by(*request, entry)};
   check_limits(name, under_way.owner, under_way.added);
   if (entry && !entry->is_closed) {
@@ -282,7 +281,7 @@ RequestService::Holdings RequestService::added_by(
   const std::uint64_t num_runs_now = campaigns_.num_runs_of(id);
   const bool has_more = horizon_of(plan, request.campaign->num_runs, num_runs_now) > num_runs_now;
   const bool has_new_rule = !plan.stop_rule.empty() && plan != campaigns_.plan_of(id);
-  const bool is_cancelled = entry->status.phase == Phase::cancelled;
+  const bool is_cancelled = entry->status.phase() == proto::CAMPAIGN_PHASE_CANCELLED;
   return has_more || has_new_rule || is_cancelled ? wanted : Holdings{};
 }
 
@@ -291,7 +290,7 @@ void RequestService::check_limits(const std::string& campaign, const CampaignRec
   const bool begins = action == wire::ControlAction::resume || action == wire::ControlAction::retry;
   if (!begins || campaigns_.holdings_of(entry.id).num_campaigns > 0) return;
   const Campaign& definition = *context_.state.campaigns.at(entry.id).definition;
-  check_limits(campaign, entry.status.owner,
+  check_limits(campaign, entry.status.owner(),
                {.num_campaigns = 1, .size = definition_size(definition)});
 }
 
@@ -345,15 +344,15 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
 
 void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction action,
                             Respond respond) {
-  const wire::CampaignStatus& status = campaign.status;
-  if (under_way_.contains(status.name)) refuse_as_under_way(status.name);
-  if (campaign.status.owner.empty()) {
-    return reopen_measured(status.name, campaign, action, 0, std::move(respond));
+  const proto::CampaignStatus& status = campaign.status;
+  if (under_way_.contains(status.name())) refuse_as_under_way(status.name());
+  if (campaign.status.owner().empty()) {
+    return reopen_measured(status.name(), campaign, action, 0, std::move(respond));
   }
-  check_limits(status.name, campaign.status.owner, {.num_campaigns = 1, .size = 0});
+  check_limits(status.name(), campaign.status.owner(), {.num_campaigns = 1, .size = 0});
   // What its definition takes is known when the file is read, which must not change if that is too
   // much: so it is opened twice.
-  const auto work = [this, &directory = *context_.config.directory, name = status.name, campaign,
+  const auto work = [this, &directory = *context_.config.directory, name = status.name(), campaign,
                      action, respond]() -> Background::Finish {
     std::uint64_t size = 0;
     const std::string failure =
@@ -369,14 +368,14 @@ void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction 
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();
-  under_way_.emplace(status.name,
-                     UnderWay{.owner = campaign.status.owner, .added = {.num_campaigns = 1}});
+  under_way_.emplace(status.name(),
+                     UnderWay{.owner = campaign.status.owner(), .added = {.num_campaigns = 1}});
 }
 
 void RequestService::reopen_measured(const std::string& name, const CampaignRecord& campaign,
                                      wire::ControlAction action, std::uint64_t size,
                                      Respond respond) {
-  UnderWay under_way{.owner = campaign.status.owner, .added = {.num_campaigns = 1, .size = size}};
+  UnderWay under_way{.owner = campaign.status.owner(), .added = {.num_campaigns = 1, .size = size}};
   check_limits(name, under_way.owner, under_way.added);
   const CampaignDirectory& directory = *context_.config.directory;
   serve_opened(

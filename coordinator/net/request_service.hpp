@@ -15,7 +15,6 @@
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/factory_reports.hpp"
-#include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_context.hpp"
 
 namespace proofmass::coordinator {
@@ -34,7 +33,7 @@ class RequestService {
   void carry_out(Request request, const Asker& asker, Respond respond);
 
   /// What a client is told of the coordinator, without any campaign.
-  [[nodiscard]] wire::StatusReply service_status() const;
+  [[nodiscard]] proto::StatusReply service_status() const;
 
   /// Carries out submissions that had to wait, and responds to questions whose answers are there.
   /// To be called several times a second.
@@ -63,7 +62,7 @@ class RequestService {
   [[nodiscard]] proto::ReplyEnvelope workers(const proto::WorkersRequest& request) const;
   [[nodiscard]] proto::ReplyEnvelope release_host(const std::string& host);
   void ask(const proto::AnswerRequest& request, const Asker& asker, const Respond& respond);
-  [[nodiscard]] proto::ReplyEnvelope take(const wire::FactoryReport& report, const Asker& asker);
+  [[nodiscard]] proto::ReplyEnvelope take(const proto::FactoryReport& report, const Asker& asker);
 
   void submit(const Submitted& request, const Asker& asker, Respond respond);
   [[nodiscard]] bool is_busy(const std::string& name) const;
@@ -100,7 +99,6 @@ class RequestService {
   CampaignService& campaigns_;
   FactoryReports factories_;
   TimePoint began_at_;
-  ServerPaths paths_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
   Answers answers_;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <system_error>
 
-#include "proto/wire/client_codec.hpp"
-
 namespace proofmass::coordinator {
 namespace {
 
@@ -42,18 +40,21 @@ std::string ServerPaths::hidden_in(std::string_view text) const {
   return result;
 }
 
-void ServerPaths::hide_in(wire::StatusReply& reply) const {
-  for (wire::CampaignStatus& campaign : reply.campaigns) {
-    campaign.storage_failure = hidden_in(campaign.storage_failure);
-  }
-  for (wire::UnservedFile& unserved : reply.unserved_files) {
-    unserved.file = hidden_in(unserved.file);
-    unserved.reason = hidden_in(unserved.reason);
+void ServerPaths::hide_in(proto::CampaignStatus& campaign) const {
+  campaign.set_storage_failure(hidden_in(campaign.storage_failure()));
+}
+
+void ServerPaths::hide_in(proto::StatusReply& reply) const {
+  for (proto::CampaignStatus& campaign : *reply.mutable_campaigns()) hide_in(campaign);
+  for (proto::UnservedFile& unserved : *reply.mutable_unserved_files()) {
+    unserved.set_file(hidden_in(unserved.file()));
+    unserved.set_reason(hidden_in(unserved.reason()));
   }
 }
 
 void ServerPaths::hide_in(proto::ReplyEnvelope& reply) const {
   const auto hide = [&](std::string* text) { *text = hidden_in(*text); };
+  if (reply.has_status()) hide_in(*reply.mutable_status());
   if (reply.has_done()) hide(reply.mutable_done()->mutable_text());
   if (reply.has_error()) hide(reply.mutable_error()->mutable_text());
   if (reply.has_answer()) hide(reply.mutable_answer()->mutable_error_text());

@@ -5,11 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/wire/client_messages.hpp"
-
-namespace proofmass::proto {
-class ReplyEnvelope;
-}  // namespace proofmass::proto
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -24,10 +20,11 @@ class ServerPaths {
   /// The text with files of the directory named within it: `campaign database = a.db (is no file)`.
   /// Other paths stay: they are those that a client sent.
   [[nodiscard]] std::string hidden_in(std::string_view text) const;
-  /// Hides paths in all that the reply says of files and failures; in a status before it is
-  /// written, since that may change or cut a path.
+  /// Hides paths in all that the reply says of files and failures. To be called before it is
+  /// encoded, since that may change or cut a path.
   void hide_in(proto::ReplyEnvelope& reply) const;
-  void hide_in(wire::StatusReply& reply) const;
+  void hide_in(proto::StatusReply& reply) const;
+  void hide_in(proto::CampaignStatus& campaign) const;
 
  private:
   std::vector<std::string> prefixes_;  ///< Spellings of the directory, with a slash at the end.

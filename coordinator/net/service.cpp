@@ -89,9 +89,7 @@ class Service::Impl final : public Outbox {
                              .num_messages_unsent = worker_gateway_.num_unsent()};
     add_workers(state_, now(), depth, snapshot);
     paths_.hide_in(snapshot.status);
-    for (CampaignRecord& campaign : snapshot.campaigns) {
-      campaign.status.storage_failure = paths_.hidden_in(campaign.status.storage_failure);
-    }
+    for (CampaignRecord& campaign : snapshot.campaigns) paths_.hide_in(campaign.status);
     return snapshot;
   }
 
@@ -404,8 +402,8 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
   impl_->run(stop, on_turn);
 }
 
-std::vector<wire::CampaignStatus> Service::campaigns() const {
-  std::vector<wire::CampaignStatus> statuses;
+std::vector<proto::CampaignStatus> Service::campaigns() const {
+  std::vector<proto::CampaignStatus> statuses;
   for (CampaignRecord& campaign : impl_->campaign_service().records()) {
     statuses.push_back(std::move(campaign.status));
   }

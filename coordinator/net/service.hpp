@@ -17,7 +17,7 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/store_writer.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -37,17 +37,14 @@ enum class ServiceEnd : std::uint8_t {
   when_done,
 };
 
-/// What a coordinator's operator may want to be told about a campaign.
+/// What a coordinator's operator may want to be told about a campaign: it is finished, or failed.
 struct CampaignNotice {
-  enum class Kind : std::uint8_t {
-    finished,  ///< All runs are stored or given up, and the statistics are in the file.
-    failed,    ///< It was cancelled by its own limit, its storage failed, or two computations of a
-               ///< run differ.
-  };
-  Kind kind = Kind::finished;
   std::string campaign;        ///< Name.
   std::filesystem::path file;  ///< Its database.
-  std::string reason = {};     ///< Of a failure.
+  /// Why it failed: it was cancelled by its own limit, its storage failed, two computations of a
+  /// run differ, or most of its runs were given up. Empty if all runs are stored or given up and
+  /// the statistics are in the file.
+  std::string failure = {};
 };
 
 /// Settings of a service.
@@ -118,7 +115,7 @@ class Service {
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn);
 
   /// The campaigns, in the order in which they came.
-  [[nodiscard]] std::vector<wire::CampaignStatus> campaigns() const;
+  [[nodiscard]] std::vector<proto::CampaignStatus> campaigns() const;
   /// Everything about it now, for other threads. To be called in its own thread.
   [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) const;
   /// True if every campaign is finished or cancelled, and no file waits to be served.

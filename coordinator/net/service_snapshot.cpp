@@ -1,5 +1,7 @@
 #include "coordinator/net/service_snapshot.hpp"
 
+#include <utility>
+
 namespace proofmass::coordinator {
 
 std::string_view name_of(WorkerActivity activity) {
@@ -20,15 +22,17 @@ WorkerActivity activity_of(const State& state, const Worker& worker, TimePoint n
 
 RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker, TimePoint now) {
   const WorkerActivity activity = activity_of(state, worker, now);
-  return {.status = {.id = id,
-                     .name = worker.name,
-                     .host = worker.host_name,
-                     .process_id = worker.process_id,
-                     .num_slots = worker.num_slots,
-                     .num_lent = worker.num_lent,
-                     .num_results = worker.num_results,
-                     .silent_s = seconds(now - worker.heard_at),
-                     .is_quarantined = activity == WorkerActivity::quarantined},
+  proto::WorkerStatus status;
+  status.set_worker_id(id.value);
+  status.set_name(worker.name);
+  status.set_host(worker.host_name);
+  status.set_process_id(worker.process_id);
+  status.set_num_slots(worker.num_slots);
+  status.set_num_lent(worker.num_lent);
+  status.set_num_results(worker.num_results);
+  status.set_silent_s(seconds(now - worker.heard_at));
+  status.set_is_quarantined(activity == WorkerActivity::quarantined);
+  return {.status = std::move(status),
           .activity = activity,
           .registered_s = seconds(now - worker.registered_at)};
 }

@@ -3,13 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
-#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "coordinator/store/campaign_record.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -28,35 +27,16 @@ inline constexpr std::array worker_activities{WorkerActivity::computing, WorkerA
 
 /// A registered worker.
 struct RegisteredWorker {
-  wire::WorkerStatus status = {};
+  proto::WorkerStatus status = {};
   WorkerActivity activity = WorkerActivity::idle;
   double registered_s = 0.0;  ///< Since it registered with this coordinator.
-};
-
-/// Tells whether a file is still the one that it was, with the same content.
-struct FileStamp {
-  std::uint64_t inode = 0;
-  std::int64_t size = 0;
-  std::int64_t written_ns = 0;
-
-  bool operator==(const FileStamp&) const = default;
-};
-
-/// A campaign of a coordinator as it stands: served, or ended and its file closed.
-struct CampaignRecord {
-  wire::CampaignId id = {};         ///< Another campaign of the same name has another one.
-  std::filesystem::path file = {};  ///< Its database.
-  wire::CampaignStatus status = {};
-  std::uint64_t num_waiting = 0;        ///< Results that were delivered and are not stored yet.
-  bool is_closed = false;               ///< It has ended, and its file is closed and complete.
-  std::optional<FileStamp> stamp = {};  ///< Of a closed file that was looked at since.
 };
 
 /// Everything about a service at one instant. It refers to nothing of the service, so that another
 /// thread may keep it.
 struct ServiceSnapshot {
-  TimePoint taken_at = {};        ///< By the clock of whoever keeps it; set by SnapshotBoard.
-  wire::StatusReply status = {};  ///< Without the campaigns, which are below.
+  TimePoint taken_at = {};         ///< By the clock of whoever keeps it; set by SnapshotBoard.
+  proto::StatusReply status = {};  ///< Without the campaigns, which are below.
   std::vector<CampaignRecord> campaigns = {};  ///< All, in the order in which they came.
   std::vector<RegisteredWorker> workers = {};  ///< All, by number; none if they were not asked for.
   /// Of each of worker_activities, whether or not `workers` lists them.

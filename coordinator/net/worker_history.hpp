@@ -24,12 +24,12 @@ class WorkerHistory {
   void note_lent(CampaignId campaign, WorkerId worker);
   /// A campaign's file is closed, and knows that all of its workers have ended.
   void note_closed(CampaignId campaign);
-  /// Why the worker is about to be removed, or was; `silent` if nobody says so.
+  /// Why the worker is about to be removed, or was. Without a call the reason is `silent`.
   void note_reason(WorkerId worker, LossReason reason);
 
   /// Writes down who is gone. To be called some times a second.
   void review();
-  /// Writes down that all others leave as well.
+  /// Writes down that all workers leave that have not left yet.
   void end_all(LossReason reason);
 
  private:

@@ -77,7 +77,7 @@ std::vector<RunRange> missing_from(const RunSet& runs, std::uint64_t first, std:
 /// coordinator knows of fewer than were read.
 bool goes_on(const ResultsReading* reading, const Store& store, const CampaignRecord& campaign) {
   if (reading == nullptr || !reading->is_of(store)) return false;
-  return reading->num_read() <= campaign.status.num_done ||
+  return reading->num_read() <= campaign.status.num_done() ||
          reading->num_read() <= num_runs_in(store.finished_runs());
 }
 
@@ -128,7 +128,7 @@ bool is_same(const CampaignRecord& a, const CampaignRecord& b) {
 /// Whether there is something to be read. There may be more results than are known to be finished,
 /// because a reading is newer than the number, or because the file is an older copy now.
 bool has_other_results(const CampaignResults* read, const CampaignRecord& campaign) {
-  return read == nullptr || !read->failure.empty() || read->num_runs != campaign.status.num_done;
+  return read == nullptr || !read->failure.empty() || read->num_runs != campaign.status.num_done();
 }
 
 /// What a reading that failed has is as old as before.
@@ -199,7 +199,7 @@ DetailReader::~DetailReader() {
 }
 
 CampaignDetails DetailReader::details(const CampaignRecord& campaign, TimePoint now) {
-  const std::string& name = campaign.status.name;
+  const std::string& name = campaign.status.name();
   const std::lock_guard lock(mutex_);
   if (!watched_.contains(name) && !make_room(now)) return without_room(now);
   Watched& watched = watched_[name];

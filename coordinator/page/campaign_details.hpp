@@ -65,14 +65,16 @@ struct CampaignEvents {
   std::vector<EndCount> ends = {};           ///< Without an estimate.
   std::vector<GivenUpRecord> given_up = {};  ///< At most page_given_up_max.
   RecentAttempts attempts = {};
-  std::string failure = {};  ///< Why the last reading failed; the rest is of the one before.
+  /// Why the last reading failed; the other members are those of the reading before it.
+  std::string failure = {};
 };
 
 /// What those results of a campaign yield that were read so far.
 struct CampaignResults {
   std::string html = {};       ///< Of LiveResults; empty before the first reading.
   std::uint64_t num_runs = 0;  ///< Finished runs that were read.
-  std::string failure = {};    ///< Why the last reading failed; the rest is of the one before.
+  /// Why the last reading failed; the other members are those of the reading before it.
+  std::string failure = {};
   std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.
 };
 

@@ -23,15 +23,16 @@ std::string fact(std::string_view name, std::string_view value) {
 }
 
 std::string facts_of(const CampaignRecord& campaign) {
-  const wire::CampaignStatus& status = campaign.status;
+  const proto::CampaignStatus& status = campaign.status;
   std::string html =
-      "<dl>" + fact("phase", wire::phase_name(status)) + fact("done", grouped(status.num_done)) +
-      fact("of runs", grouped(status.num_runs)) +
-      fact("runs/s", status.rate_hz > 0.0 ? measured_figure(status.rate_hz) : "–") +
-      fact("time left", status.remaining_s ? duration_text(*status.remaining_s) : "–") +
-      fact("lent", grouped(status.num_lent)) + fact("to be stored", grouped(campaign.num_waiting)) +
-      fact("priority", std::to_string(status.priority));
-  if (!status.owner.empty()) html += fact("owner", markup_text(status.owner));
+      "<dl>" + fact("phase", wire::phase_name(status)) + fact("done", grouped(status.num_done())) +
+      fact("of runs", grouped(status.num_runs())) +
+      fact("runs/s", status.rate_hz() > 0.0 ? measured_figure(status.rate_hz()) : "–") +
+      fact("time left", status.has_remaining_s() ? duration_text(status.remaining_s()) : "–") +
+      fact("lent", grouped(status.num_lent())) +
+      fact("to be stored", grouped(campaign.num_waiting)) +
+      fact("priority", std::to_string(status.priority()));
+  if (!status.owner().empty()) html += fact("owner", markup_text(status.owner()));
   return html + "</dl>\n";
 }
 
@@ -140,8 +141,8 @@ std::string history_of(const CampaignDetails& details, const CampaignRecord& cam
   if (!events.failure.empty()) {
     html += notes_list({{"the database cannot be read now: " + events.failure}});
   }
-  const std::string& name = campaign.status.name;
-  return html + failures_of(events, campaign.status.num_given_up) + attempts_of(events) +
+  const std::string& name = campaign.status.name();
+  return html + failures_of(events, campaign.status.num_given_up()) + attempts_of(events) +
          events_of(events, name, request.number("events").value_or(1));
 }
 
@@ -149,13 +150,13 @@ std::string history_of(const CampaignDetails& details, const CampaignRecord& cam
 
 PageContent campaign_page(const CampaignRecord& campaign, const CampaignDetails& details,
                           const PageRequest& request, TimePoint now) {
-  const wire::CampaignStatus& status = campaign.status;
-  return {.title = "Campaign " + status.name,
+  const proto::CampaignStatus& status = campaign.status;
+  return {.title = "Campaign " + status.name(),
           .to_root = "../",
           .live = fmt::format("<p class=\"large\">{}</p>\n",
-                              progress_bar(status.num_done, status.num_runs, "progress")) +
+                              progress_bar(status.num_done(), status.num_runs(), "progress")) +
                   facts_of(campaign) + notes_list(notes_about(status)) +
-                  results_of(details, status.num_done, now) +
+                  results_of(details, status.num_done(), now) +
                   history_of(details, campaign, request)};
 }
 

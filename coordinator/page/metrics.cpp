@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -44,8 +45,8 @@ class MetricWriter {
   std::string text_;
 };
 
-std::string campaign_label(const wire::CampaignStatus& campaign) {
-  return fmt::format("{{campaign=\"{}\"}}", label_value(campaign.name));
+std::string campaign_label(const proto::CampaignStatus& campaign) {
+  return fmt::format("{{campaign=\"{}\"}}", label_value(campaign.name()));
 }
 
 /// Those with metrics of their own: campaigns that may still change first, then the newest ones.
@@ -54,7 +55,7 @@ std::vector<const CampaignRecord*> measured_campaigns(const ServiceSnapshot& ser
   const auto add_those = [&](bool is_over) {
     for (auto item = service.campaigns.rbegin(); item != service.campaigns.rend(); ++item) {
       if (campaigns.size() == campaigns_with_metrics_max) return;
-      if (has_ended(item->status.phase) == is_over) campaigns.push_back(&*item);
+      if (has_ended(wire::phase_of(item->status)) == is_over) campaigns.push_back(&*item);
     }
   };
   add_those(false);
@@ -72,16 +73,17 @@ void write_campaigns(const ServiceSnapshot& service, MetricWriter& writer) {
       writer.add(campaign_label(campaign->status), value(*campaign));
     }
   };
-  for (const wire::CampaignCounter& counter : wire::campaign_counters) {
-    write(counter.metric, counter.help,
-          [&](const CampaignRecord& of) { return static_cast<double>(of.status.*counter.count); });
+  for (const CampaignCounter& counter : campaign_counters) {
+    write(counter.metric, counter.help, [&](const CampaignRecord& of) {
+      return static_cast<double>((of.status.*counter.count)());
+    });
   }
   write("proofmass_results_waiting", "Results that are to be stored.",
         [](const auto& of) { return static_cast<double>(of.num_waiting); });
   write("proofmass_storage_failed", "1 while nothing can be stored.",
-        [](const auto& of) { return of.status.storage_failure.empty() ? 0.0 : 1.0; });
+        [](const auto& of) { return of.status.storage_failure().empty() ? 0.0 : 1.0; });
   write("proofmass_campaign_priority", "Runs of a higher priority are lent first.",
-        [](const auto& of) { return static_cast<double>(of.status.priority); });
+        [](const auto& of) { return static_cast<double>(of.status.priority()); });
   writer.write("proofmass_campaigns_left_out", "Campaigns without metrics of their own.",
                service.campaigns.size() - campaigns.size());
   writer.begin("proofmass_campaigns", "Campaigns by phase.");
@@ -89,16 +91,16 @@ void write_campaigns(const ServiceSnapshot& service, MetricWriter& writer) {
   for (const CampaignPhase phase : {CampaignPhase::active, CampaignPhase::paused,
                                     CampaignPhase::finished, CampaignPhase::cancelled}) {
     const auto count = std::ranges::count_if(
-        service.campaigns, [&](const auto& one) { return one.status.phase == phase; });
+        service.campaigns, [&](const auto& one) { return wire::phase_of(one.status) == phase; });
     writer.add(fmt::format("{{phase=\"{}\"}}", wire::name_of(phase)), count);
   }
 }
 
 void write_service(const ServiceSnapshot& service, MetricWriter& writer) {
-  const wire::StatusReply& status = service.status;
+  const proto::StatusReply& status = service.status;
   writer.begin("proofmass_info", "1, with the versions as labels.");
-  writer.add(fmt::format("{{version=\"{}\",model=\"{}\"}}", label_value(status.version),
-                         label_value(status.model_version)),
+  writer.add(fmt::format("{{version=\"{}\",model=\"{}\"}}", label_value(status.version()),
+                         label_value(status.model_version())),
              1);
   writer.begin("proofmass_workers", "Registered workers by state.");
   for (std::size_t i = 0; i < worker_activities.size(); ++i) {
@@ -106,13 +108,13 @@ void write_service(const ServiceSnapshot& service, MetricWriter& writer) {
                service.num_workers_by_activity[i]);
   }
   writer.write("proofmass_worker_slots", "Runs that all workers compute at a time.",
-               status.num_slots);
+               status.num_slots());
   writer.write("proofmass_leases", "Leases of runs to workers.", service.num_leases);
   writer.write("proofmass_quarantined_hosts", "Hosts that are lent nothing.",
-               status.num_quarantined_hosts);
+               status.num_quarantined_hosts());
   writer.write("proofmass_unserved_files", "Files of the directory that cannot be served.",
-               status.num_unserved_files);
-  writer.write("proofmass_factories", "Factories that report.", status.factories.size());
+               status.num_unserved_files());
+  writer.write("proofmass_factories", "Factories that report.", status.factories_size());
   writer.write("proofmass_sockets_reset_total",
                "How often a lack of memory or descriptors closed the sockets.",
                service.num_sockets_reset);
@@ -145,7 +147,7 @@ std::vector<double> stat_fields() {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const std::size_t end = text.rfind(") ");
   if (end == std::string::npos) return {};
-  std::istringstream words(text.substr(end + 4));  // Behind the state as well.
+  std::istringstream words(text.substr(end + 4));  // Behind the name and the state.
   return {std::istream_iterator<double>(words), {}};
 }
 
@@ -219,7 +221,7 @@ std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
   const double age_s = seconds(now - snapshot.taken_at);
   write_service(snapshot, writer);
   writer.write("proofmass_uptime_seconds", "Since the coordinator started.",
-               snapshot.status.uptime_s + age_s);
+               snapshot.status.uptime_s() + age_s);
   write_campaigns(snapshot, writer);
   write_page(page, age_s, writer);
   write_process(process, writer);

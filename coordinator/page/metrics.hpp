@@ -12,8 +12,8 @@ namespace proofmass::coordinator {
 /// What the kernel says of this process.
 struct ProcessFigures {
   double cpu_s = 0.0;
-  std::uint64_t resident_size = 0;  ///< Bytes; so is the next.
-  std::uint64_t virtual_size = 0;
+  std::uint64_t resident_size = 0;  ///< Bytes.
+  std::uint64_t virtual_size = 0;   ///< Bytes.
   std::uint64_t num_descriptors = 0;
   std::uint64_t num_descriptors_max = 0;
   double start_unix_s = 0.0;

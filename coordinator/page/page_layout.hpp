@@ -14,8 +14,8 @@ namespace proofmass::coordinator {
 struct PageContent {
   std::string title = {};    ///< Plain text; becomes the heading, too.
   std::string to_root = "";  ///< From the page's address to the first page: ``, or `../`.
-  std::string form = "";     ///< Above `live`; is not exchanged. Markup, as the next.
-  std::string live = {};     ///< What the script exchanges every two seconds.
+  std::string form = "";     ///< Markup above `live`, which the script does not exchange.
+  std::string live = {};     ///< Markup that the script exchanges every two seconds.
 };
 
 /// A whole page.

@@ -99,10 +99,10 @@ HttpAnswer PageSite::about_campaign(const PageRequest& request,
   const auto& campaigns = snapshot.campaigns;
   const auto found = std::ranges::find(
       campaigns, name,
-      [](const CampaignRecord& one) -> const std::string& { return one.status.name; });
+      [](const CampaignRecord& one) -> const std::string& { return one.status.name(); });
   if (found == campaigns.end()) return not_found();
   const TimePoint now = sources_.now();
-  // The page shows what has been read, and the rest two seconds later.
+  // The page shows what has been read by now. Two seconds later its script asks again.
   return html_answer(request, campaign_page(*found, sources_.details(*found, now), request, now));
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <tuple>
+#include <cstdint>
+#include <string_view>
+#include <utility>
 
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/document_table.hpp"
@@ -15,46 +17,47 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::CampaignStatus;
+using proto::CampaignStatus;
 using wire::markup_text;
 
 Cell campaign_link(const CampaignStatus& campaign) {
-  Cell cell(campaign.name);
-  cell.markup = fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name),
-                            markup_text(campaign.name));
+  Cell cell(campaign.name());
+  cell.markup = fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name()),
+                            markup_text(campaign.name()));
   return cell;
 }
 
 Cell progress_cell(const CampaignStatus& campaign) {
   Cell cell("");
-  cell.markup = progress_bar(campaign.num_done, campaign.num_runs, "progress of " + campaign.name);
+  cell.markup =
+      progress_bar(campaign.num_done(), campaign.num_runs(), "progress of " + campaign.name());
   return cell;
 }
 
 std::string rate_cell(const CampaignStatus& campaign) {
-  return campaign.rate_hz > 0.0 ? measured_figure(campaign.rate_hz) : "–";
+  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
 }
 
 std::string time_left_cell(const CampaignStatus& campaign) {
-  return campaign.remaining_s ? duration_text(*campaign.remaining_s) : "–";
+  return campaign.has_remaining_s() ? duration_text(campaign.remaining_s()) : "–";
 }
 
 std::string title_of(const ServiceSnapshot& snapshot) {
-  const wire::StatusReply& status = snapshot.status;
-  return fmt::format("<p>Proofmass {}, model {}, up {}</p>\n", markup_text(status.version),
-                     markup_text(status.model_version), duration_text(status.uptime_s));
+  const proto::StatusReply& status = snapshot.status;
+  return fmt::format("<p>Proofmass {}, model {}, up {}</p>\n", markup_text(status.version()),
+                     markup_text(status.model_version()), duration_text(status.uptime_s()));
 }
 
 /// The line that screen readers announce when it changes: it must not change often.
 std::string summary_line(const ServiceSnapshot& snapshot) {
   std::uint64_t num_active = 0;
   for (const CampaignRecord& campaign : snapshot.campaigns) {
-    if (campaign.status.phase == wire::CampaignPhase::active) ++num_active;
+    if (campaign.status.phase() == proto::CAMPAIGN_PHASE_ACTIVE) ++num_active;
   }
-  const wire::StatusReply& status = snapshot.status;
+  const proto::StatusReply& status = snapshot.status;
   return fmt::format("<p aria-live=\"polite\">{} to compute, {} with {}</p>\n",
-                     counted(num_active, "campaign"), counted(status.num_workers, "worker"),
-                     counted(status.num_slots, "slot"));
+                     counted(num_active, "campaign"), counted(status.num_workers(), "worker"),
+                     counted(status.num_slots(), "slot"));
 }
 
 std::string age_line(TimePoint taken_at, TimePoint now) {
@@ -74,7 +77,7 @@ std::vector<Remark> overview_notes(const ServiceSnapshot& service, const PageOfL
   for (std::size_t i = list.first; i < list.end; ++i) {
     const CampaignStatus& campaign = service.campaigns[i].status;
     for (const Remark& note : notes_about(campaign)) {
-      notes.push_back({campaign.name + ": " + note.text, note.tone});
+      notes.push_back({campaign.name() + ": " + note.text, note.tone});
     }
   }
   return notes;
@@ -90,7 +93,8 @@ int place_of(WorkerActivity activity) {
 
 bool comes_before(const RegisteredWorker& a, const RegisteredWorker& b, WorkerOrder order) {
   const auto key = [](const RegisteredWorker& worker) {
-    return std::tie(worker.status.name, worker.status.id.value);
+    return std::pair<std::string_view, std::uint64_t>(worker.status.name(),
+                                                      worker.status.worker_id());
   };
   if (order == WorkerOrder::state && a.activity != b.activity) {
     return place_of(a.activity) < place_of(b.activity);
@@ -127,16 +131,16 @@ std::vector<Column> worker_columns_of(const WorkerChoice& choice) {
 }
 
 Row worker_row(const RegisteredWorker& worker) {
-  const wire::WorkerStatus& status = worker.status;
-  return {status.name,
-          status.host,
+  const proto::WorkerStatus& status = worker.status;
+  return {status.name(),
+          status.host(),
           name_of(worker.activity),
-          grouped(status.num_slots),
-          grouped(status.num_lent),
-          grouped(status.num_results),
+          grouped(status.num_slots()),
+          grouped(status.num_lent()),
+          grouped(status.num_results()),
           measured_figure(results_per_h(worker)),
-          fmt::format("{} ago", duration_text(status.silent_s)),
-          std::to_string(status.process_id)};
+          fmt::format("{} ago", duration_text(status.silent_s())),
+          std::to_string(status.process_id())};
 }
 
 std::string worker_counts(const ServiceSnapshot& service) {
@@ -175,7 +179,7 @@ WorkerChoice worker_choice(const PageRequest& request) {
 
 double results_per_h(const RegisteredWorker& worker) {
   if (worker.registered_s <= 0.0) return 0.0;
-  return 3600.0 * static_cast<double>(worker.status.num_results) / worker.registered_s;
+  return 3600.0 * static_cast<double>(worker.status.num_results()) / worker.registered_s;
 }
 
 ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
@@ -184,8 +188,8 @@ ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
   chosen.reserve(workers.size());
   for (const RegisteredWorker& worker : workers) {
     const bool is_wanted = choice.filter.empty() ||
-                           worker.status.name.find(choice.filter) != std::string::npos ||
-                           worker.status.host.find(choice.filter) != std::string::npos;
+                           worker.status.name().find(choice.filter) != std::string::npos ||
+                           worker.status.host().find(choice.filter) != std::string::npos;
     if (is_wanted) chosen.push_back(&worker);
   }
   const PageOfList list = page_of_list(choice.page, chosen.size(), rows_per_page);
@@ -217,9 +221,9 @@ PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& re
   for (std::size_t i = list.first; i < list.end; ++i) {
     const CampaignStatus& campaign = campaigns[i].status;
     table.rows.push_back({campaign_link(campaign), wire::phase_name(campaign),
-                          progress_cell(campaign), grouped(campaign.num_done),
-                          grouped(campaign.num_runs), rate_cell(campaign), time_left_cell(campaign),
-                          std::to_string(campaign.priority)});
+                          progress_cell(campaign), grouped(campaign.num_done()),
+                          grouped(campaign.num_runs()), rate_cell(campaign),
+                          time_left_cell(campaign), std::to_string(campaign.priority())});
   }
   return {.title = "Campaigns",
           .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +

@@ -45,7 +45,7 @@ struct Review {
   std::string why_not_independent;
   std::optional<Causes> causes;       ///< Empty if runs are too few, or not asked for.
   std::optional<RunSpectra> spectra;  ///< Of worst_run_of(); empty if not asked for.
-  Execution execution;
+  CampaignExecution execution;
   std::string stop;  ///< See stop_text().
 };
 

@@ -110,7 +110,7 @@ Table identity_table(const Review& review) {
 }
 
 Table execution_table(const Review& review) {
-  const Execution& execution = review.execution;
+  const CampaignExecution& execution = review.execution;
   Table table = facts(
       "execution", "How it was computed",
       {{"time of processor cores", hours(execution.compute_s)},

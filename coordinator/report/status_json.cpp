@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "coordinator/report/status_notes.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
@@ -9,69 +10,71 @@ namespace {
 
 using StatusJson = nlohmann::ordered_json;
 
-StatusJson factory_object(const wire::FactoryStatus& factory) {
-  const wire::FactoryReport& report = factory.report;
-  StatusJson json{{"name", report.name},
-                  {"batch_system", report.batch_system},
-                  {"phase", wire::name_of(report.phase)},
-                  {"num_wanted", report.num_wanted},
-                  {"num_registered", report.num_registered},
-                  {"num_queued", report.num_queued},
+StatusJson factory_object(const proto::FactoryStatus& factory) {
+  const proto::FactoryReport& report = factory.report();
+  StatusJson json{{"name", report.name()},
+                  {"batch_system", report.batch_system()},
+                  {"phase", wire::name_of(report.phase())},
+                  {"num_wanted", report.num_wanted()},
+                  {"num_registered", report.num_registered()},
+                  {"num_queued", report.num_queued()},
                   {"wait_s", nullptr},
                   {"reason", nullptr},
-                  {"interval_s", report.interval_s},
-                  {"silent_s", factory.silent_s},
+                  {"interval_s", report.interval_s()},
+                  {"silent_s", factory.silent_s()},
                   {"owner", nullptr}};
-  if (report.phase == wire::FactoryPhase::waiting) json["wait_s"] = report.wait_s;
-  if (!report.reason.empty()) json["reason"] = report.reason;
-  if (!factory.owner.empty()) json["owner"] = factory.owner;
+  if (report.phase() == proto::FACTORY_PHASE_WAITING) json["wait_s"] = report.wait_s();
+  if (!report.reason().empty()) json["reason"] = report.reason();
+  if (!factory.owner().empty()) json["owner"] = factory.owner();
   return json;
 }
 
-StatusJson campaign_object(const wire::CampaignStatus& campaign) {
-  StatusJson json{{"name", campaign.name},
+StatusJson campaign_object(const proto::CampaignStatus& campaign) {
+  StatusJson json{{"name", campaign.name()},
                   {"phase", wire::phase_name(campaign)},
-                  {"priority", campaign.priority}};
-  for (const wire::CampaignCounter& counter : wire::campaign_counters) {
-    json[std::string(counter.name)] = campaign.*counter.count;
+                  {"priority", campaign.priority()}};
+  for (const CampaignCounter& counter : campaign_counters) {
+    json[std::string(counter.name)] = (campaign.*counter.count)();
   }
-  json.update({{"rate_hz", campaign.rate_hz},
+  json.update({{"rate_hz", campaign.rate_hz()},
                {"remaining_s", nullptr},
                {"storage_failure", nullptr},
                {"owner", nullptr}});
-  if (campaign.remaining_s) json["remaining_s"] = *campaign.remaining_s;
-  if (!campaign.storage_failure.empty()) json["storage_failure"] = campaign.storage_failure;
-  if (!campaign.owner.empty()) json["owner"] = campaign.owner;
+  if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();
+  if (!campaign.storage_failure().empty()) json["storage_failure"] = campaign.storage_failure();
+  if (!campaign.owner().empty()) json["owner"] = campaign.owner();
   return json;
 }
 
-StatusJson worker_object(const wire::WorkerStatus& worker) {
-  return {{"worker_id", worker.id.value},
-          {"name", worker.name},
-          {"host", worker.host},
-          {"process_id", worker.process_id},
-          {"num_slots", worker.num_slots},
-          {"num_lent", worker.num_lent},
-          {"num_results", worker.num_results},
-          {"silent_s", worker.silent_s},
-          {"is_quarantined", worker.is_quarantined}};
+StatusJson worker_object(const proto::WorkerStatus& worker) {
+  return {{"worker_id", worker.worker_id()},
+          {"name", worker.name()},
+          {"host", worker.host()},
+          {"process_id", worker.process_id()},
+          {"num_slots", worker.num_slots()},
+          {"num_lent", worker.num_lent()},
+          {"num_results", worker.num_results()},
+          {"silent_s", worker.silent_s()},
+          {"is_quarantined", worker.is_quarantined()}};
 }
 
-StatusJson status_object(const wire::StatusReply& status) {
-  StatusJson json{{"version", status.version},     {"model_version", status.model_version},
-                  {"uptime_s", status.uptime_s},   {"num_workers", status.num_workers},
-                  {"num_slots", status.num_slots}, {"campaigns", StatusJson::array()}};
-  for (const auto& campaign : status.campaigns)
+StatusJson status_object(const proto::StatusReply& status) {
+  StatusJson json{{"version", status.version()},     {"model_version", status.model_version()},
+                  {"uptime_s", status.uptime_s()},   {"num_workers", status.num_workers()},
+                  {"num_slots", status.num_slots()}, {"campaigns", StatusJson::array()}};
+  for (const auto& campaign : status.campaigns())
     json["campaigns"].push_back(campaign_object(campaign));
   json["unserved_files"] = StatusJson::array();
-  for (const wire::UnservedFile& file : status.unserved_files) {
-    json["unserved_files"].push_back({{"file", file.file}, {"reason", file.reason}});
+  for (const proto::UnservedFile& file : status.unserved_files()) {
+    json["unserved_files"].push_back({{"file", file.file()}, {"reason", file.reason()}});
   }
-  json["num_unserved_files"] = status.num_unserved_files;
-  json["quarantined_hosts"] = status.quarantined_hosts;
-  json["num_quarantined_hosts"] = status.num_quarantined_hosts;
+  json["num_unserved_files"] = status.num_unserved_files();
+  json["quarantined_hosts"] = StatusJson::array();
+  for (const auto& host : status.quarantined_hosts()) json["quarantined_hosts"].push_back(host);
+  json["num_quarantined_hosts"] = status.num_quarantined_hosts();
   json["factories"] = StatusJson::array();
-  for (const auto& factory : status.factories) json["factories"].push_back(factory_object(factory));
+  for (const auto& factory : status.factories())
+    json["factories"].push_back(factory_object(factory));
   return json;
 }
 
@@ -82,13 +85,13 @@ std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout) {
   return json.dump(layout == JsonLayout::indented ? 2 : -1, ' ', false, replace) + "\n";
 }
 
-std::string status_json(const wire::StatusReply& status, JsonLayout layout) {
+std::string status_json(const proto::StatusReply& status, JsonLayout layout) {
   return dumped(status_object(status), layout);
 }
 
-std::string workers_json(const wire::WorkersReply& workers) {
+std::string workers_json(const proto::WorkersReply& workers) {
   StatusJson json{{"workers", StatusJson::array()}};
-  for (const auto& worker : workers.workers) json["workers"].push_back(worker_object(worker));
+  for (const auto& worker : workers.workers()) json["workers"].push_back(worker_object(worker));
   return dumped(json, JsonLayout::indented);
 }
 

@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -17,7 +17,7 @@ enum class JsonLayout : std::uint8_t { one_line, indented };
 /// The text of an object. Bytes of it that are not UTF-8 are replaced by U+FFFD.
 [[nodiscard]] std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout);
 
-[[nodiscard]] std::string status_json(const wire::StatusReply& status, JsonLayout layout);
-[[nodiscard]] std::string workers_json(const wire::WorkersReply& workers);
+[[nodiscard]] std::string status_json(const proto::StatusReply& status, JsonLayout layout);
+[[nodiscard]] std::string workers_json(const proto::WorkersReply& workers);
 
 }  // namespace proofmass::coordinator

@@ -14,39 +14,39 @@ std::string counted(std::uint64_t count, std::string_view thing) {
   return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
 }
 
-std::uint64_t percent_done(const wire::CampaignStatus& campaign) {
-  return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
+std::uint64_t percent_done(const proto::CampaignStatus& campaign) {
+  return campaign.num_done() * 100 / std::max<std::uint64_t>(1, campaign.num_runs());
 }
 
-std::string further_note(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
-  if (count <= num_shown) return {};
-  return fmt::format("and {}", counted(count - num_shown, thing));
+std::string further_note(std::uint64_t count, int num_shown, std::string_view thing) {
+  const auto shown = static_cast<std::uint64_t>(num_shown);
+  return count > shown ? fmt::format("and {}", counted(count - shown, thing)) : "";
 }
 
 namespace {
 
-Remark comparison_note(const wire::CampaignStatus& campaign) {
+Remark comparison_note(const proto::CampaignStatus& campaign) {
   const std::string compared =
-      counted(campaign.num_audited, "result") + " compared with a second computation: ";
-  if (campaign.num_mismatches == 0) return {compared + "all equal"};
-  return {compared + fmt::format("{} differ (none may)", campaign.num_mismatches), Tone::bad};
+      counted(campaign.num_audited(), "result") + " compared with a second computation: ";
+  if (campaign.num_mismatches() == 0) return {compared + "all equal"};
+  return {compared + fmt::format("{} differ (none may)", campaign.num_mismatches()), Tone::bad};
 }
 
 }  // namespace
 
-std::vector<Remark> notes_about(const wire::CampaignStatus& campaign) {
+std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
   std::vector<Remark> notes;
   const auto add_trouble = [&](std::string text) { notes.push_back({std::move(text), Tone::bad}); };
-  if (!campaign.storage_failure.empty()) {
-    add_trouble("nothing can be stored: " + wire::visible_text(campaign.storage_failure));
+  if (!campaign.storage_failure().empty()) {
+    add_trouble("nothing can be stored: " + wire::visible_text(campaign.storage_failure()));
   }
-  if (campaign.num_given_up > 0) {
-    add_trouble(counted(campaign.num_given_up, "run") + " given up: too many workers crashed");
+  if (campaign.num_given_up() > 0) {
+    add_trouble(counted(campaign.num_given_up(), "run") + " given up: too many workers crashed");
   }
-  if (campaign.num_without_estimate > 0) {
-    add_trouble(counted(campaign.num_without_estimate, "run") + " without an estimate");
+  if (campaign.num_without_estimate() > 0) {
+    add_trouble(counted(campaign.num_without_estimate(), "run") + " without an estimate");
   }
-  if (campaign.num_audited > 0 || campaign.num_mismatches > 0) {
+  if (campaign.num_audited() > 0 || campaign.num_mismatches() > 0) {
     notes.push_back(comparison_note(campaign));
   }
   return notes;
@@ -59,36 +59,37 @@ std::string quarantine_note(const std::string& host) {
       "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`", host);
 }
 
-std::string factory_note(const wire::FactoryStatus& factory) {
-  const wire::FactoryReport& report = factory.report;
-  std::string note =
-      fmt::format("factory {} ({}) {}: {} wanted, {} registered, {} in the queue", report.name,
-                  report.batch_system, wire::name_of(report.phase),
-                  counted(report.num_wanted, "worker"), report.num_registered, report.num_queued);
-  if (report.phase == wire::FactoryPhase::waiting) {
-    const double left_s = std::max(0.0, report.wait_s - factory.silent_s);
+std::string factory_note(const proto::FactoryStatus& factory) {
+  const proto::FactoryReport& report = factory.report();
+  std::string note = fmt::format(
+      "factory {} ({}) {}: {} wanted, {} registered, {} in the queue", report.name(),
+      report.batch_system(), wire::name_of(report.phase()), counted(report.num_wanted(), "worker"),
+      report.num_registered(), report.num_queued());
+  if (report.phase() == proto::FACTORY_PHASE_WAITING) {
+    const double left_s = std::max(0.0, report.wait_s() - factory.silent_s());
     note += fmt::format("; tries again in {}", duration_text(left_s));
   }
-  if (!report.reason.empty()) note += "; " + wire::visible_text(report.reason);
+  if (!report.reason().empty()) note += "; " + wire::visible_text(report.reason());
   return note;
 }
 
 }  // namespace
 
-std::vector<Remark> service_notes(const wire::StatusReply& status) {
+std::vector<Remark> service_notes(const proto::StatusReply& status) {
   std::vector<Remark> notes;
   const auto add = [&](std::string note, Tone tone) {
     if (!note.empty()) notes.push_back({std::move(note), tone});
   };
-  for (const wire::UnservedFile& file : status.unserved_files) {
-    add("not served, tried again: " + wire::visible_text(file.reason), Tone::bad);
+  for (const proto::UnservedFile& file : status.unserved_files()) {
+    add("not served, tried again: " + wire::visible_text(file.reason()), Tone::bad);
   }
-  add(further_note(status.num_unserved_files, status.unserved_files.size(), "more such file"),
+  add(further_note(status.num_unserved_files(), status.unserved_files_size(), "more such file"),
       Tone::plain);
-  for (const std::string& host : status.quarantined_hosts) add(quarantine_note(host), Tone::bad);
-  add(further_note(status.num_quarantined_hosts, status.quarantined_hosts.size(), "more such host"),
+  for (const std::string& host : status.quarantined_hosts()) add(quarantine_note(host), Tone::bad);
+  add(further_note(status.num_quarantined_hosts(), status.quarantined_hosts_size(),
+                   "more such host"),
       Tone::plain);
-  for (const wire::FactoryStatus& factory : status.factories) {
+  for (const proto::FactoryStatus& factory : status.factories()) {
     add(factory_note(factory), Tone::plain);
   }
   return notes;

@@ -200,9 +200,9 @@ RecentAttempts CampaignHistory::recent_attempts(std::size_t num_runs_max,
   return attempts;
 }
 
-Execution Store::execution() const {
+CampaignExecution Store::execution() const {
   const Database& database = impl_->database;
-  Execution execution;
+  CampaignExecution execution;
   execution.num_coordinators = database.count("SELECT count(*) FROM coordinator_start");
   execution.num_workers = database.count("SELECT count(*) FROM worker");
   execution.num_hosts = database.count("SELECT count(DISTINCT host) FROM worker");

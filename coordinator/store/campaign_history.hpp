@@ -98,8 +98,8 @@ class CampaignHistory {
   [[nodiscard]] std::vector<EndCount> ends_without_estimate() const;
   /// The first `count_max` runs that were given up.
   [[nodiscard]] std::vector<GivenUpRecord> given_up(std::size_t count_max) const;
-  /// @param num_runs_max    Delivered runs that are looked at; the newest.
-  /// @param num_losses_max  The same of losses.
+  /// @param num_runs_max    How many of the newest delivered runs are looked at.
+  /// @param num_losses_max  How many of the newest losses are looked at.
   [[nodiscard]] RecentAttempts recent_attempts(std::size_t num_runs_max,
                                                std::size_t num_losses_max) const;
 

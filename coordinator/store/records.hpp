@@ -129,7 +129,7 @@ struct LossCount {
 };
 
 /// How a campaign was computed, as far as its database keeps it.
-struct Execution {
+struct CampaignExecution {
   std::uint64_t num_coordinators = 0;  ///< Starts of one.
   std::uint64_t num_workers = 0;
   std::uint64_t num_hosts = 0;

@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <exception>
 #include <functional>
 #include <optional>
-#include <system_error>
 #include <utility>
 #include <variant>
 
@@ -110,15 +108,7 @@ wire::CampaignId Store::id() const {
 
 std::string Store::name() const { return impl_->database.text("SELECT name FROM campaign"); }
 
-std::uint64_t Store::seed() const {
-  const std::string digits = impl_->database.text("SELECT seed FROM campaign");
-  std::uint64_t seed = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
-  if (error != std::errc() || end != digits.data() + digits.size()) {
-    impl_->database.refuse_as_damaged(fmt::format("seed = {}", digits));
-  }
-  return seed;
-}
+std::uint64_t Store::seed() const { return detail::read_seed(impl_->database); }
 
 std::uint64_t Store::num_runs() const {
   return impl_->database.count("SELECT num_runs FROM campaign");

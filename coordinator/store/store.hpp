@@ -26,6 +26,8 @@ class Database;
 
 namespace proofmass::coordinator {
 
+struct CampaignRecord;
+
 /// Results of a campaign database, one after the other, of one state of the file. The Store that
 /// made it outlives it.
 class ResultReader {
@@ -102,6 +104,8 @@ class Store {
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
 
+  /// What a few rows tell: all but the file, the stamp and the numbers of runs with a result.
+  [[nodiscard]] CampaignRecord record() const;
   /// A random number since the file was made; not 0, and below 2⁶³.
   [[nodiscard]] wire::CampaignId id() const;
   [[nodiscard]] std::string name() const;
@@ -148,7 +152,7 @@ class Store {
   [[nodiscard]] std::uint64_t num_without_estimate() const;
 
   /// How the runs were computed. Takes 0.1 s for a million runs.
-  [[nodiscard]] Execution execution() const;
+  [[nodiscard]] CampaignExecution execution() const;
 
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;
@@ -216,9 +220,9 @@ class Store {
   [[nodiscard]] ResultReader results(RunRange runs) const;  ///< Of some of the runs.
 
   /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
-  /// @param budget   Of the campaign.
-  /// @param digests   Of the same results.
-  /// @param warnings  The same; rows of `run_warning`.
+  /// @param budget    Of the campaign.
+  /// @param digests   Of the results that the statistics were computed from.
+  /// @param warnings  Of these results; rows of `run_warning`.
   void write_statistics(const CampaignStatistics& statistics,
                         const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
                         std::span<const RunWarning> warnings = {});

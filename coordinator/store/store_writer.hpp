@@ -59,13 +59,13 @@ struct StoreRecovered {
 
 /// Something to be logged about a file, said once until it is over:
 ///
-///     write_ahead_log_grown   somebody has been reading one state of the file for long, and what
-///     was
-///                             written since cannot leave the log before they end; nothing is lost
-///                             but space on the disk. Over with write_ahead_log_shrunk
-///     write_ahead_log_kept    after a file has come to rest: for the same reason its log cannot be
-///                             folded in, and the file must be copied together with it for now;
-///                             tried again each `retry_after`. Over with write_ahead_log_folded
+///     write_ahead_log_grown   A program has been reading one state of the file for long. What was
+///                             written since stays in the log until it ends; nothing is lost but
+///                             space on the disk. Over with write_ahead_log_shrunk.
+///     write_ahead_log_kept    Nothing more is expected of the file, but its log cannot be folded
+///                             in while a program reads an old state. Until then the file must be
+///                             copied together with its log. Tried again after each `retry_after`.
+///                             Over with write_ahead_log_folded.
 struct FileEvent {
   wire::CampaignId campaign;
   wire::Event event;

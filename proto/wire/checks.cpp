@@ -65,12 +65,6 @@ bool has_fields_at_most(std::string_view bytes, const Descriptor& type, std::siz
   return count_down(stream, type, count_max);
 }
 
-const FieldDescriptor* field_of(const Descriptor* type, std::string_view name) {
-  const FieldDescriptor* const field = type->FindFieldByName(std::string(name));
-  PROOFMASS_EXPECT(field != nullptr);
-  return field;
-}
-
 void require(bool condition, std::string_view field, const std::string& value,
              std::string_view rule) {
   if (!condition) throw ConfigError(field, value, rule);

@@ -7,7 +7,6 @@
 
 namespace google::protobuf {
 class Descriptor;
-class FieldDescriptor;
 }  // namespace google::protobuf
 
 namespace proofmass::wire::detail {
@@ -21,10 +20,6 @@ namespace proofmass::wire::detail {
 [[nodiscard]] bool has_fields_at_most(std::string_view bytes,
                                       const google::protobuf::Descriptor& type,
                                       std::size_t count_max);
-
-/// The field of that name. @pre The type has it.
-[[nodiscard]] const google::protobuf::FieldDescriptor* field_of(
-    const google::protobuf::Descriptor* type, std::string_view name);
 
 // What decoders require of values that a peer sent. They throw; decode() and its like turn that
 // into a DecodeError.

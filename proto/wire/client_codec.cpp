@@ -1,8 +1,11 @@
 #include "proto/wire/client_codec.hpp"
 
 #include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -13,6 +16,8 @@
 
 namespace proofmass::wire {
 namespace {
+
+using Field = google::protobuf::FieldDescriptor;
 
 /// The text, cut to what may be sent, with `?` for what may not.
 std::string sendable(std::string_view text) {
@@ -27,105 +32,55 @@ double sendable(double magnitude) {
   return std::isfinite(magnitude) && magnitude > 0.0 ? magnitude : 0.0;
 }
 
-}  // namespace
+/// Fields whose rule is that of names.
+constexpr std::array<std::string_view, 5> name_fields{"name", "host", "batch_system", "owner",
+                                                      "quarantined_hosts"};
 
-void write(const FactoryReport& report, proto::FactoryReport& message) {
-  message.set_name(name_from(report.name));
-  message.set_batch_system(name_from(report.batch_system));
-  message.set_phase(static_cast<proto::FactoryPhase>(report.phase));
-  message.set_num_wanted(report.num_wanted);
-  message.set_num_registered(report.num_registered);
-  message.set_num_queued(report.num_queued);
-  message.set_wait_s(sendable(report.wait_s));
-  message.set_reason(sendable(report.reason));
-  message.set_interval_s(report.interval_s);
+std::string sendable(std::string_view text, const Field& field) {
+  if (std::ranges::find(name_fields, std::string_view(field.name())) == name_fields.end()) {
+    return sendable(text);
+  }
+  return text.empty() && field.name() == "owner" ? "" : name_from(text);
 }
 
-namespace {
+void make_sendable(google::protobuf::Message& message);
 
-void write_factory(const FactoryStatus& factory, proto::FactoryStatus& message) {
-  write(factory.report, *message.mutable_report());
-  if (!factory.owner.empty()) message.set_owner(name_from(factory.owner));
-  message.set_silent_s(sendable(factory.silent_s));
-}
-
-void write_campaign(const CampaignStatus& campaign, proto::CampaignStatus& message) {
-  message.set_name(name_from(campaign.name));
-  message.set_phase(static_cast<proto::CampaignPhase>(campaign.phase));
-  message.set_priority(std::clamp(campaign.priority, -priority_max, priority_max));
-  for (const CampaignCounter& counter : campaign_counters) {
-    message.GetReflection()->SetUInt64(
-        &message, detail::field_of(proto::CampaignStatus::descriptor(), counter.name),
-        campaign.*counter.count);
-  }
-  const std::uint64_t num_runs = std::clamp<std::uint64_t>(campaign.num_runs, 1, num_runs_max);
-  const std::uint64_t num_given_up = std::min(campaign.num_given_up, num_runs);
-  message.set_num_runs(num_runs);
-  message.set_num_given_up(num_given_up);
-  message.set_num_done(std::min(campaign.num_done, num_runs - num_given_up));
-  message.set_rate_hz(sendable(campaign.rate_hz));
-  if (campaign.remaining_s) message.set_remaining_s(sendable(*campaign.remaining_s));
-  message.set_storage_failure(sendable(campaign.storage_failure));
-  if (!campaign.owner.empty()) message.set_owner(name_from(campaign.owner));
-}
-
-}  // namespace
-
-void write(const StatusReply& status, proto::StatusReply& message) {
-  message.set_version(status.version);
-  message.set_model_version(status.model_version);
-  message.set_uptime_s(sendable(status.uptime_s));
-  message.set_num_workers(status.num_workers);
-  message.set_num_slots(status.num_slots);
-  for (const CampaignStatus& campaign : status.campaigns) {
-    write_campaign(campaign, *message.add_campaigns());
-  }
-  message.set_num_campaigns(status.num_campaigns);
-  for (const UnservedFile& file : status.unserved_files) {
-    proto::UnservedFile& unserved = *message.add_unserved_files();
-    unserved.set_file(sendable(file.file));
-    unserved.set_reason(sendable(file.reason));
-  }
-  message.set_num_unserved_files(status.num_unserved_files);
-  for (const std::string& host : status.quarantined_hosts) {
-    message.add_quarantined_hosts(name_from(host));
-  }
-  message.set_num_quarantined_hosts(status.num_quarantined_hosts);
-  for (const FactoryStatus& factory : status.factories) {
-    write_factory(factory, *message.add_factories());
+void make_field_sendable(google::protobuf::Message& message, const Field& field) {
+  const google::protobuf::Reflection& values = *message.GetReflection();
+  const int count = field.is_repeated() ? values.FieldSize(message, &field) : 0;
+  if (field.type() == Field::TYPE_STRING) {
+    if (!field.is_repeated()) {
+      return values.SetString(&message, &field, sendable(values.GetString(message, &field), field));
+    }
+    for (int i = 0; i < count; ++i) {
+      values.SetRepeatedString(&message, &field, i,
+                               sendable(values.GetRepeatedString(message, &field, i), field));
+    }
+  } else if (field.type() == Field::TYPE_MESSAGE) {
+    if (!field.is_repeated() && values.HasField(message, &field)) {
+      make_sendable(*values.MutableMessage(&message, &field));
+    }
+    for (int i = 0; i < count; ++i) {
+      make_sendable(*values.MutableRepeatedMessage(&message, &field, i));
+    }
+  } else if (field.type() == Field::TYPE_DOUBLE && values.HasField(message, &field)) {
+    values.SetDouble(&message, &field, sendable(values.GetDouble(message, &field)));
   }
 }
 
-namespace {
-
-void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
-  message.set_worker_id(worker.id.value);
-  message.set_name(name_from(worker.name));
-  message.set_host(name_from(worker.host));
-  message.set_process_id(worker.process_id);
-  message.set_num_slots(worker.num_slots);
-  message.set_num_lent(worker.num_lent);
-  message.set_num_results(worker.num_results);
-  message.set_silent_s(sendable(worker.silent_s));
-  message.set_is_quarantined(worker.is_quarantined);
+/// Also the messages in it. Bytes stay as they are.
+void make_sendable(google::protobuf::Message& message) {
+  const google::protobuf::Descriptor& type = *message.GetDescriptor();
+  for (int i = 0; i < type.field_count(); ++i) make_field_sendable(message, *type.field(i));
 }
 
-}  // namespace
-
-void write(const WorkersReply& reply, proto::WorkersReply& message) {
-  for (const WorkerStatus& worker : reply.workers) write_worker(worker, *message.add_workers());
-  message.set_num_workers(reply.num_workers);
-}
-
-namespace {
-
-void make_sendable(std::string& text) { text = sendable(std::string_view(text)); }
-
-/// Texts of the messages that are not written by write().
-void make_sendable(proto::ReplyEnvelope& reply) {
-  if (reply.has_done()) make_sendable(*reply.mutable_done()->mutable_text());
-  if (reply.has_error()) make_sendable(*reply.mutable_error()->mutable_text());
-  if (reply.has_answer()) make_sendable(*reply.mutable_answer()->mutable_error_text());
+void cut_counts(proto::CampaignStatus& campaign) {
+  campaign.set_priority(std::clamp(campaign.priority(), -priority_max, priority_max));
+  const std::uint64_t num_runs = std::clamp<std::uint64_t>(campaign.num_runs(), 1, num_runs_max);
+  const std::uint64_t num_given_up = std::min(campaign.num_given_up(), num_runs);
+  campaign.set_num_runs(num_runs);
+  campaign.set_num_given_up(num_given_up);
+  campaign.set_num_done(std::min(campaign.num_done(), num_runs - num_given_up));
 }
 
 template <typename Envelope>
@@ -142,11 +97,15 @@ std::string bytes_of(Envelope& envelope, std::string_view what, std::size_t size
 }  // namespace
 
 std::string encode(proto::RequestEnvelope request) {
+  if (request.has_factory_report()) make_sendable(*request.mutable_factory_report());
   return bytes_of(request, "request", size_max_of(request));
 }
 
 std::string encode(proto::ReplyEnvelope reply) {
   make_sendable(reply);
+  if (reply.has_status()) {
+    for (auto& campaign : *reply.mutable_status()->mutable_campaigns()) cut_counts(campaign);
+  }
   return bytes_of(reply, "reply", reply_size_max);
 }
 

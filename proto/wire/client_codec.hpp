@@ -13,15 +13,15 @@
 
 namespace proofmass::wire {
 
-// What clients and coordinator exchange: the envelopes of client.proto, and their bytes. What a
-// peer may send is told here and by the checks of client_message_reader.cpp; the comments of
-// client.proto name these limits.
+// What clients and coordinator exchange: the envelopes of client.proto, and their bytes. The limits
+// below, which the comments of client.proto name, and the checks in client_message_reader.cpp
+// define what a peer may send.
 
-/// Size limits, bytes. A SubmitRequest may be as large as the first, any other as the second.
-inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;
-inline constexpr std::size_t request_size_max = std::size_t{64} << 10;
-inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;
-/// Of one message: a larger request travels as RequestParts with slices of at most the first.
+inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;   ///< Of a submission, bytes.
+inline constexpr std::size_t request_size_max = std::size_t{64} << 10;  ///< Of others, bytes.
+inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;     ///< Bytes.
+/// A larger request travels as several messages, each a RequestPart with a slice of at most
+/// request_part_size_max bytes.
 inline constexpr std::size_t request_part_size_max = std::size_t{256} << 10;
 inline constexpr std::size_t request_message_size_max = request_part_size_max + 1024;
 
@@ -42,9 +42,10 @@ inline constexpr std::size_t answer_part_size_max = std::size_t{1} << 20;
 /// Of a request with this content, bytes.
 [[nodiscard]] std::size_t size_max_of(const proto::RequestEnvelope& request);
 
-/// The bytes of a request or reply; they say this program's protocol_version. Texts of a reply are
-/// cut to reply_text_size_max; what is not printable ASCII or the end of a line becomes `?` in
-/// them, since they go to terminals.
+/// The bytes of a request or reply; they say this program's protocol_version. Texts of a reply and
+/// of a factory's report are cut to reply_text_size_max; what is not printable ASCII or the end of
+/// a line becomes `?` in them, since they go to terminals. Names become names, numbers that are not
+/// finite or negative become 0, and counts of a campaign's runs that contradict each other are cut.
 /// @throws InvalidArgument if they are more than the message may have.
 [[nodiscard]] std::string encode(proto::RequestEnvelope request);
 [[nodiscard]] std::string encode(proto::ReplyEnvelope reply);
@@ -66,16 +67,5 @@ void set_definition(const Definition& definition, proto::SubmitRequest& request)
 [[nodiscard]] proto::ReplyEnvelope done_reply(std::string text);
 /// The request was refused: `field = value (rule)`.
 [[nodiscard]] proto::ReplyEnvelope error_reply(std::string text);
-
-// The messages about a coordinator, its campaigns, workers and factories, in the form in which they
-// are computed and shown. Texts and numbers that may not be sent are changed as encode() does.
-
-void write(const FactoryReport& report, proto::FactoryReport& message);
-void write(const StatusReply& status, proto::StatusReply& message);
-void write(const WorkersReply& reply, proto::WorkersReply& message);
-/// @throws ConfigError if a value is forbidden, which none is of a message that has been decoded.
-[[nodiscard]] FactoryReport read(const proto::FactoryReport& message);
-[[nodiscard]] StatusReply read(const proto::StatusReply& message);
-[[nodiscard]] WorkersReply read(const proto::WorkersReply& message);
 
 }  // namespace proofmass::wire

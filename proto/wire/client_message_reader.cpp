@@ -22,19 +22,16 @@ using detail::require_in;
 /// A reply with 4096 workers has 37,000.
 constexpr std::size_t request_fields_max = std::size_t{1} << 16;
 
-int checked_priority(int priority) {
+void check_priority(int priority) {
   require(priority >= -priority_max && priority <= priority_max, "priority",
           fmt::format("{}", priority),
           fmt::format("must be in [{}, {}]", -priority_max, priority_max));
-  return priority;
 }
 
 /// @param maximum  The largest enumerator; 0 says that there is none.
-template <typename Sent>
-Sent checked_enumerator(Sent sent, Sent maximum, std::string_view field) {
-  require(sent >= 1 && sent <= maximum, field, fmt::format("{}", static_cast<int>(sent)),
-          fmt::format("must be in [1, {}]", static_cast<int>(maximum)));
-  return sent;
+void check_enumerator(int sent, int maximum, std::string_view field) {
+  require(sent >= 1 && sent <= maximum, field, fmt::format("{}", sent),
+          fmt::format("must be in [1, {}]", maximum));
 }
 
 void check(const proto::SubmitRequest& message) {
@@ -46,14 +43,14 @@ void check(const proto::SubmitRequest& message) {
   require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
           fmt::format("must be at most {}", stop_rule_size_max));
   if (!rule.empty()) (void)parse_stop_rule(rule);
-  (void)checked_priority(message.priority());
+  check_priority(message.priority());
   require_in(message.failures_max(), 0, num_runs_max, "failures");
 }
 
 void check(const proto::ControlRequest& message) {
-  (void)checked_enumerator(message.action(), proto::ControlAction_MAX, "action");
+  check_enumerator(message.action(), proto::ControlAction_MAX, "action");
   (void)checked_name(message.campaign(), "campaign");
-  (void)checked_priority(message.priority());
+  check_priority(message.priority());
 }
 
 void check(const proto::RequestPart& message) {
@@ -77,7 +74,7 @@ void check_argument(const std::string& text, std::size_t size_max, std::string_v
 
 void check(const proto::AnswerRequest& message) {
   (void)checked_name(message.campaign(), "campaign");
-  (void)checked_enumerator(message.question(), proto::Question_MAX, "question");
+  check_enumerator(message.question(), proto::Question_MAX, "question");
   require_count(message.options_size(), 0, answer_options_max, "options");
   for (const std::string& option : message.options()) {
     check_argument(option, answer_option_size_max, "option size");
@@ -90,136 +87,82 @@ void check(const proto::AnswerRequest& message) {
 
 bool may_be_in_text(char c) { return c == '\n' || (c >= ' ' && c <= '~'); }
 
-std::string checked_text(const std::string& text, std::string_view field) {
+void check_text(const std::string& text, std::string_view field) {
   require(text.size() <= reply_text_size_max, field, fmt::format("{} bytes", text.size()),
           fmt::format("must be at most {}", reply_text_size_max));
   // It goes to a terminal.
   require(std::all_of(text.begin(), text.end(), may_be_in_text), field,
           fmt::format("{} bytes", text.size()), "must be printable ASCII and line ends");
-  return text;
 }
 
-std::string checked_owner(const std::string& owner) {
-  return owner.empty() ? "" : checked_name(owner, "owner");
+void check_owner(const std::string& owner) {
+  if (!owner.empty()) (void)checked_name(owner, "owner");
 }
 
-}  // namespace
-
-FactoryReport read(const proto::FactoryReport& message) {
+void check(const proto::FactoryReport& message) {
   require_in(message.interval_s(), 1, factory_interval_s_max, "interval_s");
-  return {.name = checked_name(message.name(), "name"),
-          .batch_system = checked_name(message.batch_system(), "batch_system"),
-          .phase = static_cast<FactoryPhase>(
-              checked_enumerator(message.phase(), proto::FactoryPhase_MAX, "phase")),
-          .num_wanted = message.num_wanted(),
-          .num_registered = message.num_registered(),
-          .num_queued = message.num_queued(),
-          .wait_s = checked_magnitude(message.wait_s(), "wait_s"),
-          .reason = checked_text(message.reason(), "reason"),
-          .interval_s = message.interval_s()};
+  (void)checked_name(message.name(), "name");
+  (void)checked_name(message.batch_system(), "batch_system");
+  check_enumerator(message.phase(), proto::FactoryPhase_MAX, "phase");
+  (void)checked_magnitude(message.wait_s(), "wait_s");
+  check_text(message.reason(), "reason");
 }
 
-namespace {
-
-FactoryStatus read_factory(const proto::FactoryStatus& message) {
-  return {.report = read(message.report()),
-          .owner = checked_owner(message.owner()),
-          .silent_s = checked_magnitude(message.silent_s(), "silent_s")};
+void check(const proto::FactoryStatus& message) {
+  check(message.report());
+  check_owner(message.owner());
+  (void)checked_magnitude(message.silent_s(), "silent_s");
 }
 
-std::optional<double> remaining_time(const proto::CampaignStatus& message) {
-  if (!message.has_remaining_s()) return std::nullopt;
-  return checked_magnitude(message.remaining_s(), "remaining_s");
-}
-
-CampaignStatus read_campaign(const proto::CampaignStatus& message) {
+void check(const proto::CampaignStatus& message) {
   require_in(message.num_runs(), 1, num_runs_max, "num_runs");
   require_in(message.num_given_up(), 0, message.num_runs(), "num_given_up");
   require_in(message.num_done(), 0, message.num_runs() - message.num_given_up(), "num_done");
-  CampaignStatus campaign{
-      .name = checked_name(message.name(), "name"),
-      .phase = static_cast<CampaignPhase>(
-          checked_enumerator(message.phase(), proto::CampaignPhase_MAX, "phase")),
-      .priority = checked_priority(message.priority()),
-      .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
-      .remaining_s = remaining_time(message),
-      .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
-      .owner = checked_owner(message.owner())};
-  for (const CampaignCounter& counter : campaign_counters) {
-    campaign.*counter.count = message.GetReflection()->GetUInt64(
-        message, detail::field_of(proto::CampaignStatus::descriptor(), counter.name));
-  }
-  return campaign;
+  (void)checked_name(message.name(), "name");
+  check_enumerator(message.phase(), proto::CampaignPhase_MAX, "phase");
+  check_priority(message.priority());
+  (void)checked_magnitude(message.rate_hz(), "rate_hz");
+  (void)checked_magnitude(message.remaining_s(), "remaining_s");
+  check_text(message.storage_failure(), "storage_failure");
+  check_owner(message.owner());
 }
 
-void read_lists(const proto::StatusReply& message, StatusReply& status) {
+void check(const proto::StatusReply& message) {
+  require_count(message.campaigns_size(), 0, campaigns_per_reply_max, "campaigns");
   require_count(message.unserved_files_size(), 0, unserved_files_per_reply_max, "unserved_files");
   require_count(message.quarantined_hosts_size(), 0, quarantined_hosts_per_reply_max,
                 "quarantined_hosts");
-  for (const auto& file : message.unserved_files()) {
-    status.unserved_files.push_back({.file = checked_text(file.file(), "file"),
-                                     .reason = checked_text(file.reason(), "reason")});
+  require_count(message.factories_size(), 0, factories_max, "factories");
+  (void)checked_name(message.version(), "version");
+  (void)checked_name(message.model_version(), "model_version");
+  (void)checked_magnitude(message.uptime_s(), "uptime_s");
+  for (const proto::CampaignStatus& campaign : message.campaigns()) check(campaign);
+  for (const proto::UnservedFile& file : message.unserved_files()) {
+    check_text(file.file(), "file");
+    check_text(file.reason(), "reason");
   }
   for (const std::string& host : message.quarantined_hosts()) {
-    status.quarantined_hosts.push_back(checked_name(host, "quarantined_hosts"));
+    (void)checked_name(host, "quarantined_hosts");
   }
-  require_count(message.factories_size(), 0, factories_max, "factories");
-  for (const auto& factory : message.factories()) {
-    status.factories.push_back(read_factory(factory));
-  }
+  for (const proto::FactoryStatus& factory : message.factories()) check(factory);
 }
 
-}  // namespace
-
-StatusReply read(const proto::StatusReply& message) {
-  require_count(message.campaigns_size(), 0, campaigns_per_reply_max, "campaigns");
-  StatusReply status{.version = checked_name(message.version(), "version"),
-                     .model_version = checked_name(message.model_version(), "model_version"),
-                     .uptime_s = checked_magnitude(message.uptime_s(), "uptime_s"),
-                     .num_workers = message.num_workers(),
-                     .num_slots = message.num_slots(),
-                     .campaigns = {},
-                     .num_campaigns = message.num_campaigns(),
-                     .num_unserved_files = message.num_unserved_files(),
-                     .num_quarantined_hosts = message.num_quarantined_hosts()};
-  for (const auto& campaign : message.campaigns()) {
-    status.campaigns.push_back(read_campaign(campaign));
-  }
-  read_lists(message, status);
-  return status;
-}
-
-namespace {
-
-WorkerStatus read_worker(const proto::WorkerStatus& message) {
-  return {.id = {detail::checked_id(message.worker_id(), "worker_id")},
-          .name = checked_name(message.name(), "name"),
-          .host = checked_name(message.host(), "host"),
-          .process_id = message.process_id(),
-          .num_slots = message.num_slots(),
-          .num_lent = message.num_lent(),
-          .num_results = message.num_results(),
-          .silent_s = checked_magnitude(message.silent_s(), "silent_s"),
-          .is_quarantined = message.is_quarantined()};
-}
-
-}  // namespace
-
-WorkersReply read(const proto::WorkersReply& message) {
+void check(const proto::WorkersReply& message) {
   require_count(message.workers_size(), 0, workers_per_reply_max, "workers");
-  WorkersReply reply{.workers = {}, .num_workers = message.num_workers()};
-  for (const auto& worker : message.workers()) reply.workers.push_back(read_worker(worker));
-  return reply;
+  for (const proto::WorkerStatus& worker : message.workers()) {
+    (void)detail::checked_id(worker.worker_id(), "worker_id");
+    (void)checked_name(worker.name(), "name");
+    (void)checked_name(worker.host(), "host");
+    (void)checked_magnitude(worker.silent_s(), "silent_s");
+  }
 }
-
-namespace {
 
 void check(const proto::AnswerReply& message) {
   require_in(message.offset(), 0, message.size(), "offset");
   require_in(message.exit_code(), 0, 255, "exit_code");
   (void)detail::checked_id(message.answer_id(), "answer_id");
   check_sha256(message.sha256(), "sha256");
-  (void)checked_text(message.error_text(), "error_text");
+  check_text(message.error_text(), "error_text");
 }
 
 void check(const proto::RequestEnvelope& envelope) {
@@ -241,7 +184,7 @@ void check(const proto::RequestEnvelope& envelope) {
     case proto::RequestEnvelope::kAnswerPart:
       return (void)detail::checked_id(envelope.answer_part().answer_id(), "answer_id");
     case proto::RequestEnvelope::kFactoryReport:
-      return (void)read(envelope.factory_report());
+      return check(envelope.factory_report());
     case proto::RequestEnvelope::REQUEST_NOT_SET:
       break;
   }
@@ -251,13 +194,13 @@ void check(const proto::RequestEnvelope& envelope) {
 void check(const proto::ReplyEnvelope& envelope) {
   switch (envelope.reply_case()) {
     case proto::ReplyEnvelope::kStatus:
-      return (void)read(envelope.status());
+      return check(envelope.status());
     case proto::ReplyEnvelope::kWorkers:
-      return (void)read(envelope.workers());
+      return check(envelope.workers());
     case proto::ReplyEnvelope::kDone:
-      return (void)checked_text(envelope.done().text(), "text");
+      return check_text(envelope.done().text(), "text");
     case proto::ReplyEnvelope::kError:
-      return (void)checked_text(envelope.error().text(), "text");
+      return check_text(envelope.error().text(), "text");
     case proto::ReplyEnvelope::kPart:
     case proto::ReplyEnvelope::kWait:
       return;

@@ -75,8 +75,8 @@ struct Attempt {
 enum class LossReason : std::uint8_t {
   silent = 1,         ///< The worker was not heard for too long.
   crashed = 2,        ///< Its process was ended by a signal. Counts against the runs it computed.
-  out_of_memory = 3,  ///< Its process was ended for its use of memory. Counts as well.
-  hung = 4,           ///< No step was finished for too long. Counts as well.
+  out_of_memory = 3,  ///< It was ended for its use of memory. Counts against the runs it computed.
+  hung = 4,           ///< No step was finished for too long. Counts against the runs it computed.
   drained = 5,        ///< The worker was told to leave.
   walltime = 6,       ///< The worker's time is up.
   preempted = 7,      ///< The worker was asked to end by a signal.

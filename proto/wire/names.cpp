@@ -1,10 +1,12 @@
 #include "proto/wire/names.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "proto/client.pb.h"
 
 namespace proofmass::wire {
 namespace {
@@ -58,24 +60,26 @@ std::string_view name_of(CampaignPhase phase) {
   PROOFMASS_EXPECT(false);
 }
 
-bool has_failed(const CampaignStatus& campaign) {
-  return campaign.phase == CampaignPhase::finished && campaign.num_given_up > campaign.num_runs / 2;
+CampaignPhase phase_of(const proto::CampaignStatus& campaign) {
+  return static_cast<CampaignPhase>(campaign.phase());
 }
 
-std::string_view phase_name(const CampaignStatus& campaign) {
-  return has_failed(campaign) ? "failed" : name_of(campaign.phase);
+proto::CampaignPhase message_value(CampaignPhase phase) {
+  return static_cast<proto::CampaignPhase>(phase);
 }
 
-std::string_view name_of(FactoryPhase phase) {
-  switch (phase) {
-    case FactoryPhase::active:
-      return "active";
-    case FactoryPhase::waiting:
-      return "waiting";
-    case FactoryPhase::paused:
-      return "paused";
-  }
-  PROOFMASS_EXPECT(false);
+bool has_failed(const proto::CampaignStatus& campaign) {
+  return phase_of(campaign) == CampaignPhase::finished &&
+         campaign.num_given_up() > campaign.num_runs() / 2;
+}
+
+std::string_view phase_name(const proto::CampaignStatus& campaign) {
+  return has_failed(campaign) ? "failed" : name_of(phase_of(campaign));
+}
+
+std::string_view name_of(proto::FactoryPhase phase) {
+  constexpr std::array<std::string_view, 3> names{"active", "waiting", "paused"};
+  return names.at(static_cast<std::size_t>(phase) - 1);
 }
 
 std::string_view name_of(LossReason reason) {

@@ -6,6 +6,12 @@
 #include "proto/wire/client_messages.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass::proto {
+class CampaignStatus;
+enum CampaignPhase : int;
+enum FactoryPhase : int;
+}  // namespace proofmass::proto
+
 namespace proofmass::wire {
 
 /// True for 1 to 128 characters of which has_name_form() holds: names of workers, hosts and models,
@@ -16,15 +22,18 @@ namespace proofmass::wire {
 /// place, cut to 128; `unnamed` if nothing is left.
 [[nodiscard]] std::string name_from(std::string_view text);
 
+[[nodiscard]] CampaignPhase phase_of(const proto::CampaignStatus& campaign);
+[[nodiscard]] proto::CampaignPhase message_value(CampaignPhase phase);
+
 /// True if most runs of the campaign were given up: then it is no success that it is finished.
-[[nodiscard]] bool has_failed(const CampaignStatus& campaign);
+[[nodiscard]] bool has_failed(const proto::CampaignStatus& campaign);
 
 /// Names of values for people, logs, JSON and the database: `pause`, `active`, `out_of_memory`.
 [[nodiscard]] std::string_view name_of(ControlAction action);
 [[nodiscard]] std::string_view name_of(CampaignPhase phase);
-[[nodiscard]] std::string_view name_of(FactoryPhase phase);
+[[nodiscard]] std::string_view name_of(proto::FactoryPhase phase);
 /// The phase, or `failed` if the campaign is finished and most of its runs were given up.
-[[nodiscard]] std::string_view phase_name(const CampaignStatus& campaign);
+[[nodiscard]] std::string_view phase_name(const proto::CampaignStatus& campaign);
 [[nodiscard]] std::string_view name_of(LossReason reason);
 
 }  // namespace proofmass::wire

@@ -53,7 +53,7 @@ void NullExecution::begin_batches(TimePoint now) {
   const bool takes_time = pace_.batch_time_s > 0.0;
   const std::size_t size_max = takes_time ? batch_size : std::numeric_limits<std::size_t>::max();
   while (batches_.size() < pace_.num_threads) {
-    worker::Assignment assignment = waiting_.take(size_max, is_known);
+    worker::TakenRuns assignment = waiting_.take(size_max, is_known);
     if (assignment.requests.empty()) return;
     if (!takes_time) {
       finish(assignment, pace_.elapsed_s);
@@ -121,7 +121,7 @@ int NullExecution::num_steps_done(const Batch& batch) const {
   return static_cast<int>(num_steps * std::clamp(fraction, 0.0, 1.0));
 }
 
-void NullExecution::finish(const worker::Assignment& assignment, double elapsed_s) {
+void NullExecution::finish(const worker::TakenRuns& assignment, double elapsed_s) {
   const Campaign& campaign = *campaigns_.at(assignment.campaign);
   for (const RunRequest& request : assignment.requests) {
     finished_.push_back(

@@ -53,7 +53,7 @@ class NullExecution final : public worker::Execution {
 
  private:
   struct Batch {
-    worker::Assignment assignment;
+    worker::TakenRuns assignment;
     TimePoint started_at;
     TimePoint due_at;
   };
@@ -61,7 +61,7 @@ class NullExecution final : public worker::Execution {
   void begin_batches(TimePoint now);
   [[nodiscard]] worker::Duration time_of_batch(std::uint64_t number) const;
   [[nodiscard]] int num_steps_done(const Batch& batch) const;
-  void finish(const worker::Assignment& assignment, double elapsed_s);
+  void finish(const worker::TakenRuns& assignment, double elapsed_s);
   void note_due();
 
   NullPace pace_;

@@ -288,35 +288,27 @@ MicroscopeCampaign campaign_with_table() {
 }
 
 std::string client_messages() {
-  wire::CampaignStatus campaign;
-  campaign.name = "a";
-  campaign.num_runs = 10;
-  campaign.remaining_s = 1.5;
-  campaign.storage_failure = "disk full";
-  const wire::FactoryReport report{.name = "fleet",
-                                   .batch_system = "pbs",
-                                   .phase = wire::FactoryPhase::waiting,
-                                   .num_wanted = 3,
-                                   .wait_s = 60.0,
-                                   .reason = "queue full",
-                                   .interval_s = 30};
-  const wire::StatusReply status{.version = "0",
-                                 .model_version = "m",
-                                 .uptime_s = 1.0,
-                                 .num_workers = 1,
-                                 .num_slots = 2,
-                                 .campaigns = {campaign},
-                                 .factories = {{.report = report, .owner = "anna"}}};
-  wire::WorkerStatus worker;
-  worker.id = {1};
-  worker.name = worker.host = "w";
+  proto::CampaignStatus campaign = campaign_status("a", 0, 10);
+  campaign.set_remaining_s(1.5);
+  campaign.set_storage_failure("disk full");
+  proto::FactoryStatus factory;
+  proto::FactoryReport& report = *factory.mutable_report();
+  report = factory_report("fleet", 30, proto::FACTORY_PHASE_WAITING);
+  report.set_num_wanted(3);
+  report.set_wait_s(60.0);
+  report.set_reason("queue full");
+  factory.set_owner("anna");
+  proto::StatusReply status = status_with({campaign});
+  status.set_version("0");
+  status.set_num_slots(2);
+  *status.add_factories() = factory;
   proto::RequestEnvelope status_request;
   status_request.mutable_status();
   proto::RequestEnvelope workers_request;
   workers_request.mutable_workers();
   return to_bytes({from_client(status_request), from_client(workers_request),
                    from_client(request_of(report)), to_client(reply_with(status)),
-                   to_client(reply_with(wire::WorkersReply{.workers = {worker}})),
+                   to_client(reply_with({worker_status(1, "w", "w")})),
                    to_client(wire::done_reply("done")), to_client(wire::error_reply("a = b (c)"))});
 }
 

@@ -113,7 +113,7 @@ std::shared_ptr<Executor::Batch> Executor::next_batch_for_device() {
   };
   std::unique_lock lock(mutex_);
   while (!is_ending_ && !failure_) {
-    Assignment assignment =
+    TakenRuns assignment =
         queue_.take_for_device(runs_worth_a_device, runs_worth_a_device / 2, is_for_devices);
     if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
     changed_.wait(lock);
@@ -128,7 +128,7 @@ std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
   if (is_ending_ || failure_) return nullptr;
   const auto is_ready_now = [this](wire::CampaignId other) { return is_ready(other); };
   if (queue_.first_campaign(is_ready_now) != campaign) return nullptr;
-  Assignment assignment = queue_.take_for_device(
+  TakenRuns assignment = queue_.take_for_device(
       1, size_max, [&](wire::CampaignId other) { return other == campaign; });
   return assignment.requests.empty() ? nullptr : begin_batch(std::move(assignment));
 }

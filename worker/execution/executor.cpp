@@ -213,7 +213,7 @@ std::shared_ptr<Executor::Batch> Executor::next_batch() {
   std::unique_lock lock(mutex_);
   while (true) {
     if (is_ending_ || failure_) return nullptr;
-    Assignment assignment = queue_.take(config_.batch_size_max, is_ready_now);
+    TakenRuns assignment = queue_.take(config_.batch_size_max, is_ready_now);
     if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
@@ -223,7 +223,7 @@ std::shared_ptr<Executor::Batch> Executor::next_batch() {
   }
 }
 
-std::shared_ptr<Executor::Batch> Executor::begin_batch(Assignment assignment) {
+std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment) {
   KnownCampaign& known = campaigns_.at(assignment.campaign);
   known.used = ++num_uses_;
   const auto batch = std::make_shared<Batch>();

@@ -101,7 +101,7 @@ class Executor final : public Execution {
   /// taken when it is dropped.
   struct Batch {
     std::uint64_t number = 0;
-    Assignment assignment;
+    TakenRuns assignment;
     std::shared_ptr<const PreparedCampaign> prepared;
     TimePoint started_at;
     std::atomic<int> num_steps_done = 0;
@@ -113,7 +113,7 @@ class Executor final : public Execution {
   void serve_device(Device& device);
   /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
   [[nodiscard]] std::shared_ptr<Batch> next_batch();
-  [[nodiscard]] std::shared_ptr<Batch> begin_batch(Assignment assignment);
+  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment);
   /// Waits for runs that are worth a device; null at the end.
   [[nodiscard]] std::shared_ptr<Batch> next_batch_for_device();
   /// More runs of the same campaign, if they wait; null if those of another one come first.

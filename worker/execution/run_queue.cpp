@@ -20,8 +20,8 @@ void RunQueue::add(const proto::RunLease& lease, std::span<const RunRange> runs)
   }
 }
 
-Assignment RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
-  Assignment assignment;
+TakenRuns RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
+  TakenRuns assignment;
   assignment.campaign = first_campaign(is_ready);
   for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
     const bool can_join = assignment.requests.empty() || !run->is_alone;
@@ -40,9 +40,9 @@ Assignment RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
   return assignment;
 }
 
-Assignment RunQueue::take_for_device(std::size_t count_min, std::size_t count_max,
-                                     const IsReady& is_ready) {
-  Assignment assignment;
+TakenRuns RunQueue::take_for_device(std::size_t count_min, std::size_t count_max,
+                                    const IsReady& is_ready) {
+  TakenRuns assignment;
   assignment.campaign = first_campaign(is_ready);
   const auto is_fit = [&](const Waiting& run) {
     return run.campaign == assignment.campaign && !run.is_alone;

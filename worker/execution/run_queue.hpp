@@ -17,7 +17,7 @@ class RunLease;
 namespace proofmass::worker {
 
 /// Runs of one campaign that are to be computed together.
-struct Assignment {
+struct TakenRuns {
   wire::CampaignId campaign;
   std::vector<RunRequest> requests;  ///< Not empty.
 };
@@ -34,12 +34,12 @@ class RunQueue {
   /// lease they are of; fewer than `count_max` if there are no more, none if no campaign is ready.
   /// A run that is to be alone is. If the lease of the first run wants smaller batches, this is
   /// one.
-  [[nodiscard]] Assignment take(std::size_t count_max, const IsReady& is_ready);
+  [[nodiscard]] TakenRuns take(std::size_t count_max, const IsReady& is_ready);
 
   /// As take(), for a device that computes thousands of runs at a time: of as many batches as it
   /// takes, but none that is to be alone. None if fewer than `count_min` of them are here.
-  [[nodiscard]] Assignment take_for_device(std::size_t count_min, std::size_t count_max,
-                                           const IsReady& is_ready);
+  [[nodiscard]] TakenRuns take_for_device(std::size_t count_min, std::size_t count_max,
+                                          const IsReady& is_ready);
 
   /// Removes those of the runs that are here and returns them in ascending order.
   std::vector<RunIndex> drop(wire::CampaignId campaign, std::span<const RunRange> ranges);

@@ -168,12 +168,12 @@ class Service {
   }
 
   void heed_signals(TimePoint now) {
-    const StopRequest request = signals_.request();
+    const EndRequest request = signals_.request();
     if (request == former_request_) return;
     former_request_ = request;
     log_({.kind = "asked_to_end",
-          .fields = {{"how", request == StopRequest::drain ? "drain" : "at_once"}}});
-    if (request == StopRequest::drain) {
+          .fields = {{"how", request == EndRequest::drain ? "drain" : "at_once"}}});
+    if (request == EndRequest::drain) {
       conversation_.on_drain_request(now);
     } else {
       conversation_.on_abandon_request();
@@ -192,7 +192,7 @@ class Service {
   const wire::Log& log_;
   const wire::Wake& progress_;
   StopSignals& signals_;
-  StopRequest former_request_ = StopRequest::none;
+  EndRequest former_request_ = EndRequest::none;
   CoordinatorLink link_;
   Duration wait_max_;
   Conversation conversation_;

@@ -25,22 +25,22 @@ int open_signals(SignalSource source) {
   return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
-StopRequest after_one_more(StopRequest request) {
-  return request == StopRequest::none ? StopRequest::drain : StopRequest::abandon;
+EndRequest after_one_more(EndRequest request) {
+  return request == EndRequest::none ? EndRequest::drain : EndRequest::abandon;
 }
 
 /// What is asked for once this signal has come, too.
-StopRequest after(StopRequest request, const signalfd_siginfo& signal, SignalSource source) {
+EndRequest after(EndRequest request, const signalfd_siginfo& signal, SignalSource source) {
   switch (source) {
     case SignalSource::anyone:
       return after_one_more(request);
     case SignalSource::supervisor: {
       const bool is_second =
           signal.ssi_signo == static_cast<std::uint32_t>(handed_on_signal()) && signal.ssi_int >= 2;
-      return std::max(request, is_second ? StopRequest::abandon : StopRequest::drain);
+      return std::max(request, is_second ? EndRequest::abandon : EndRequest::drain);
     }
     case SignalSource::campaign:
-      return signal.ssi_signo == SIGTERM ? StopRequest::abandon : request;
+      return signal.ssi_signo == SIGTERM ? EndRequest::abandon : request;
   }
   PROOFMASS_EXPECT(false);
 }
@@ -53,7 +53,7 @@ StopSignals::StopSignals(SignalSource source) : source_(source), descriptor_(ope
 
 StopSignals::~StopSignals() { close(descriptor_); }
 
-StopRequest StopSignals::request() {
+EndRequest StopSignals::request() {
   signalfd_siginfo signal{};
   while (read(descriptor_, &signal, sizeof signal) == sizeof signal) {
     request_ = after(request_, signal, source_);

@@ -13,7 +13,7 @@ enum class SignalSource : std::uint8_t {
 };
 
 /// What signals have asked for so far.
-enum class StopRequest : std::uint8_t { none, drain, abandon };
+enum class EndRequest : std::uint8_t { none, drain, abandon };
 
 /// Receives signals by a file descriptor, so that one poll waits for them and for a socket. (The
 /// coordinator and the commands use handlers instead: some of their threads never poll.)
@@ -30,12 +30,12 @@ class StopSignals {
   [[nodiscard]] int descriptor() const { return descriptor_; }
 
   /// Takes in the signals that have come and returns the strongest request since the beginning.
-  [[nodiscard]] StopRequest request();
+  [[nodiscard]] EndRequest request();
 
  private:
   SignalSource source_;
   int descriptor_;
-  StopRequest request_ = StopRequest::none;
+  EndRequest request_ = EndRequest::none;
 };
 
 }  // namespace proofmass::worker

@@ -97,7 +97,7 @@ void Hdf5File::set(hid_t object, const char* name, hid_t stored, hid_t given, Hd
 }
 
 GrowingDataset::GrowingDataset(const Hdf5File& file, hid_t group, const std::string& name,
-                               const RowFormat& format)
+                               const DatasetFormat& format)
     : file_(&file), given_(format.given) {
   const hsize_t none = 0, unlimited = H5S_UNLIMITED;
   const Hdf5Handle space = file.handle(H5Screate_simple(1, &none, &unlimited), H5Sclose);

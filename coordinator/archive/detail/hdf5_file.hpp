@@ -79,7 +79,7 @@ class Hdf5File {
 };
 
 /// What the rows of a dataset are.
-struct RowFormat {
+struct DatasetFormat {
   hid_t stored = -1;  ///< Type in the file.
   hid_t given = -1;   ///< Type in memory; lives as long as the dataset.
   hsize_t chunk_rows = 1;
@@ -89,7 +89,7 @@ struct RowFormat {
 class GrowingDataset {
  public:
   GrowingDataset(const Hdf5File& file, hid_t group, const std::string& name,
-                 const RowFormat& format);
+                 const DatasetFormat& format);
 
   [[nodiscard]] hid_t id() const { return dataset_; }
 

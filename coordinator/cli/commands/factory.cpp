@@ -111,14 +111,14 @@ int show_submission(const BatchSystem& system, const FactoryConfig& config) {
 }
 
 /// A campaign that is over, or paused by a person, is not worked for.
-FactoryView view_of(const wire::StatusReply& status, const wire::WorkersReply& workers) {
+FactoryView view_of(const proto::StatusReply& status, const proto::WorkersReply& workers) {
   FactoryView view;
-  for (const wire::CampaignStatus& campaign : status.campaigns) {
-    view.rate_hz += campaign.rate_hz;
-    if (campaign.phase != wire::CampaignPhase::active) continue;
-    view.num_open_runs += campaign.num_runs - campaign.num_done - campaign.num_given_up;
+  for (const proto::CampaignStatus& campaign : status.campaigns()) {
+    view.rate_hz += campaign.rate_hz();
+    if (campaign.phase() != proto::CAMPAIGN_PHASE_ACTIVE) continue;
+    view.num_open_runs += campaign.num_runs() - campaign.num_done() - campaign.num_given_up();
   }
-  for (const wire::WorkerStatus& worker : workers.workers) view.workers.insert(worker.name);
+  for (const auto& worker : workers.workers()) view.workers.insert(worker.name());
   return view;
 }
 
@@ -129,7 +129,9 @@ class FactoryLoop {
       : options_(options),
         config_(std::move(config)),
         log_(log),
-        report_(with_constants({.name = config_.name, .batch_system = {}})) {}
+        report_(report_of({}, config_, {}, std::chrono::steady_clock::now())) {
+    add_constants();
+  }
 
   /// One look at coordinator and queue, and what follows from it. What fails is tried again at the
   /// next look.
@@ -140,11 +142,11 @@ class FactoryLoop {
       const Ask ask = [&](const proto::RequestEnvelope& request) {
         return connection.ask(request);
       };
-      const wire::StatusReply status = whole_status(ask);
+      const proto::StatusReply status = whole_status(ask);
       const bool has_looked = look_at_queue(view_of(status, all_workers(ask)));
       report(ask);
-      return has_looked && !status.campaigns.empty() &&
-             std::ranges::all_of(status.campaigns, is_over);
+      return has_looked && !status.campaigns().empty() &&
+             std::ranges::all_of(status.campaigns(), is_over);
     } catch (const InvalidArgument&) {
       throw;  // The address is wrong.
     } catch (const Error& error) {
@@ -158,10 +160,9 @@ class FactoryLoop {
   }
 
  private:
-  [[nodiscard]] wire::FactoryReport with_constants(wire::FactoryReport report) const {
-    report.batch_system = options_.system.name;
-    report.interval_s = options_.interval_s;
-    return report;
+  void add_constants() {
+    report_.set_batch_system(std::string(options_.system.name));
+    report_.set_interval_s(options_.interval_s);
   }
 
   void log_waiting(const std::string& reason) const {
@@ -181,28 +182,29 @@ class FactoryLoop {
     }
     carry_out(on_view(state_, config_, view, std::chrono::steady_clock::now(), log_), state_,
               options_.system, config_, log_);
-    const bool was_paused = report_.phase == wire::FactoryPhase::paused;
-    report_ = with_constants(report_of(state_, config_, view, std::chrono::steady_clock::now()));
-    if (report_.phase == wire::FactoryPhase::paused && !was_paused) {
+    const bool was_paused = report_.phase() == proto::FACTORY_PHASE_PAUSED;
+    report_ = report_of(state_, config_, view, std::chrono::steady_clock::now());
+    add_constants();
+    if (report_.phase() == proto::FACTORY_PHASE_PAUSED && !was_paused) {
       log_({.severity = wire::Severity::error,
             .kind = "factory_paused",
-            .fields = {wire::Field::reason(report_.reason)}});
+            .fields = {wire::Field::reason(report_.reason())}});
     }
     return true;
   }
 
   void note_unlisted(const std::string& reason) {
     log_waiting(reason);
-    if (report_.phase == wire::FactoryPhase::paused) return;
-    report_.phase = wire::FactoryPhase::waiting;
-    report_.wait_s = static_cast<double>(options_.interval_s);
-    report_.reason = reason;
+    if (report_.phase() == proto::FACTORY_PHASE_PAUSED) return;
+    report_.set_phase(proto::FACTORY_PHASE_WAITING);
+    report_.set_wait_s(static_cast<double>(options_.interval_s));
+    report_.set_reason(reason);
   }
 
   /// Nothing depends on the report, which an older coordinator does not know.
   void report(const Ask& ask) {
     proto::RequestEnvelope request;
-    wire::write(report_, *request.mutable_factory_report());
+    *request.mutable_factory_report() = report_;
     const std::string reason = ask(request).error().text();
     if (!reason.empty() && reason != refused_because_) {
       log_({.severity = wire::Severity::warning,
@@ -216,7 +218,7 @@ class FactoryLoop {
   FactoryConfig config_;
   const wire::Log& log_;
   FactoryState state_;
-  wire::FactoryReport report_;   ///< After the last look.
+  proto::FactoryReport report_;  ///< After the last look.
   std::string refused_because_;  ///< The last report; empty if it was taken.
 };
 

@@ -164,9 +164,9 @@ class StorageNotes {
   StorageNotes(ProgressDisplay& display, Duration retry_after)
       : display_(display), retry_after_s_(std::chrono::duration<double>(retry_after).count()) {}
 
-  void update(const wire::CampaignStatus& status) {
-    if (status.storage_failure == shown_) return;
-    shown_ = status.storage_failure;
+  void update(const proto::CampaignStatus& status) {
+    if (status.storage_failure() == shown_) return;
+    shown_ = status.storage_failure();
     if (shown_.empty()) return display_.note("proofmass: all results are stored again");
     display_.note("proofmass: error: " + wire::visible_text(shown_), Tone::bad);
     display_.note(fmt::format(
@@ -226,7 +226,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   LocalWorkers workers(service, display, *processes);
   StorageNotes storage(display, config.writer.retry_after);
   const auto show = [&] {
-    const wire::CampaignStatus status = service.campaigns().front();
+    const proto::CampaignStatus status = service.campaigns().front();
     if (!service.is_done()) storage.update(status);  // Otherwise run_campaign() tells why.
     display.update(options.part ? of_part(status, part.count, num_finished_beside)
                                 : out_of(status, num_runs));

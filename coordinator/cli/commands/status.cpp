@@ -8,7 +8,7 @@ namespace {
 
 int show_status(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
-    const wire::StatusReply status = whole_status(ask);
+    const proto::StatusReply status = whole_status(ask);
     if (options.format == OutputFormat::json) {
       print_lines(status_json(status, JsonLayout::indented));
     } else {
@@ -20,7 +20,7 @@ int show_status(const ClientOptions& options) {
 
 int show_workers(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
-    const wire::WorkersReply workers = all_workers(ask);
+    const proto::WorkersReply workers = all_workers(ask);
     if (options.format == OutputFormat::json) {
       print_lines(workers_json(workers));
     } else {

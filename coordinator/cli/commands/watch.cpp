@@ -21,17 +21,18 @@ namespace proofmass::coordinator {
 namespace {
 
 /// Changes when a line about the campaign is worth writing.
-std::string gist_of(const wire::CampaignStatus& campaign) {
+std::string gist_of(const proto::CampaignStatus& campaign) {
   const std::uint64_t tenths =
-      campaign.num_done * 10 / std::max<std::uint64_t>(1, campaign.num_runs);
-  return fmt::format("{} {} {} {} {}", static_cast<int>(campaign.phase), tenths,
-                     campaign.num_given_up, campaign.num_mismatches, campaign.storage_failure);
+      campaign.num_done() * 10 / std::max<std::uint64_t>(1, campaign.num_runs());
+  return fmt::format("{} {} {} {} {}", static_cast<int>(campaign.phase()), tenths,
+                     campaign.num_given_up(), campaign.num_mismatches(),
+                     campaign.storage_failure());
 }
 
 /// Campaigns that are over come last: they are the ones that a small screen leaves out.
-wire::StatusReply with_open_ones_first(wire::StatusReply status) {
-  std::ranges::stable_partition(status.campaigns,
-                                [](const auto& campaign) { return !is_over(campaign); });
+proto::StatusReply with_open_ones_first(proto::StatusReply status) {
+  std::stable_partition(status.mutable_campaigns()->begin(), status.mutable_campaigns()->end(),
+                        [](const auto& campaign) { return !is_over(campaign); });
   return status;
 }
 
@@ -62,7 +63,7 @@ Drawing drawn_over(std::size_t num_lines_before, std::string_view text, std::siz
 
 WatchDisplay::WatchDisplay(WatchMode mode, std::FILE* stream) : mode_(mode), stream_(stream) {}
 
-void WatchDisplay::update(const wire::StatusReply& status) {
+void WatchDisplay::update(const proto::StatusReply& status) {
   switch (mode_) {
     case WatchMode::screen:
       show_screen(status);
@@ -77,7 +78,7 @@ void WatchDisplay::update(const wire::StatusReply& status) {
   std::fflush(stream_);
 }
 
-void WatchDisplay::show_screen(const wire::StatusReply& status) {
+void WatchDisplay::show_screen(const proto::StatusReply& status) {
   TerminalStyle style = style_of(stream_);
   style.cuts_remarks = true;
   const Drawing drawing =
@@ -87,10 +88,10 @@ void WatchDisplay::show_screen(const wire::StatusReply& status) {
   num_lines_drawn_ = drawing.num_lines;
 }
 
-void WatchDisplay::show_lines(const wire::StatusReply& status) {
-  for (const wire::CampaignStatus& campaign : status.campaigns) {
+void WatchDisplay::show_lines(const proto::StatusReply& status) {
+  for (const proto::CampaignStatus& campaign : status.campaigns()) {
     std::string gist = gist_of(campaign);
-    std::string& shown = shown_[campaign.name];
+    std::string& shown = shown_[campaign.name()];
     if (gist == shown) continue;
     shown = std::move(gist);
     fmt::print(stream_, "{}\n", wire::visible_text(campaign_line(campaign)));
@@ -99,18 +100,19 @@ void WatchDisplay::show_lines(const wire::StatusReply& status) {
 
 namespace {
 
-[[noreturn]] void fail_unknown(const wire::StatusReply& status, const std::string& name) {
+[[noreturn]] void fail_unknown(const proto::StatusReply& status, const std::string& name) {
   std::string names;
-  for (const wire::CampaignStatus& campaign : status.campaigns) {
-    names += (names.empty() ? "" : ", ") + campaign.name;
+  for (const proto::CampaignStatus& campaign : status.campaigns()) {
+    names += (names.empty() ? "" : ", ") + campaign.name();
   }
   throw Error(fmt::format("campaign = {} (there is {})", name, names.empty() ? "none" : names));
 }
 
-void keep_only(wire::StatusReply& status, const std::string& name) {
-  const auto is_other = [&](const auto& campaign) { return campaign.name != name; };
-  if (std::ranges::all_of(status.campaigns, is_other)) fail_unknown(status, name);
-  std::erase_if(status.campaigns, is_other);
+void keep_only(proto::StatusReply& status, const std::string& name) {
+  const auto is_other = [&](const auto& campaign) { return campaign.name() != name; };
+  if (std::ranges::all_of(status.campaigns(), is_other)) fail_unknown(status, name);
+  auto& campaigns = *status.mutable_campaigns();
+  campaigns.erase(std::remove_if(campaigns.begin(), campaigns.end(), is_other), campaigns.end());
 }
 
 WatchMode mode_for(OutputFormat format) {
@@ -123,12 +125,12 @@ WatchMode mode_for(OutputFormat format) {
 int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
                      WatchDisplay& display, const std::function<void()>& pause) {
   for (;;) {
-    wire::StatusReply status = whole_status(ask);
+    proto::StatusReply status = whole_status(ask);
     if (campaign) keep_only(status, *campaign);
     display.update(status);
-    if (std::ranges::all_of(status.campaigns, is_over)) {
-      const bool is_in_vain = std::ranges::any_of(status.campaigns, [](const auto& one) {
-        return one.phase == wire::CampaignPhase::cancelled || wire::has_failed(one);
+    if (std::ranges::all_of(status.campaigns(), is_over)) {
+      const bool is_in_vain = std::ranges::any_of(status.campaigns(), [](const auto& one) {
+        return one.phase() == proto::CAMPAIGN_PHASE_CANCELLED || wire::has_failed(one);
       });
       return is_in_vain ? exit_cannot_be_done : exit_done;
     }

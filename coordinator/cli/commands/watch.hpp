@@ -38,11 +38,11 @@ class WatchDisplay {
   /// @param stream  Must outlive this object.
   WatchDisplay(WatchMode mode, std::FILE* stream);
 
-  void update(const wire::StatusReply& status);
+  void update(const proto::StatusReply& status);
 
  private:
-  void show_screen(const wire::StatusReply& status);
-  void show_lines(const wire::StatusReply& status);
+  void show_screen(const proto::StatusReply& status);
+  void show_lines(const proto::StatusReply& status);
 
   WatchMode mode_;
   std::FILE* stream_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "coordinator/store/detail/integrity.hpp"
 #include "core/error.hpp"
@@ -160,6 +162,16 @@ void extend_campaign(Database& database, const Campaign& campaign, std::string_v
       .run(campaign.num_runs, definition);
   fix_num_runs(database);
   write_table_digest(database);
+}
+
+std::uint64_t read_seed(const Database& database) {
+  const std::string digits = database.text("SELECT seed FROM campaign");
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
+  if (error != std::errc() || end != digits.data() + digits.size()) {
+    database.refuse_as_damaged(fmt::format("seed = {}", digits));
+  }
+  return seed;
 }
 
 CampaignControl read_control(const Database& database) {

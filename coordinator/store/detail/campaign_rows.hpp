@@ -31,6 +31,9 @@ void insert_parameters(Database& database, const Campaign& campaign);
 /// @pre It is the stored campaign. @throws StoreError if that has more runs.
 void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition);
 
+/// @throws StoreError if the stored text is not a whole number below 2⁶⁴.
+[[nodiscard]] std::uint64_t read_seed(const Database& database);
+
 /// How the campaign is served: columns of `campaign`.
 [[nodiscard]] CampaignControl read_control(const Database& database);
 void write_control(const Database& database, const CampaignControl& control);

@@ -11,7 +11,7 @@
 #include <limits>
 #include <system_error>
 
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/link/whole_file.hpp"

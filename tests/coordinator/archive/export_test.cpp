@@ -107,15 +107,6 @@ TEST_F(Listing, NamesAFileThatItMayNotRead) {
   }
 }
 
-const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name.db",
-                             .problem = "",
-                             .name = "a campaign with a long name, too",
-                             .seed = 18446744073709551615U,
-                             .num_runs = 1'000'000'000,
-                             .num_finished = 999'999'999,
-                             .phase = wire::CampaignPhase::cancelled,
-                             .created_utc = "2024-02-29T12:00:10Z"};
-
 using ::testing::ThrowsMessage;
 
 std::vector<RunIndex> chosen_runs(const std::vector<RunRange>& runs, double fraction) {

@@ -329,7 +329,7 @@ TEST(LinearRange, HoldsAnyData) {
 }
 
 TEST(LogarithmicRange, HasPowersOfTen) {
-  const Axis axis{.scale = Scale::logarithmic};
+  const ChartAxis axis{.scale = Scale::logarithmic};
   EXPECT_THAT(labels_of(logarithmic_range(axis, 0.1, 1000.0, 8)),
               ElementsAre("0.1", "1", "10", "100", "1000"));
   EXPECT_THAT(labels_of(logarithmic_range(axis, 1e-16, 1e-13, 8)),
@@ -337,13 +337,13 @@ TEST(LogarithmicRange, HasPowersOfTen) {
 }
 
 TEST(LogarithmicRange, LeavesOutPowersWhereTheyAreMany) {
-  const Axis axis{.scale = Scale::logarithmic};
+  const ChartAxis axis{.scale = Scale::logarithmic};
   EXPECT_THAT(labels_of(logarithmic_range(axis, 1e-12, 1.0, 5)),
               ElementsAre("10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1"));
 }
 
 TEST(LogarithmicRange, DividesFewPowersByTwoAndFive) {
-  const Axis axis{.scale = Scale::logarithmic};
+  const ChartAxis axis{.scale = Scale::logarithmic};
   const AxisRange range = logarithmic_range(axis, 130.0, 900.0, 8);
   EXPECT_EQ(range.from, 100.0);
   EXPECT_EQ(range.to, 1000.0);

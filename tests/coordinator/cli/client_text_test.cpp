@@ -9,37 +9,38 @@
 #include <sstream>
 
 #include "core/runs.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-wire::CampaignStatus campaign(const std::string& name, std::uint64_t num_done) {
-  wire::CampaignStatus status;
-  status.name = name;
-  status.num_runs = 100;
-  status.num_done = num_done;
+proto::CampaignStatus campaign(const std::string& name, std::uint64_t num_done) {
+  return test::campaign_status(name, num_done, 100);
+}
+
+proto::StatusReply status_with(const std::vector<proto::CampaignStatus>& campaigns) {
+  proto::StatusReply status = test::status_with(campaigns);
+  status.set_version("0.1.0");
+  status.set_model_version("hardy2013-2");
+  status.set_uptime_s(12000.0);
+  status.set_num_workers(12);
+  status.set_num_slots(48);
   return status;
 }
 
-wire::StatusReply status_with(const std::vector<wire::CampaignStatus>& campaigns) {
-  return {.version = "0.1.0",
-          .model_version = "hardy2013-2",
-          .uptime_s = 12000.0,
-          .num_workers = 12,
-          .num_slots = 48,
-          .campaigns = campaigns};
+void add_unserved(const std::string& file, const std::string& reason, proto::StatusReply& status) {
+  proto::UnservedFile& unserved = *status.add_unserved_files();
+  unserved.set_file(file);
+  unserved.set_reason(reason);
 }
 
-wire::WorkerStatus worker(std::uint64_t id, const std::string& name) {
-  wire::WorkerStatus status;
-  status.id = {id};
-  status.name = name;
-  status.host = fmt::format("n{}", id);
-  status.process_id = 4711;
-  status.num_slots = 4;
-  status.num_lent = 64;
-  status.num_results = 1234;
-  status.silent_s = 2.9;
+proto::WorkerStatus worker(std::uint64_t id, const std::string& name) {
+  proto::WorkerStatus status = test::worker_status(id, name, fmt::format("n{}", id));
+  status.set_process_id(4711);
+  status.set_num_slots(4);
+  status.set_num_lent(64);
+  status.set_num_results(1234);
+  status.set_silent_s(2.9);
   return status;
 }
 
@@ -49,12 +50,12 @@ void expect_width_at_most(const std::string& text, std::size_t width) {
 }
 
 TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
-  wire::StatusReply status = status_with({campaign("a", 1)});
-  status.num_campaigns = 3;
-  status.unserved_files = {{.file = "d/b.db", .reason = "campaign database = d/b.db (is locked)"}};
-  status.num_unserved_files = 2;
-  status.quarantined_hosts = {"n7"};
-  status.num_quarantined_hosts = 1;
+  proto::StatusReply status = status_with({campaign("a", 1)});
+  status.set_num_campaigns(3);
+  add_unserved("d/b.db", "campaign database = d/b.db (is locked)", status);
+  status.set_num_unserved_files(2);
+  status.add_quarantined_hosts("n7");
+  status.set_num_quarantined_hosts(1);
   const std::string text = status_text(status, {.line_width_max = 79});
   EXPECT_TRUE(
       text.ends_with("and 2 more campaigns\n"
@@ -67,9 +68,9 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
 
 // A file that somebody made may have any name of a campaign in it, and the reason may quote it.
 TEST(StatusTable, ShowsAReasonInOneLine) {
-  wire::StatusReply status = status_with({campaign("a", 1)});
-  status.campaigns[0].storage_failure = "full\nb: all is well";
-  status.unserved_files = {{.file = "d/b.db", .reason = "d/b.db: campaign b\nc \x1b[2J"}};
+  proto::StatusReply status = status_with({campaign("a", 1)});
+  status.mutable_campaigns(0)->set_storage_failure("full\nb: all is well");
+  add_unserved("d/b.db", "d/b.db: campaign b\nc \x1b[2J", status);
   const std::string text = status_text(status, {.line_width_max = 79});
   EXPECT_TRUE(
       text.ends_with("a: nothing can be stored: full\\nb: all is well\n"
@@ -77,27 +78,32 @@ TEST(StatusTable, ShowsAReasonInOneLine) {
       << text;
 }
 
-wire::FactoryStatus factory(wire::FactoryPhase phase, double wait_s, const std::string& reason) {
-  return {.report = {.name = "fleet",
-                     .batch_system = "pbs",
-                     .phase = phase,
-                     .num_wanted = 3,
-                     .num_registered = 2,
-                     .num_queued = 1,
-                     .wait_s = wait_s,
-                     .reason = reason,
-                     .interval_s = 30},
-          .owner = "anna",
-          .silent_s = 12.0};
+proto::WorkersReply reply_of(const std::vector<proto::WorkerStatus>& workers) {
+  return test::reply_with(workers).workers();
+}
+
+proto::FactoryStatus factory(proto::FactoryPhase phase, double wait_s, const std::string& reason) {
+  proto::FactoryStatus status;
+  proto::FactoryReport& report = *status.mutable_report();
+  report = test::factory_report("fleet", 30, phase);
+  report.set_num_wanted(3);
+  report.set_num_registered(2);
+  report.set_num_queued(1);
+  report.set_wait_s(wait_s);
+  report.set_reason(reason);
+  status.set_owner("anna");
+  status.set_silent_s(12.0);
+  return status;
 }
 
 TEST(StatusTable, ShowsFactoriesAndWhyTheyDoNotSubmit) {
-  using wire::FactoryPhase;
-  wire::StatusReply status = status_with({});
-  status.factories = {factory(FactoryPhase::active, 0.0, ""),
-                      factory(FactoryPhase::waiting, 60.0, "submission: qsub: queue\nfull"),
-                      factory(FactoryPhase::waiting, 5.0, "late"),
-                      factory(FactoryPhase::paused, 0.0, "3 workers in a row did not start")};
+  proto::StatusReply status = status_with({});
+  *status.add_factories() = factory(proto::FACTORY_PHASE_ACTIVE, 0.0, "");
+  *status.add_factories() =
+      factory(proto::FACTORY_PHASE_WAITING, 60.0, "submission: qsub: queue\nfull");
+  *status.add_factories() = factory(proto::FACTORY_PHASE_WAITING, 5.0, "late");
+  *status.add_factories() =
+      factory(proto::FACTORY_PHASE_PAUSED, 0.0, "3 workers in a row did not start");
   const std::string counts = ": 3 workers wanted, 2 registered, 1 in the queue";
   const std::string text = status_text(status, {.line_width_max = 79});
   EXPECT_TRUE(
@@ -112,17 +118,17 @@ TEST(StatusTable, ShowsFactoriesAndWhyTheyDoNotSubmit) {
 }
 
 TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
-  wire::CampaignStatus first = campaign("hardy2013", 42);
-  first.rate_hz = 12.34;
-  first.remaining_s = 200.0;
-  first.num_lent = 16;
-  wire::CampaignStatus second = campaign("second-order", 97);
-  second.phase = wire::CampaignPhase::paused;
-  second.priority = -5;
-  second.num_given_up = 1;
-  second.num_without_estimate = 2;
-  second.num_audited = 10;
-  second.num_mismatches = 3;
+  proto::CampaignStatus first = campaign("hardy2013", 42);
+  first.set_rate_hz(12.34);
+  first.set_remaining_s(200.0);
+  first.set_num_lent(16);
+  proto::CampaignStatus second = campaign("second-order", 97);
+  second.set_phase(proto::CAMPAIGN_PHASE_PAUSED);
+  second.set_priority(-5);
+  second.set_num_given_up(1);
+  second.set_num_without_estimate(2);
+  second.set_num_audited(10);
+  second.set_num_mismatches(3);
   EXPECT_EQ(status_text(status_with({first, second}), {.line_width_max = 79}),
             R"(Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min
 12 workers with 48 slots, 16 runs lent
@@ -139,7 +145,7 @@ second-order: 10 results compared with a second computation: 3 differ (none may)
 
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
   const std::string name(30, 'x');
-  const wire::StatusReply status = status_with({campaign(name, 1), campaign("b", 1)});
+  const proto::StatusReply status = status_with({campaign(name, 1), campaign("b", 1)});
   const std::string text = status_text(status, {.line_width_max = 200});
   EXPECT_NE(text.find("\n" + name + " active "), std::string::npos) << text;
   EXPECT_NE(text.find("\nb" + std::string(30, ' ') + "active "), std::string::npos) << text;
@@ -149,37 +155,38 @@ TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
 }
 
 TEST(StatusTable, HasAtMost79Columns) {
-  wire::CampaignStatus wide = campaign(std::string(128, 'x'), num_runs_max);
-  wide.phase = wire::CampaignPhase::cancelled;
-  wide.priority = -100;
-  wide.num_runs = num_runs_max;
+  proto::CampaignStatus wide = campaign(std::string(128, 'x'), num_runs_max);
+  wide.set_phase(proto::CAMPAIGN_PHASE_CANCELLED);
+  wide.set_priority(-100);
+  wide.set_num_runs(num_runs_max);
   for (const double number : {1e-12, 1.0, 59.0 * 60.0 + 59.0, 1e300}) {
-    wide.rate_hz = number;
-    wide.remaining_s = number;
-    wire::StatusReply status = status_with({wide});
-    status.version = std::string(128, 'v');
-    status.num_slots = std::numeric_limits<std::uint64_t>::max();
+    wide.set_rate_hz(number);
+    wide.set_remaining_s(number);
+    proto::StatusReply status = status_with({wide});
+    status.set_version(std::string(128, 'v'));
+    status.set_num_slots(std::numeric_limits<std::uint64_t>::max());
     expect_width_at_most(status_text(status, {.line_width_max = 79}), 79);
   }
 }
 
 TEST(StatusTable, CutsNothingInAFile) {
-  wire::StatusReply status = status_with({campaign(std::string(128, 'x'), 1)});
-  status.model_version = std::string(128, 'm');
+  proto::StatusReply status = status_with({campaign(std::string(128, 'x'), 1)});
+  status.set_model_version(std::string(128, 'm'));
   const std::string table = status_text(status, {});
   EXPECT_NE(table.find(std::string(128, 'x') + " "), std::string::npos) << table;
   EXPECT_NE(table.find(std::string(128, 'm') + ","), std::string::npos) << table;
 }
 
 TEST(StatusTable, MarksTroubleAndNothingElse) {
-  wire::CampaignStatus status = campaign("mine", 1);
-  status.storage_failure = "disk full";
-  status.num_given_up = 2;
-  status.num_without_estimate = 3;
-  status.num_audited = status.num_mismatches = 1;
-  wire::StatusReply reply = status_with({status});
-  reply.unserved_files = {{.file = "b.db", .reason = "is damaged"}};
-  reply.quarantined_hosts = {"node7"};
+  proto::CampaignStatus status = campaign("mine", 1);
+  status.set_storage_failure("disk full");
+  status.set_num_given_up(2);
+  status.set_num_without_estimate(3);
+  status.set_num_audited(1);
+  status.set_num_mismatches(1);
+  proto::StatusReply reply = status_with({status});
+  add_unserved("b.db", "is damaged", reply);
+  reply.add_quarantined_hosts("node7");
   const std::string text = status_text(reply, {.paint = Paint::yes});
   const std::string bad = "\033[1;38;5;130m", plain = "\033[0m";
   for (const std::string line :
@@ -194,10 +201,10 @@ TEST(StatusTable, MarksTroubleAndNothingElse) {
 }
 
 TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
-  wire::WorkerStatus second = worker(1234, "local-2");
-  second.silent_s = 3.0 * 3600.0;
-  second.is_quarantined = true;
-  EXPECT_EQ(terminal_text(workers_table({.workers = {worker(7, "local-1"), second}}),
+  proto::WorkerStatus second = worker(1234, "local-2");
+  second.set_silent_s(3.0 * 3600.0);
+  second.set_is_quarantined(true);
+  EXPECT_EQ(terminal_text(workers_table(reply_of({worker(7, "local-1"), second})),
                           {.line_width_max = 79}),
             R"(      id  worker         host               pid slots    lent  results    heard
 ───────────────────────────────────────────────────────────────────────────────
@@ -209,34 +216,36 @@ TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
 
 TEST(WorkersTable, HasAtMost79Columns) {
   constexpr auto most = std::numeric_limits<std::uint64_t>::max();
-  wire::WorkerStatus wide = worker(most, std::string(128, 'x'));
-  wide.host = std::string(128, 'y');
-  wide.process_id = wide.num_slots = wide.num_lent = wide.num_results = most;
-  wide.silent_s = 1e300;
-  expect_width_at_most(terminal_text(workers_table({.workers = {wide}}), {.line_width_max = 79}),
-                       79);
+  proto::WorkerStatus wide = worker(most, std::string(128, 'x'));
+  wide.set_host(std::string(128, 'y'));
+  wide.set_process_id(most);
+  wide.set_num_slots(most);
+  wide.set_num_lent(most);
+  wide.set_num_results(most);
+  wide.set_silent_s(1e300);
+  expect_width_at_most(terminal_text(workers_table(reply_of({wide})), {.line_width_max = 79}), 79);
 }
 
 TEST(CampaignLine, SaysHowFarItIsAndHowFast) {
-  wire::CampaignStatus status = campaign("hardy2013", 42);
+  proto::CampaignStatus status = campaign("hardy2013", 42);
   EXPECT_EQ(campaign_line(status), "hardy2013 active: 42 of 100 runs, 42 %");
-  status.rate_hz = 0.5;
-  status.remaining_s = 116.0;
+  status.set_rate_hz(0.5);
+  status.set_remaining_s(116.0);
   EXPECT_EQ(campaign_line(status),
             "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left");
-  status.num_audited = 1;
-  status.num_given_up = 2;
+  status.set_num_audited(1);
+  status.set_num_given_up(2);
   EXPECT_EQ(campaign_line(status),
             "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left; 2 runs given "
             "up: too many workers crashed; 1 result compared with a second computation: all equal");
 }
 
 TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
-  wire::CampaignStatus status = campaign("a", 40);
-  status.phase = wire::CampaignPhase::finished;
-  status.num_given_up = 50;
+  proto::CampaignStatus status = campaign("a", 40);
+  status.set_phase(proto::CAMPAIGN_PHASE_FINISHED);
+  status.set_num_given_up(50);
   EXPECT_TRUE(campaign_line(status).starts_with("a finished: 40 of 100 runs"));
-  status.num_given_up = 51;
+  status.set_num_given_up(51);
   EXPECT_TRUE(campaign_line(status).starts_with("a failed: 40 of 100 runs"));
 }
 
@@ -246,44 +255,32 @@ namespace {
 
 using Json = nlohmann::json;
 
-wire::StatusReply some_status() {
-  wire::StatusReply status{.version = "0.1.0",
-                           .model_version = "m-2",
-                           .uptime_s = 1.5,
-                           .num_workers = 2,
-                           .num_slots = 3,
-                           .campaigns = {}};
-  status.campaigns.push_back({.name = "a",
-                              .phase = wire::CampaignPhase::paused,
-                              .priority = -1,
-                              .num_runs = 100,
-                              .num_done = 11,
-                              .num_without_estimate = 2,
-                              .num_given_up = 3,
-                              .num_lent = 4,
-                              .num_duplicates = 5,
-                              .num_audited = 6,
-                              .num_mismatches = 7,
-                              .rate_hz = 0.5,
-                              .remaining_s = 2.5,
-                              .storage_failure = "disk full",
-                              .owner = "anna"});
-  status.num_campaigns = 1;
-  status.unserved_files = {{.file = "d/a.db", .reason = "is locked"}};
-  status.num_unserved_files = 2;
-  status.quarantined_hosts = {"n7"};
-  status.num_quarantined_hosts = 1;
-  status.factories = {{.report = {.name = "fleet",
-                                  .batch_system = "pbs",
-                                  .phase = wire::FactoryPhase::waiting,
-                                  .num_wanted = 3,
-                                  .num_registered = 2,
-                                  .num_queued = 1,
-                                  .wait_s = 60.5,
-                                  .reason = "qsub: queue full",
-                                  .interval_s = 30},
-                       .owner = "anna",
-                       .silent_s = 1.5}};
+proto::StatusReply some_status() {
+  proto::CampaignStatus campaign =
+      test::campaign_status("a", 11, 100, proto::CAMPAIGN_PHASE_PAUSED);
+  campaign.set_priority(-1);
+  campaign.set_num_without_estimate(2);
+  campaign.set_num_given_up(3);
+  campaign.set_num_lent(4);
+  campaign.set_num_duplicates(5);
+  campaign.set_num_audited(6);
+  campaign.set_num_mismatches(7);
+  campaign.set_rate_hz(0.5);
+  campaign.set_remaining_s(2.5);
+  campaign.set_storage_failure("disk full");
+  campaign.set_owner("anna");
+  proto::StatusReply status = test::status_with({campaign});
+  status.set_version("0.1.0");
+  status.set_model_version("m-2");
+  status.set_uptime_s(1.5);
+  status.set_num_workers(2);
+  status.set_num_slots(3);
+  status.set_num_campaigns(1);
+  add_unserved("d/a.db", "is locked", status);
+  status.set_num_unserved_files(2);
+  status.add_quarantined_hosts("n7");
+  status.set_num_quarantined_hosts(1);
+  *status.add_factories() = factory(proto::FACTORY_PHASE_WAITING, 60.5, "qsub: queue full");
   return status;
 }
 
@@ -323,17 +320,18 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"wait_s", 60.5},
                          {"reason", "qsub: queue full"},
                          {"interval_s", 30},
-                         {"silent_s", 1.5},
+                         {"silent_s", 12.0},
                          {"owner", "anna"}}}}};
   EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::indented)), expected);
   EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::one_line)), expected);
 }
 
 TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
-  wire::StatusReply status = some_status();
-  status.campaigns[0].remaining_s.reset();
-  status.campaigns[0].storage_failure.clear();
-  status.factories = {{.report = {.name = "fleet", .batch_system = "pbs"}}};
+  proto::StatusReply status = some_status();
+  status.mutable_campaigns(0)->clear_remaining_s();
+  status.mutable_campaigns(0)->clear_storage_failure();
+  status.clear_factories();
+  *status.add_factories()->mutable_report() = test::factory_report("fleet", 30);
   const Json json = Json::parse(status_json(status, JsonLayout::indented));
   EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
@@ -354,26 +352,19 @@ TEST(StatusJson, MayStandOnOneLine) {
 }
 
 TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
-  const wire::WorkersReply reply{.workers = {{.id = {3},
-                                              .name = "w",
-                                              .host = "h",
-                                              .process_id = 4,
-                                              .num_slots = 5,
-                                              .num_lent = 6,
-                                              .num_results = 7,
-                                              .silent_s = 0.5,
-                                              .is_quarantined = true}}};
+  proto::WorkerStatus one = worker(3, "w");
+  one.set_is_quarantined(true);
   const Json expected{{"workers",
                        {{{"worker_id", 3},
                          {"name", "w"},
-                         {"host", "h"},
-                         {"process_id", 4},
-                         {"num_slots", 5},
-                         {"num_lent", 6},
-                         {"num_results", 7},
-                         {"silent_s", 0.5},
+                         {"host", "n3"},
+                         {"process_id", 4711},
+                         {"num_slots", 4},
+                         {"num_lent", 64},
+                         {"num_results", 1234},
+                         {"silent_s", 2.9},
                          {"is_quarantined", true}}}}};
-  EXPECT_EQ(Json::parse(workers_json(reply)), expected);
+  EXPECT_EQ(Json::parse(workers_json(reply_of({one}))), expected);
   EXPECT_TRUE(Json::parse(workers_json({}))["workers"].is_array());
 }
 

@@ -47,9 +47,9 @@ class CampaignFolderTest : public testing::Test {
     const CoordinatorStart start{.epoch = {7}, .host = "h", .version = "0"};
     for (const FileLook& look : look_at_all(folder, known, start)) {
       if (look.store) {
-        names.push_back(look.record.status.name);
+        names.push_back(look.record.status.name());
       } else {
-        warnings.push_back(look.failure);
+        warnings.push_back(look.record.problem);
       }
     }
     return names;

@@ -26,18 +26,13 @@ int exit_code_of_factory(const std::string& endpoint) {
   return chosen();
 }
 
-wire::StatusReply status_with(wire::CampaignPhase phase) {
-  wire::CampaignStatus campaign;
-  campaign.name = "a";
-  campaign.phase = phase;
-  campaign.num_runs = 1;
-  return {.version = "0", .model_version = "m", .campaigns = {campaign}, .num_campaigns = 1};
-}
-
 /// Answers one look as a coordinator does that does not know reports.
-void answer_look(test::PlayedCoordinator& coordinator, wire::CampaignPhase phase) {
-  coordinator.answer(coordinator.receive().request_id(), test::reply_with(status_with(phase)));
-  coordinator.answer(coordinator.receive().request_id(), test::reply_with(wire::WorkersReply{}));
+void answer_look(test::PlayedCoordinator& coordinator, proto::CampaignPhase phase) {
+  coordinator.answer(
+      coordinator.receive().request_id(),
+      test::reply_with(test::status_with({test::campaign_status("a", 0, 1, phase)})));
+  coordinator.answer(coordinator.receive().request_id(),
+                     test::reply_with(std::vector<proto::WorkerStatus>{}));
   EXPECT_TRUE(coordinator.receive().has_factory_report());
   coordinator.answer(0, wire::error_reply("request = none (must be of a known kind)"));
 }
@@ -48,9 +43,9 @@ TEST(FactoryLoop, GoesOnWithACoordinatorThatDoesNotKnowReports) {
   testing::internal::CaptureStderr();
   auto exit_code =
       std::async(std::launch::async, [&] { return exit_code_of_factory(endpoint.address()); });
-  answer_look(coordinator, wire::CampaignPhase::paused);
-  answer_look(coordinator, wire::CampaignPhase::paused);
-  answer_look(coordinator, wire::CampaignPhase::finished);
+  answer_look(coordinator, proto::CAMPAIGN_PHASE_PAUSED);
+  answer_look(coordinator, proto::CAMPAIGN_PHASE_PAUSED);
+  answer_look(coordinator, proto::CAMPAIGN_PHASE_FINISHED);
   EXPECT_EQ(exit_code.get(), exit_done);
   const std::string log = testing::internal::GetCapturedStderr();
   EXPECT_THAT(log, HasSubstr("report_refused reason=\"request = none (must be of a known kind)\""));

@@ -8,12 +8,12 @@ namespace {
 
 using test::output_of;
 
-wire::CampaignStatus progress(std::uint64_t num_done, std::uint64_t num_runs, double rate_hz) {
-  wire::CampaignStatus status;
-  status.num_done = num_done;
-  status.num_runs = num_runs;
-  status.rate_hz = rate_hz;
-  if (rate_hz > 0.0) status.remaining_s = static_cast<double>(num_runs - num_done) / rate_hz;
+proto::CampaignStatus progress(std::uint64_t num_done, std::uint64_t num_runs, double rate_hz) {
+  proto::CampaignStatus status;
+  status.set_num_done(num_done);
+  status.set_num_runs(num_runs);
+  status.set_rate_hz(rate_hz);
+  if (rate_hz > 0.0) status.set_remaining_s(static_cast<double>(num_runs - num_done) / rate_hz);
   return status;
 }
 
@@ -34,11 +34,11 @@ TEST(ProgressBar, ShowsRunsPercentRateAndTimeLeft) {
 }
 
 TEST(ProgressBar, SaysThatTheFirstRunsAreComputed) {
-  wire::CampaignStatus status = progress(0, 100, 0.0);
-  status.num_lent = 32;
+  proto::CampaignStatus status = progress(0, 100, 0.0);
+  status.set_num_lent(32);
   EXPECT_EQ(progress_bar(status, 60),
             "0/100 runs [.................]   0 %  computing the first 32");
-  status.num_done = 16;
+  status.set_num_done(16);
   EXPECT_EQ(progress_line(status), "16/100 runs   16 %");
 }
 
@@ -79,8 +79,8 @@ TEST(ProgressDisplay, WritesALineEveryTenPercent) {
 }
 
 TEST(ProgressDisplay, ShowsThatNothingCanBeStored) {
-  wire::CampaignStatus failing = progress(42, 100, 0.5);
-  failing.storage_failure = "campaign database = a.db (the disk is full)";
+  proto::CampaignStatus failing = progress(42, 100, 0.5);
+  failing.set_storage_failure("campaign database = a.db (the disk is full)");
   EXPECT_EQ(progress_bar(failing, 73),
             "42/100 runs [############..................]  42 %  nothing can be stored");
   const std::string text =

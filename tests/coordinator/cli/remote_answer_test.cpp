@@ -166,7 +166,7 @@ TEST_F(Answering, LeavesTheServiceToOthers) {
   start_with("exec sleep 1000");
   client->send(1, question());
   test::PlayingClient other(service->clients_endpoint());
-  EXPECT_EQ(other.status().campaigns.at(0).name, "a");
+  EXPECT_EQ(other.status().campaigns(0).name(), "a");
 }
 
 TEST_F(Answering, KeepsNoMoreAnswersThanItMay) {

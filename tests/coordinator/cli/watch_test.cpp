@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "coordinator/cli/program.hpp"
+#include "proto/wire/names.hpp"
 #include "tests/coordinator/cli/display_output.hpp"
 #include "tests/proto/wire/requests.hpp"
 
@@ -20,17 +21,8 @@ namespace {
 
 using test::output_of;
 
-wire::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
-  wire::CampaignStatus campaign;
-  campaign.name = name;
-  campaign.num_runs = 100;
-  campaign.num_done = num_done;
-  return {.version = "v",
-          .model_version = "m",
-          .uptime_s = 1.0,
-          .num_workers = 1,
-          .num_slots = 1,
-          .campaigns = {campaign}};
+proto::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
+  return test::status_with({test::campaign_status(name, num_done, 100)});
 }
 
 TEST(Drawing, TakesThePlaceOfTheOneBefore) {
@@ -68,9 +60,9 @@ TEST(LineWidth, HasNoLimitWhereThereIsNoTerminal) {
 
 // A small screen leaves out the last lines.
 TEST(WatchDisplay, ShowsCampaignsThatAreOverLast) {
-  wire::StatusReply status = status_of("over", 100);
-  status.campaigns[0].phase = wire::CampaignPhase::finished;
-  status.campaigns.push_back(status_of("open", 1).campaigns[0]);
+  proto::StatusReply status = status_of("over", 100);
+  status.mutable_campaigns(0)->set_phase(proto::CAMPAIGN_PHASE_FINISHED);
+  *status.add_campaigns() = test::campaign_status("open", 1, 100);
   const std::string text = output_of<WatchDisplay>(
       WatchMode::screen, [&](WatchDisplay& display) { display.update(status); });
   EXPECT_LT(text.find("\nopen"), text.find("\nover"));
@@ -89,15 +81,15 @@ TEST(WatchDisplay, WritesALineEveryTenPercent) {
 
 TEST(WatchDisplay, WritesALineWhenSomethingHappens) {
   const std::string text = output_of<WatchDisplay>(WatchMode::lines, [](WatchDisplay& display) {
-    wire::StatusReply status = status_of("a", 1);
+    proto::StatusReply status = status_of("a", 1);
     for (int i = 0; i < 2; ++i) display.update(status);
-    status.campaigns[0].phase = wire::CampaignPhase::paused;
+    status.mutable_campaigns(0)->set_phase(proto::CAMPAIGN_PHASE_PAUSED);
     for (int i = 0; i < 2; ++i) display.update(status);
-    status.campaigns[0].num_given_up = 1;
+    status.mutable_campaigns(0)->set_num_given_up(1);
     for (int i = 0; i < 2; ++i) display.update(status);
-    status.campaigns[0].num_mismatches = 1;
+    status.mutable_campaigns(0)->set_num_mismatches(1);
     for (int i = 0; i < 2; ++i) display.update(status);
-    status.campaigns[0].storage_failure = "disk full";
+    status.mutable_campaigns(0)->set_storage_failure("disk full");
     for (int i = 0; i < 2; ++i) display.update(status);
   });
   EXPECT_EQ(std::ranges::count(text, '\n'), 5);
@@ -105,8 +97,8 @@ TEST(WatchDisplay, WritesALineWhenSomethingHappens) {
 
 TEST(WatchDisplay, KeepsCampaignsApart) {
   const std::string text = output_of<WatchDisplay>(WatchMode::lines, [](WatchDisplay& display) {
-    wire::StatusReply status = status_of("a", 1);
-    status.campaigns.push_back(status_of("b", 2).campaigns[0]);
+    proto::StatusReply status = status_of("a", 1);
+    *status.add_campaigns() = test::campaign_status("b", 2, 100);
     for (int i = 0; i < 3; ++i) display.update(status);
   });
   EXPECT_EQ(text, "a active: 1 of 100 runs, 1 %\nb active: 2 of 100 runs, 2 %\n");
@@ -135,15 +127,11 @@ using wire::CampaignPhase;
 
 proto::ReplyEnvelope status_reply(
     const std::vector<std::pair<std::string, CampaignPhase>>& campaigns) {
-  wire::StatusReply status{.version = "v", .model_version = "m", .campaigns = {}};
+  std::vector<proto::CampaignStatus> statuses;
   for (const auto& [name, phase] : campaigns) {
-    wire::CampaignStatus campaign;
-    campaign.name = name;
-    campaign.phase = phase;
-    campaign.num_runs = 10;
-    status.campaigns.push_back(campaign);
+    statuses.push_back(test::campaign_status(name, 0, 10, wire::message_value(phase)));
   }
-  return test::reply_with(status);
+  return test::reply_with(test::status_with(statuses));
 }
 
 /// How a watch went whose questions are answered with the replies, one after the other.

@@ -223,32 +223,32 @@ TEST_F(FactoryTest, ReportsHowManyWorkersItWantsAndHas) {
   enter("1");
   view_.workers.insert("stranger");
   (void)look();
-  const wire::FactoryReport report = report_of(state_, config_, view_, now_);
-  EXPECT_EQ(report.name, "proofmass");
-  EXPECT_EQ(report.phase, wire::FactoryPhase::active);
-  EXPECT_EQ(report.num_wanted, 3u);
-  EXPECT_EQ(report.num_registered, 1u);
-  EXPECT_EQ(report.num_queued, 1u);
-  EXPECT_EQ(report.reason, "");
+  const proto::FactoryReport report = report_of(state_, config_, view_, now_);
+  EXPECT_EQ(report.name(), "proofmass");
+  EXPECT_EQ(report.phase(), proto::FACTORY_PHASE_ACTIVE);
+  EXPECT_EQ(report.num_wanted(), 3u);
+  EXPECT_EQ(report.num_registered(), 1u);
+  EXPECT_EQ(report.num_queued(), 1u);
+  EXPECT_EQ(report.reason(), "");
 }
 
 TEST_F(FactoryTest, ReportsWhyAndHowLongItWaits) {
   fail_submission();
   now_ += seconds(20);
-  const wire::FactoryReport report = report_of(state_, config_, view_, now_);
-  EXPECT_EQ(report.phase, wire::FactoryPhase::waiting);
-  EXPECT_EQ(report.wait_s, 40.0);
-  EXPECT_EQ(report.reason, "submission: sbatch: no such partition");
+  const proto::FactoryReport report = report_of(state_, config_, view_, now_);
+  EXPECT_EQ(report.phase(), proto::FACTORY_PHASE_WAITING);
+  EXPECT_EQ(report.wait_s(), 40.0);
+  EXPECT_EQ(report.reason(), "submission: sbatch: no such partition");
   now_ += seconds(40);
-  EXPECT_EQ(report_of(state_, config_, view_, now_).phase, wire::FactoryPhase::active);
+  EXPECT_EQ(report_of(state_, config_, view_, now_).phase(), proto::FACTORY_PHASE_ACTIVE);
 }
 
 TEST_F(FactoryTest, ReportsWhyItIsPaused) {
   for (int i = 0; i < 10; ++i) fail_submission();
-  const wire::FactoryReport report = report_of(state_, config_, view_, now_);
-  EXPECT_EQ(report.phase, wire::FactoryPhase::paused);
-  EXPECT_EQ(report.wait_s, 0.0);
-  EXPECT_EQ(report.reason, *reason_to_pause(state_));
+  const proto::FactoryReport report = report_of(state_, config_, view_, now_);
+  EXPECT_EQ(report.phase(), proto::FACTORY_PHASE_PAUSED);
+  EXPECT_EQ(report.wait_s(), 0.0);
+  EXPECT_EQ(report.reason(), *reason_to_pause(state_));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "tests/proto/wire/requests.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
@@ -12,14 +13,14 @@ using std::chrono::seconds;
 
 constexpr TimePoint begin{};
 
-wire::FactoryReport report_of(const std::string& name, std::uint64_t interval_s = 10) {
-  return {.name = name, .batch_system = "pbs", .interval_s = interval_s};
+proto::FactoryReport report_of(const std::string& name, std::uint64_t interval_s = 10) {
+  return test::factory_report(name, interval_s);
 }
 
 std::vector<std::string> names(const FactoryReports& reports, TimePoint now) {
   std::vector<std::string> found;
-  for (const wire::FactoryStatus& factory : reports.current(now)) {
-    found.push_back(factory.report.name + " of " + factory.owner);
+  for (const proto::FactoryStatus& factory : reports.current(now)) {
+    found.push_back(factory.report().name() + " of " + factory.owner());
   }
   return found;
 }
@@ -29,14 +30,14 @@ TEST(FactoryReports, KeepTheLastOfEachNameAndOwner) {
   reports.take(report_of("b"), "anna", begin);
   reports.take(report_of("a"), "anna", begin);
   reports.take(report_of("b"), "ben", begin);
-  wire::FactoryReport later = report_of("b");
-  later.num_wanted = 7;
+  proto::FactoryReport later = report_of("b");
+  later.set_num_wanted(7);
   reports.take(later, "anna", begin + seconds(5));
   const TimePoint now = begin + seconds(6);
   EXPECT_THAT(names(reports, now), ElementsAre("a of anna", "b of anna", "b of ben"));
-  EXPECT_EQ(reports.current(now)[1].report.num_wanted, 7U);
-  EXPECT_EQ(reports.current(now)[1].silent_s, 1.0);
-  EXPECT_EQ(reports.current(now)[2].silent_s, 6.0);
+  EXPECT_EQ(reports.current(now)[1].report().num_wanted(), 7U);
+  EXPECT_EQ(reports.current(now)[1].silent_s(), 1.0);
+  EXPECT_EQ(reports.current(now)[2].silent_s(), 6.0);
 }
 
 TEST(FactoryReports, AreForgottenAfterThreeIntervalsOfTheirOwn) {

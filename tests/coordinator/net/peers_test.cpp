@@ -177,13 +177,15 @@ TEST(ServerPaths, LeaveOtherPathsAsTheyAre) {
 
 TEST(ServerPaths, AreInNoReply) {
   const ServerPaths paths("served");
-  wire::StatusReply shown;
-  shown.campaigns.emplace_back().storage_failure = "file = served/a.db (full)";
-  shown.unserved_files = {{.file = "served/b.db", .reason = "file = served/b.db (locked)"}};
-  paths.hide_in(shown);
-  EXPECT_EQ(shown.campaigns[0].storage_failure, "file = a.db (full)");
-  EXPECT_EQ(shown.unserved_files[0].file, "b.db");
-  EXPECT_EQ(shown.unserved_files[0].reason, "file = b.db (locked)");
+  proto::ReplyEnvelope reply;
+  proto::StatusReply& shown = *reply.mutable_status();
+  shown.add_campaigns()->set_storage_failure("file = served/a.db (full)");
+  shown.add_unserved_files()->set_file("served/b.db");
+  shown.mutable_unserved_files(0)->set_reason("file = served/b.db (locked)");
+  paths.hide_in(reply);
+  EXPECT_EQ(shown.campaigns(0).storage_failure(), "file = a.db (full)");
+  EXPECT_EQ(shown.unserved_files(0).file(), "b.db");
+  EXPECT_EQ(shown.unserved_files(0).reason(), "file = b.db (locked)");
   proto::ReplyEnvelope error = wire::error_reply("file = served/b.db (locked)");
   paths.hide_in(error);
   EXPECT_EQ(error.error().text(), "file = b.db (locked)");

@@ -75,12 +75,12 @@ class PlayingClient {
     EXPECT_TRUE(reply.has_error());
     return reply.error().text();
   }
-  wire::StatusReply status(std::uint64_t first_campaign = 0) {
+  proto::StatusReply status(std::uint64_t first_campaign = 0) {
     proto::RequestEnvelope request;
     request.mutable_status()->set_first_campaign(first_campaign);
     const proto::ReplyEnvelope reply = ask(request);
     EXPECT_TRUE(reply.has_status());
-    return wire::read(reply.status());
+    return reply.status();
   }
 
  private:

@@ -46,8 +46,9 @@ TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
                 .audit_fraction = 0.25,
                 .stop_rule = "mean(k2c) within 5%",
                 .failures_max = 7});
-  EXPECT_EQ(client->status().campaigns[0].priority, -2);
-  EXPECT_EQ(client->status().campaigns[0].num_runs, 128U);  // The first at which rules are checked.
+  EXPECT_EQ(client->status().campaigns(0).priority(), -2);
+  EXPECT_EQ(client->status().campaigns(0).num_runs(),
+            128U);  // The first at which rules are checked.
   end(StopRequest::now);
   const Store store = Store::open_read_only(directory / "a.db");
   EXPECT_EQ(store.control().priority, -2);
@@ -61,8 +62,8 @@ TEST_F(ServiceClients, ExtendACampaignThatKeepsItsPriority) {
   start_with({});
   (void)submit("a", 3, {.priority = 7, .audit_fraction = 0.5});
   (void)submit("a", 5);
-  EXPECT_EQ(client->status().campaigns[0].num_runs, 5U);
-  EXPECT_EQ(client->status().campaigns[0].priority, 7);
+  EXPECT_EQ(client->status().campaigns(0).num_runs(), 5U);
+  EXPECT_EQ(client->status().campaigns(0).priority(), 7);
   end(StopRequest::now);
   const Store store = Store::open_read_only(directory / "a.db");
   EXPECT_EQ(store.control().priority, 7);
@@ -81,7 +82,7 @@ TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
   EXPECT_EQ(control(ControlAction::retry), "campaign a: active, 1 runs, 0 of them done");
   EXPECT_EQ(client->error(test::control(ControlAction::retry, "a")),
             "campaign = a (has no run that was given up)");
-  EXPECT_EQ(client->status().campaigns[0].num_given_up, 0U);
+  EXPECT_EQ(client->status().campaigns(0).num_given_up(), 0U);
   end(StopRequest::now);
   EXPECT_THAT(Store::open_read_only(directory / "a.db").given_up_runs(), ElementsAre());
 }
@@ -154,7 +155,7 @@ TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
   (void)control(ControlAction::pause);
   end(StopRequest::now);
   start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::paused);
+  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_PAUSED);
 }
 
 /// A submission of so many runs with a table, as bytes.
@@ -196,7 +197,7 @@ TEST_F(ServiceClients, SubmitLargeCampaignsInParts) {
     EXPECT_EQ(reply.request_id(), 7U);
     EXPECT_TRUE(reply.has_done());
   }
-  EXPECT_EQ(client->status().campaigns.size(), 2U);
+  EXPECT_EQ(client->status().campaigns_size(), 2);
 }
 
 TEST_F(ServiceClients, GetOneCampaignForASubmissionThatTheyRepeat) {
@@ -282,11 +283,11 @@ TEST_F(ServiceClients, SeeAllCampaignsInPages) {
     campaigns.push_back(test::campaign_of("c" + std::to_string(i), 1));
   }
   start_with(campaigns);
-  const wire::StatusReply page = client->status(1);
-  EXPECT_EQ(page.num_campaigns, 3U);
-  ASSERT_EQ(page.campaigns.size(), 2U);
-  EXPECT_EQ(page.campaigns[0].name, "c1");
-  EXPECT_TRUE(client->status(~std::uint64_t{0}).campaigns.empty());
+  const proto::StatusReply page = client->status(1);
+  EXPECT_EQ(page.num_campaigns(), 3U);
+  ASSERT_EQ(page.campaigns_size(), 2);
+  EXPECT_EQ(page.campaigns(0).name(), "c1");
+  EXPECT_TRUE(client->status(~std::uint64_t{0}).campaigns().empty());
 }
 
 TEST_F(ServiceClients, GetAnErrorForWhatIsNoRequest) {
@@ -317,12 +318,12 @@ TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
 TEST_F(ServiceClients, AreToldTheEndByAServiceThatEndsWhenAllIsDone) {
   config.end = ServiceEnd::when_done;
   start_with({test::campaign_of("a", 1)});
-  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::active);
+  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_ACTIVE);
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
   (void)worker.receive<proto::ResultAck>();
   (void)wait_for_event("campaign_summarised");
-  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
+  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_FINISHED);
   wait_for_end();
 }
 

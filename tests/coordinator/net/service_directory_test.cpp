@@ -2,7 +2,7 @@
 
 #include <sqlite3.h>
 
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"
@@ -65,7 +65,8 @@ class ServiceWithADirectory : public test::ServiceTest {
 
   std::vector<std::string> served() {
     std::vector<std::string> names;
-    for (const auto& campaign : client->status().campaigns) names.push_back(campaign.name);
+    const proto::StatusReply status = client->status();
+    for (const auto& campaign : status.campaigns()) names.push_back(campaign.name());
     return names;
   }
 
@@ -92,7 +93,7 @@ TEST_F(ServiceWithADirectory, ServesAFileWhoseLogWasFoldedInHalfway) {
   write_bytes(file, after.substr(0, first_page_size) + before.substr(first_page_size));
   write_bytes(directory / "a.db-wal", log);
   start_service();
-  EXPECT_THAT(client->status().unserved_files, IsEmpty());
+  EXPECT_THAT(client->status().unserved_files(), IsEmpty());
   EXPECT_THAT(served(), ElementsAre("a"));
 }
 
@@ -106,7 +107,7 @@ TEST_F(ServiceWithADirectory, ServesTheOthersWhateverAFileThrows) {
   });
   start_service();
   EXPECT_THAT(served(), ElementsAre("c"));
-  EXPECT_EQ(client->status().num_unserved_files, 2U);
+  EXPECT_EQ(client->status().num_unserved_files(), 2U);
 }
 
 TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
@@ -121,8 +122,8 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
     worker.send(test::make_bye());
     wait_for_event("worker_left");
   }
-  EXPECT_EQ(client->status().campaigns.at(0).phase, wire::CampaignPhase::finished);
-  EXPECT_EQ(client->status().campaigns.at(0).num_done, 1U);
+  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_FINISHED);
+  EXPECT_EQ(client->status().campaigns(0).num_done(), 1U);
   EXPECT_EQ(client->error(test::control(wire::ControlAction::pause, "a")),
             "campaign = a (is finished)");
   EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
@@ -255,7 +256,7 @@ TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
             "campaign a: cancelled, 2 runs, 0 of them done");
   EXPECT_EQ(client->done(test::control(wire::ControlAction::resume, "a")),
             "campaign a: active, 2 runs, 0 of them done");
-  EXPECT_EQ(client->status().campaigns.at(0).priority, 4);
+  EXPECT_EQ(client->status().campaigns(0).priority(), 4);
   PlayingWorker worker(endpoint.address());
   EXPECT_EQ(worker.borrow(1).first_run(), 0U);
 }
@@ -324,10 +325,10 @@ TEST_F(ServiceWithADirectory, ShowsTheOthersBesideACampaignWhoseNamesBreakTheRul
   make_file("good");
   start_service();
   EXPECT_THAT(served(), ElementsAre("good"));
-  const wire::StatusReply status = client->status();
-  ASSERT_EQ(status.unserved_files.size(), 8U);
-  for (const wire::UnservedFile& file : status.unserved_files) {
-    EXPECT_THAT(file.reason, testing::HasSubstr("its name, owner or priority breaks the rules"));
+  const proto::StatusReply status = client->status();
+  ASSERT_EQ(status.unserved_files_size(), 8);
+  for (const proto::UnservedFile& file : status.unserved_files()) {
+    EXPECT_THAT(file.reason(), testing::HasSubstr("its name, owner or priority breaks the rules"));
   }
 }
 

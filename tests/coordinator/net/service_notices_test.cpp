@@ -33,10 +33,9 @@ class ServiceNotices : public test::ServiceTest {
 
   void expect_failure(const std::string& reason) {
     const CampaignNotice notice = first_notice();
-    EXPECT_EQ(notice.kind, CampaignNotice::Kind::failed);
     EXPECT_EQ(notice.campaign, "a");
     EXPECT_EQ(notice.file, directory / "a.db");
-    EXPECT_THAT(notice.reason, HasSubstr(reason));
+    EXPECT_THAT(notice.failure, HasSubstr(reason));
   }
 
  private:

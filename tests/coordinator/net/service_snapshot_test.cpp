@@ -43,8 +43,8 @@ TEST_F(ServiceSnapshotTest, TellsWhatEachWorkerDoes) {
   EXPECT_EQ(snapshot.workers[1].activity, WorkerActivity::computing);
   EXPECT_EQ(snapshot.workers[2].activity, WorkerActivity::silent);
   EXPECT_EQ(snapshot.workers[3].activity, WorkerActivity::quarantined);
-  EXPECT_EQ(snapshot.workers[1].status.name, "w2");
-  EXPECT_EQ(snapshot.workers[1].status.num_lent, 5U);
+  EXPECT_EQ(snapshot.workers[1].status.name(), "w2");
+  EXPECT_EQ(snapshot.workers[1].status.num_lent(), 5U);
   EXPECT_EQ(snapshot.workers[1].registered_s, 100.0);
 }
 

@@ -1,6 +1,7 @@
 // Campaigns that end before all of their runs are finished, over real sockets.
 
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 #include "tests/test.hpp"
 
@@ -41,7 +42,7 @@ TEST_F(ServiceStop, IsNotFinishedWhileTheRuleIsChecked) {
   CampaignPhase phase = CampaignPhase::finished;
   in_service([&] {
     is_done = service->is_done();
-    phase = service->campaigns().front().phase;
+    phase = wire::phase_of(service->campaigns().front());
   });
   EXPECT_FALSE(is_done);
   EXPECT_EQ(phase, CampaignPhase::active);
@@ -127,7 +128,7 @@ TEST_F(ServiceStop, DoesNotCheckARuleAgainThatItsPredecessorDid) {
   end(StopRequest::now);
   start({test::campaign_of("a", 1)});
   CampaignPhase phase = CampaignPhase::active;
-  in_service([&] { phase = service->campaigns().front().phase; });
+  in_service([&] { phase = wire::phase_of(service->campaigns().front()); });
   EXPECT_EQ(phase, CampaignPhase::finished);
   end(StopRequest::now);
   EXPECT_EQ(num_events("campaign_summarised"), 1);

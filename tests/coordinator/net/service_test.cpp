@@ -60,7 +60,7 @@ TEST_F(ServiceWorkers, KeepTheirRunsOnANewConnection) {
   EXPECT_TRUE(worker.is_lent_nothing({PlayingWorker::held(lease)}));
   worker.deliver(lease);
   EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
-  in_service([&] { EXPECT_EQ(service->campaigns().front().num_duplicates, 0U); });
+  in_service([&] { EXPECT_EQ(service->campaigns().front().num_duplicates(), 0U); });
 }
 
 TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
@@ -106,7 +106,7 @@ TEST_F(ServiceWorkers, AreNotLentRunsThatWereGivenUp) {
   start({test::campaign_of("a", 1)});
   in_service([&] {
     EXPECT_TRUE(service->is_done());
-    EXPECT_EQ(service->campaigns().front().num_given_up, 1U);
+    EXPECT_EQ(service->campaigns().front().num_given_up(), 1U);
   });
 }
 
@@ -123,13 +123,13 @@ TEST_F(ServiceStorage, FailsAndRecovers) {
     worker.deliver(lease);
     (void)wait_for_event("storage_failed");
     in_service([&] {
-      EXPECT_THAT(service->campaigns().front().storage_failure, HasSubstr("a.db"));
-      EXPECT_EQ(service->campaigns().front().num_done, 0U);
+      EXPECT_THAT(service->campaigns().front().storage_failure(), HasSubstr("a.db"));
+      EXPECT_EQ(service->campaigns().front().num_done(), 0U);
     });
   }
   EXPECT_THAT(wire::runs_of(worker.receive<proto::ResultAck>()), ElementsAre(RunIndex{0}));
   (void)wait_for_event("storage_recovered");
-  in_service([&] { EXPECT_EQ(service->campaigns().front().storage_failure, ""); });
+  in_service([&] { EXPECT_EQ(service->campaigns().front().storage_failure(), ""); });
   end(StopRequest::now);
   EXPECT_EQ(num_stored("a"), 1U);
 }

@@ -40,8 +40,8 @@ TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
 CampaignRecord record(const std::filesystem::path& file, std::uint64_t num_done = 0,
                       const std::string& name = "") {
   CampaignRecord campaign{.file = file};
-  campaign.status.name = name.empty() ? file.stem().string() : name;
-  campaign.status.num_done = num_done;
+  campaign.status.set_name(name.empty() ? file.stem().string() : name);
+  campaign.status.set_num_done(num_done);
   return campaign;
 }
 

@@ -60,7 +60,7 @@ TEST(Metrics, TellWhatIsKnownOfEachCampaign) {
   ServiceSnapshot snapshot;
   snapshot.campaigns = {test::campaign_snapshot("a", 42, 100),
                         test::campaign_snapshot("b", 1'000'000, 12'345'678)};
-  snapshot.campaigns[1].status.storage_failure = "disk";
+  snapshot.campaigns[1].status.set_storage_failure("disk");
   snapshot.campaigns[1].num_waiting = 7;
   const auto metrics = read_metrics(text_of(snapshot));
   EXPECT_EQ(metrics.at("proofmass_runs_finished_total").samples.at("{campaign=\"a\"}"), 42.0);
@@ -105,7 +105,7 @@ TEST(Metrics, LeaveOutCampaignsBeyondABound) {
   snapshot.campaigns.push_back(test::campaign_snapshot("active", 1, 2));
   for (int i = 0; i < 250; ++i) {
     snapshot.campaigns.push_back(test::campaign_snapshot("c" + std::to_string(i), 2, 2));
-    snapshot.campaigns.back().status.phase = wire::CampaignPhase::finished;
+    snapshot.campaigns.back().status.set_phase(proto::CAMPAIGN_PHASE_FINISHED);
   }
   const auto metrics = read_metrics(text_of(snapshot));
   const auto& finished = metrics.at("proofmass_runs_finished_total").samples;

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "coordinator/page/snapshot_board.hpp"
+#include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::test {
 
@@ -16,9 +17,7 @@ inline coordinator::CampaignRecord campaign_snapshot(const std::string& name,
                                                      std::uint64_t num_done,
                                                      std::uint64_t num_runs) {
   coordinator::CampaignRecord campaign;
-  campaign.status.name = name;
-  campaign.status.num_done = num_done;
-  campaign.status.num_runs = num_runs;
+  campaign.status = campaign_status(name, num_done, num_runs);
   campaign.file = "/nowhere/" + name + ".db";
   return campaign;
 }
@@ -26,11 +25,11 @@ inline coordinator::CampaignRecord campaign_snapshot(const std::string& name,
 inline coordinator::RegisteredWorker worker_snapshot(const std::string& name, std::uint64_t id,
                                                      std::uint64_t num_results = 0) {
   coordinator::RegisteredWorker worker;
-  worker.status.id = {id};
-  worker.status.name = name;
-  worker.status.host = "host-" + name;
-  worker.status.num_slots = 4;
-  worker.status.num_results = num_results;
+  worker.status.set_worker_id(id);
+  worker.status.set_name(name);
+  worker.status.set_host("host-" + name);
+  worker.status.set_num_slots(4);
+  worker.status.set_num_results(num_results);
   worker.registered_s = 3600.0;
   return worker;
 }

@@ -31,7 +31,7 @@ class PageSiteTest : public ::testing::Test {
                      .board = &board,
                      .details =
                          [this](const CampaignRecord& campaign, TimePoint) {
-                           asked_for = campaign.status.name + " " + campaign.file.string();
+                           asked_for = campaign.status.name() + " " + campaign.file.string();
                            return details;
                          },
                      .counts = [] { return HttpCounts{}; },

@@ -60,8 +60,8 @@ TEST(GroupedNumber, HasACommaEveryThreeDigits) {
 TEST(OverviewPage, ShowsEachCampaign) {
   ServiceSnapshot snapshot;
   snapshot.campaigns = {campaign_snapshot("hardy2013", 42, 100)};
-  snapshot.campaigns[0].status.rate_hz = 0.5;
-  snapshot.campaigns[0].status.remaining_s = 116.0;
+  snapshot.campaigns[0].status.set_rate_hz(0.5);
+  snapshot.campaigns[0].status.set_remaining_s(116.0);
   const std::string html = overview_page(snapshot, {}, {}).live;
   EXPECT_THAT(html, HasSubstr("<a href=\"campaigns/hardy2013\">hardy2013</a>"));
   EXPECT_THAT(html, HasSubstr("<progress max=\"100\" value=\"42\""));
@@ -92,10 +92,11 @@ TEST(OverviewPage, SaysWhenTheCoordinatorIsSilent) {
 TEST(Pages, ShowHostileTextAsText) {
   ServiceSnapshot snapshot;
   snapshot.campaigns = {campaign_snapshot(hostile_name, 1, 2)};
-  snapshot.campaigns[0].status.owner = hostile_name;
-  snapshot.campaigns[0].status.storage_failure = hostile_name;
-  snapshot.status.unserved_files = {{.file = hostile_name, .reason = hostile_name}};
-  snapshot.status.num_unserved_files = 1;
+  snapshot.campaigns[0].status.set_owner(hostile_name);
+  snapshot.campaigns[0].status.set_storage_failure(hostile_name);
+  snapshot.status.add_unserved_files()->set_file(hostile_name);
+  snapshot.status.mutable_unserved_files(0)->set_reason(hostile_name);
+  snapshot.status.set_num_unserved_files(1);
   snapshot.workers = {worker_snapshot(hostile_name, 1)};
   expect_harmless(text_of(overview_page(snapshot, {}, {})));
   expect_harmless(text_of(workers_page(
@@ -121,8 +122,8 @@ TEST(ChosenWorkers, AreThoseOfOnePageInOrder) {
   const std::vector<RegisteredWorker> workers = test::many_workers(120);
   const ChosenWorkers second = choose_workers(workers, {.page = 2});
   ASSERT_EQ(second.workers.size(), rows_per_page);
-  EXPECT_EQ(second.workers.front()->status.name, "w00050");
-  EXPECT_EQ(second.workers.back()->status.name, "w00099");
+  EXPECT_EQ(second.workers.front()->status.name(), "w00050");
+  EXPECT_EQ(second.workers.back()->status.name(), "w00099");
   EXPECT_EQ(choose_workers(workers, {.page = 3}).workers.size(), 20U);
 }
 
@@ -132,13 +133,13 @@ TEST(ChosenWorkers, HaveEachWorkerOnceOverAllPages) {
   std::mt19937 random(1);
   std::shuffle(workers.begin(), workers.end(), random);
   for (RegisteredWorker& worker : workers) {
-    worker.activity = worker_activities[worker.status.id.value % worker_activities.size()];
+    worker.activity = worker_activities[worker.status.worker_id() % worker_activities.size()];
   }
   for (const WorkerOrder order : {WorkerOrder::name, WorkerOrder::state, WorkerOrder::throughput}) {
     std::set<std::string> names;
     for (std::size_t page = 1; page <= 7; ++page) {
       for (const auto* worker : choose_workers(workers, {.order = order, .page = page}).workers) {
-        names.insert(worker->status.name);
+        names.insert(worker->status.name());
       }
     }
     EXPECT_EQ(names.size(), 333U) << name_of(order);
@@ -153,7 +154,7 @@ TEST(ChosenWorkers, AreSortedByStateAndThroughput) {
   const auto names = [&](WorkerOrder order) {
     std::string text;
     for (const auto* worker : choose_workers(workers, {.order = order}).workers) {
-      text += worker->status.name.back();
+      text += worker->status.name().back();
     }
     return text;
   };

@@ -154,10 +154,10 @@ TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
 TEST_F(StoreMigration, OfAFileThatIsListedReadsACopy) {
   make_older_file();
   const std::vector<std::filesystem::path> places{directory()};
-  const std::vector<ListedCampaign> campaigns = list_campaigns(places);
+  const std::vector<CampaignRecord> campaigns = list_campaigns(places);
   ASSERT_EQ(campaigns.size(), 1u);
   EXPECT_EQ(campaigns[0].problem, "");
-  EXPECT_EQ(campaigns[0].name, "old");
+  EXPECT_EQ(campaigns[0].status.name(), "old");
 }
 
 // A query sees the views of the newest version, also of files that are attached.

@@ -326,7 +326,7 @@ class StoreExecution : public test::StoreTest {
 };
 
 TEST_F(StoreExecution, OfANewCampaignIsEmpty) {
-  const Execution execution =
+  const CampaignExecution execution =
       Store::create(directory() / "new.db", test::campaign_of(5), "definition").execution();
   EXPECT_EQ(execution.num_workers, 0U);
   EXPECT_EQ(execution.compute_s, 0.0);
@@ -344,7 +344,7 @@ TEST_F(StoreExecution, SaysWhoComputedTheResultsAndWhen) {
   wrong.worker = third_worker;
   write({SecondDelivery{computed(0, third_worker, 1, 0.5)}, SecondDelivery{wrong}});
   test::change(file(), "UPDATE delivery SET received_unix_s = 86400 + 3600 * run_index");
-  const Execution execution = store.execution();
+  const CampaignExecution execution = store.execution();
   EXPECT_EQ(execution.num_audited, 2U);
   EXPECT_EQ(execution.num_contradicting, 1U);
   EXPECT_EQ(execution.first_result_utc, "1970-01-02T00:00:00Z");

@@ -1,7 +1,7 @@
 // When a campaign database is whole without its write-ahead log, and what is made of one that is
 // not.
 
-#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"

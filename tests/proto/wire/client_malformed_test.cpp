@@ -62,15 +62,9 @@ std::string refusal_of_control(const std::function<void(proto::ControlRequest&)>
 }
 
 std::string refusal_of_status(const std::function<void(proto::StatusReply&)>& change) {
-  CampaignStatus campaign;
-  campaign.name = "a";
-  campaign.num_runs = 10;
-  campaign.remaining_s = 1.0;
-  StatusReply good;
-  good.version = "v";
-  good.model_version = "m";
-  good.campaigns = {campaign};
-  return refusal(test::reply_with(good),
+  proto::CampaignStatus campaign = test::campaign_status("a", 0, 10);
+  campaign.set_remaining_s(1.0);
+  return refusal(test::reply_with(test::status_with({campaign})),
                  [&](auto& envelope) { change(*envelope.mutable_status()); });
 }
 
@@ -79,8 +73,7 @@ std::string refusal_of_campaign(const std::function<void(proto::CampaignStatus&)
 }
 
 std::string refusal_of_worker(const std::function<void(proto::WorkerStatus&)>& change) {
-  const WorkersReply good{.workers = {{.id = {1}, .name = "w", .host = "h"}}};
-  return refusal(test::reply_with(good),
+  return refusal(test::reply_with({test::worker_status(1, "w", "h")}),
                  [&](auto& envelope) { change(*envelope.mutable_workers()->mutable_workers(0)); });
 }
 
@@ -175,8 +168,7 @@ TEST(MalformedRelease, MustNameAHost) {
 }
 
 std::string refusal_of_report(const std::function<void(proto::FactoryReport&)>& change) {
-  const FactoryReport good{.name = "fleet", .batch_system = "pbs", .interval_s = 30};
-  return refusal(test::request_of(good),
+  return refusal(test::request_of(test::factory_report("fleet", 30)),
                  [&](auto& envelope) { change(*envelope.mutable_factory_report()); });
 }
 
@@ -203,10 +195,8 @@ TEST(MalformedFactoryReport, HasNamesAPhaseTimesAndAText) {
 }
 
 std::string refusal_of_factory(const std::function<void(proto::FactoryStatus&)>& change) {
-  StatusReply good;
-  good.version = "v";
-  good.model_version = "m";
-  good.factories = {{.report = {.name = "fleet", .batch_system = "pbs", .interval_s = 30}}};
+  proto::StatusReply good = test::status_with({});
+  *good.add_factories()->mutable_report() = test::factory_report("fleet", 30);
   return refusal(test::reply_with(good),
                  [&](auto& envelope) { change(*envelope.mutable_status()->mutable_factories(0)); });
 }
@@ -422,7 +412,7 @@ TEST(MalformedTexts, AreBoundedAndHarmlessToATerminal) {
 }
 
 TEST(MalformedWorkersReply, NamesABoundedNumberOfWorkers) {
-  EXPECT_EQ(refusal(test::reply_with(WorkersReply{}),
+  EXPECT_EQ(refusal(test::reply_with(std::vector<proto::WorkerStatus>{}),
                     [](auto& envelope) {
                       for (int i = 0; i < 4097; ++i) envelope.mutable_workers()->add_workers();
                     }),

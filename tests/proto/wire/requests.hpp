@@ -80,23 +80,67 @@ inline proto::RequestEnvelope request_of(proto::RequestPart part) {
   return request;
 }
 
-inline proto::RequestEnvelope request_of(const wire::FactoryReport& report) {
+/// @param interval_s  Between two reports.
+inline proto::FactoryReport factory_report(
+    const std::string& name, std::uint64_t interval_s,
+    proto::FactoryPhase phase = proto::FACTORY_PHASE_ACTIVE) {
+  proto::FactoryReport report;
+  report.set_name(name);
+  report.set_batch_system("pbs");
+  report.set_phase(phase);
+  report.set_interval_s(interval_s);
+  return report;
+}
+
+inline proto::RequestEnvelope request_of(const proto::FactoryReport& report) {
   proto::RequestEnvelope request;
-  wire::write(report, *request.mutable_factory_report());
+  *request.mutable_factory_report() = report;
   return request;
 }
 
 // Replies of coordinators.
 
-inline proto::ReplyEnvelope reply_with(const wire::StatusReply& status) {
+inline proto::CampaignStatus campaign_status(
+    const std::string& name, std::uint64_t num_done, std::uint64_t num_runs,
+    proto::CampaignPhase phase = proto::CAMPAIGN_PHASE_ACTIVE) {
+  proto::CampaignStatus campaign;
+  campaign.set_name(name);
+  campaign.set_phase(phase);
+  campaign.set_num_runs(num_runs);
+  campaign.set_num_done(num_done);
+  return campaign;
+}
+
+/// One of each thing that it counts.
+inline proto::StatusReply status_with(const std::vector<proto::CampaignStatus>& campaigns) {
+  proto::StatusReply status;
+  status.set_version("v");
+  status.set_model_version("m");
+  status.set_uptime_s(1.0);
+  status.set_num_workers(1);
+  status.set_num_slots(1);
+  status.mutable_campaigns()->Assign(campaigns.begin(), campaigns.end());
+  return status;
+}
+
+inline proto::ReplyEnvelope reply_with(const proto::StatusReply& status) {
   proto::ReplyEnvelope reply;
-  wire::write(status, *reply.mutable_status());
+  *reply.mutable_status() = status;
   return reply;
 }
 
-inline proto::ReplyEnvelope reply_with(const wire::WorkersReply& workers) {
+inline proto::WorkerStatus worker_status(std::uint64_t id, const std::string& name,
+                                         const std::string& host) {
+  proto::WorkerStatus worker;
+  worker.set_worker_id(id);
+  worker.set_name(name);
+  worker.set_host(host);
+  return worker;
+}
+
+inline proto::ReplyEnvelope reply_with(const std::vector<proto::WorkerStatus>& workers) {
   proto::ReplyEnvelope reply;
-  wire::write(workers, *reply.mutable_workers());
+  reply.mutable_workers()->mutable_workers()->Assign(workers.begin(), workers.end());
   return reply;
 }
 

@@ -25,7 +25,7 @@ void add(RunQueue& queue, const proto::RunLease& lease) {
 
 bool always(wire::CampaignId) { return true; }
 
-Indices indices(const Assignment& assignment) {
+Indices indices(const TakenRuns& assignment) {
   Indices runs;
   for (const RunRequest& request : assignment.requests) runs.push_back(request.run.value);
   return runs;
@@ -46,7 +46,7 @@ TEST(RunQueue, PutsRunsOfOneCampaignTogether) {
   add(queue, lease(1, 0, 2));
   add(queue, lease(2, 0, 2));
   add(queue, lease(1, 7, 1));
-  const Assignment first = queue.take(4, always);
+  const TakenRuns first = queue.take(4, always);
   EXPECT_EQ(first.campaign, wire::CampaignId{1});
   EXPECT_EQ(indices(first), (Indices{0, 1, 7}));
   EXPECT_EQ(queue.take(4, always).campaign, wire::CampaignId{2});
@@ -104,7 +104,7 @@ TEST(RunQueue, HandsEachRunItsTableValues) {
   RunQueue queue;
   const auto three = test::make_lease({1}, {{7}, 3}, {1}, {1.5, -1.0, 2.5, -2.0, 3.5, -3.0});
   queue.add(three, std::array{RunRange{{7}, 1}, RunRange{{9}, 1}});
-  const Assignment assignment = queue.take(3, always);
+  const TakenRuns assignment = queue.take(3, always);
   ASSERT_EQ(indices(assignment), (Indices{7, 9}));
   EXPECT_EQ(assignment.requests[0].table_values, (std::vector<double>{1.5, -1.0}));
   EXPECT_EQ(assignment.requests[1].table_values, (std::vector<double>{3.5, -3.0}));

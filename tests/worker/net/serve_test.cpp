@@ -212,38 +212,38 @@ void hand_on(int num_requests) {
 
 TEST(StopSignals, DrainAtFirstAndEndAtOnceThen) {
   StopSignals signals(SignalSource::anyone);
-  EXPECT_EQ(signals.request(), StopRequest::none);
+  EXPECT_EQ(signals.request(), EndRequest::none);
   EXPECT_FALSE(is_readable(signals));
   raise(SIGTERM);
   EXPECT_TRUE(is_readable(signals));
-  EXPECT_EQ(signals.request(), StopRequest::drain);
+  EXPECT_EQ(signals.request(), EndRequest::drain);
   EXPECT_FALSE(is_readable(signals));
-  EXPECT_EQ(signals.request(), StopRequest::drain);
+  EXPECT_EQ(signals.request(), EndRequest::drain);
   raise(SIGINT);
-  EXPECT_EQ(signals.request(), StopRequest::abandon);
+  EXPECT_EQ(signals.request(), EndRequest::abandon);
 }
 
 // SIGTERM to both processes, once or twice, is one request as long as the supervisor has one.
 TEST(StopSignals, AreCountedByTheSupervisor) {
   StopSignals signals(SignalSource::supervisor);
   raise(SIGTERM);
-  EXPECT_EQ(signals.request(), StopRequest::drain);
+  EXPECT_EQ(signals.request(), EndRequest::drain);
   hand_on(1);
-  EXPECT_EQ(signals.request(), StopRequest::drain);
+  EXPECT_EQ(signals.request(), EndRequest::drain);
   raise(SIGINT);
-  EXPECT_EQ(signals.request(), StopRequest::drain);
+  EXPECT_EQ(signals.request(), EndRequest::drain);
   hand_on(2);
-  EXPECT_EQ(signals.request(), StopRequest::abandon);
+  EXPECT_EQ(signals.request(), EndRequest::abandon);
   raise(SIGTERM);
-  EXPECT_EQ(signals.request(), StopRequest::abandon);
+  EXPECT_EQ(signals.request(), EndRequest::abandon);
 }
 
 TEST(StopSignals, EndAtOnceIfTheyComeFromTheCampaign) {
   StopSignals signals(SignalSource::campaign);
   raise(SIGINT);
-  EXPECT_EQ(signals.request(), StopRequest::none);
+  EXPECT_EQ(signals.request(), EndRequest::none);
   raise(SIGTERM);
-  EXPECT_EQ(signals.request(), StopRequest::abandon);
+  EXPECT_EQ(signals.request(), EndRequest::abandon);
 }
 
 }  // namespace

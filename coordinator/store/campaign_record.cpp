@@ -1,0 +1,84 @@
+#include "coordinator/store/campaign_record.hpp"
+
+#include <sys/stat.h>
+
+#include <system_error>
+
+#include "coordinator/store/detail/campaign_rows.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Database;
+
+CampaignRecord read_record(const Database& database) {
+  const CampaignControl control = detail::read_control(database);
+  CampaignRecord record{.id = {database.count("SELECT campaign_uid FROM campaign")},
+                        .seed = detail::read_seed(database),
+                        .created_utc = database.text("SELECT created_utc FROM campaign")};
+  record.status.set_name(database.text("SELECT name FROM campaign"));
+  record.status.set_phase(wire::message_value(control.phase));
+  record.status.set_priority(control.priority);
+  record.status.set_num_runs(database.count("SELECT num_runs FROM campaign"));
+  record.status.set_owner(database.text("SELECT owner FROM campaign"));
+  return record;
+}
+
+/// Whether the campaign has ended, and its statistics are those of all of its results.
+bool is_complete(const Database& database, const proto::CampaignStatus& status) {
+  if (status.phase() == proto::CAMPAIGN_PHASE_FINISHED) {
+    return status.num_done() + status.num_given_up() == status.num_runs();
+  }
+  return status.phase() == proto::CAMPAIGN_PHASE_CANCELLED &&
+         database.count("SELECT count(*) FROM delivery") == status.num_done();
+}
+
+}  // namespace
+
+std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return std::nullopt;
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  return FileStamp{.inode = status.st_ino,
+                   .size = status.st_size,
+                   .written_ns = status.st_mtim.tv_sec * ns_per_s + status.st_mtim.tv_nsec};
+}
+
+bool has_journal(const std::filesystem::path& path) {
+  for (const std::filesystem::path& log : {detail::log_path(path), detail::journal_path(path)}) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(log, error);
+    if (!error && size > 0) return true;
+  }
+  return false;
+}
+
+CampaignRecord Store::record() const { return read_record(impl_->database); }
+
+CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) detail::refuse_file(path, "is no file");
+  Database database(path, detail::Access::immutable);
+  database.execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
+  if (depth == PeekDepth::pages) {
+    detail::check_campaign_file(database);
+    (void)detail::check_all_pages(database);
+  } else {
+    detail::check_kind(database);
+  }
+  CampaignRecord record = read_record(database);
+  record.file = path;
+  proto::CampaignStatus& status = record.status;
+  status.set_num_given_up(database.count("SELECT count(*) FROM run_failure"));
+  status.set_num_done(database.count("SELECT coalesce(max(num_finished), 0) FROM summary"));
+  const bool is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
+  record.is_closed = is_complete(database, status) && !is_log_needed && !has_journal(path);
+  return record;
+}
+
+}  // namespace proofmass::coordinator
