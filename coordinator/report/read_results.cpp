@@ -159,7 +159,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors;
   std::optional<RunningInstruments> instruments;
-  if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
+  if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
     instruments.emplace(objectives, realisations);
   }
   KeptErrors kept(objectives.size());
