@@ -7,13 +7,13 @@
 namespace proofmass {
 namespace {
 
-constexpr std::uint64_t seed = 23;
-constexpr SamplingDesign latin{.kind = DesignKind::latin_hypercube, .points = 250};
-constexpr SamplingDesign net{.kind = DesignKind::sobol, .points = 256};
+constexpr std::uint64_t design_seed = 23;
+constexpr SamplingDesign latin_of_250{.kind = DesignKind::latin_hypercube, .points = 250};
+constexpr SamplingDesign net_of_256{.kind = DesignKind::sobol, .points = 256};
 
-double normal_distribution(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
+double normal_share_below(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
 
-Dispersion bounded_law(Law law, double mean) {
+Dispersion law_within_bounds(Law law, double mean) {
   Dispersion bounded;
   bounded.law = law;
   bounded.mean = mean;
@@ -23,21 +23,22 @@ Dispersion bounded_law(Law law, double mean) {
   return bounded;
 }
 
-double distribution(const Dispersion& law, double x) {
+double share_below(const Dispersion& law, double x) {
   if (law.law == Law::uniform) return (x - law.minimum) / (law.maximum - law.minimum);
   const auto below = [&law](double value) {
-    return normal_distribution((value - law.mean) / law.standard_deviation);
+    return normal_share_below((value - law.mean) / law.standard_deviation);
   };
   if (law.law == Law::normal) return below(x);
   return (below(x) - below(law.minimum)) / (below(law.maximum) - below(law.minimum));
 }
 
 /// The values of a quantity in the second replicate.
-std::vector<double> values_of(const DispersionSet& laws, std::size_t quantity,
-                              const SamplingDesign& design) {
+std::vector<double> replicate_values(const DispersionSet& laws, std::size_t quantity,
+                                     const SamplingDesign& design) {
   std::vector<double> values;
   for (std::uint64_t i = 0; i < design.points; ++i) {
-    values.push_back(draw_values(laws, seed, RunIndex{design.points + i}, 0, {}, design)[quantity]);
+    values.push_back(
+        draw_values(laws, design_seed, RunIndex{design.points + i}, 0, {}, design)[quantity]);
   }
   return values;
 }
@@ -54,14 +55,14 @@ void expect_one_in_each_part(std::vector<double> numbers) {
 
 TEST(Design, HasOneDrawInEachPartOfEqualProbabilityOfALaw) {
   DispersionSet laws = nominal_dispersions();
-  laws[1] = bounded_law(Law::normal, 2.0);
-  laws[2] = bounded_law(Law::truncated, 1.0);
-  laws[3] = bounded_law(Law::truncated_normal, 0.1);
-  laws[59] = bounded_law(Law::truncated, -1.5);
-  for (const SamplingDesign& design : {latin, net}) {
+  laws[1] = law_within_bounds(Law::normal, 2.0);
+  laws[2] = law_within_bounds(Law::truncated, 1.0);
+  laws[3] = law_within_bounds(Law::truncated_normal, 0.1);
+  laws[59] = law_within_bounds(Law::truncated, -1.5);
+  for (const SamplingDesign& design : {latin_of_250, net_of_256}) {
     for (const std::size_t quantity : {0U, 1U, 2U, 3U, 59U}) {
-      std::vector<double> numbers = values_of(laws, quantity, design);
-      for (double& number : numbers) number = distribution(laws[quantity], number);
+      std::vector<double> numbers = replicate_values(laws, quantity, design);
+      for (double& number : numbers) number = share_below(laws[quantity], number);
       expect_one_in_each_part(std::move(numbers));
     }
   }
@@ -72,7 +73,7 @@ TEST(Design, HasDiscreteValuesAsOftenAsTheirProbabilitiesSay) {
   laws[4].law = Law::discrete;
   laws[4].values = {3.0, 1.0, 2.0};
   laws[4].probabilities = {0.125, 0.5, 0.375};
-  const std::vector<double> values = values_of(laws, 4, net);
+  const std::vector<double> values = replicate_values(laws, 4, net_of_256);
   EXPECT_EQ(std::ranges::count(values, 3.0), 32);
   EXPECT_EQ(std::ranges::count(values, 1.0), 128);
   EXPECT_EQ(std::ranges::count(values, 2.0), 96);
@@ -81,36 +82,37 @@ TEST(Design, HasDiscreteValuesAsOftenAsTheirProbabilitiesSay) {
 // x = z₁ and y = 0.6 z₁ + 0.8 z₂, z₁ and z₂ each having one value in each part.
 TEST(Design, CorrelatesDeviatesThatCoverTheirLaws) {
   DispersionSet laws = nominal_dispersions();
-  laws[24] = bounded_law(Law::normal, 0.0);
+  laws[24] = law_within_bounds(Law::normal, 0.0);
   laws[25] = laws[24];
   laws[25].law = Law::correlated;
   laws[25].with = {"offcentring_m.x"};
   laws[25].correlations = {0.6};
-  const std::vector<double> x = values_of(laws, 24, net), y = values_of(laws, 25, net);
+  const std::vector<double> x = replicate_values(laws, 24, net_of_256),
+                            y = replicate_values(laws, 25, net_of_256);
   std::vector<double> numbers;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    numbers.push_back(normal_distribution((y[i] - 0.6 * x[i]) / (0.8 * 0.5)));
+    numbers.push_back(normal_share_below((y[i] - 0.6 * x[i]) / (0.8 * 0.5)));
   }
   expect_one_in_each_part(std::move(numbers));
 }
 
-MicroscopeCampaign campaign_with(const SamplingDesign& design, std::uint64_t num_runs) {
+MicroscopeCampaign campaign_with_design(const SamplingDesign& design, std::uint64_t num_runs) {
   MicroscopeCampaign campaign;
-  campaign.seed = seed;
+  campaign.seed = design_seed;
   campaign.design = design;
   campaign.num_runs = num_runs;
   return campaign;
 }
 
 TEST(Design, ReplacesADrawThatIsNotAcceptedByAnIndependentOne) {
-  for (const SamplingDesign& design : {latin, net}) {
-    const MicroscopeCampaign campaign = campaign_with(design, 2 * design.points);
+  for (const SamplingDesign& design : {latin_of_250, net_of_256}) {
+    const MicroscopeCampaign campaign = campaign_with_design(design, 2 * design.points);
     std::uint64_t num_drawn_again = 0;
     for (std::uint64_t run = 0; run < campaign.num_runs; ++run) {
       const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
       const std::uint32_t last = draw.num_draws - 1;
       if (last > 0) ++num_drawn_again;
-      EXPECT_EQ(draw.values, draw_values(campaign.dispersions, seed, RunIndex{run}, last, {},
+      EXPECT_EQ(draw.values, draw_values(campaign.dispersions, design_seed, RunIndex{run}, last, {},
                                          last == 0 ? design : SamplingDesign{}));
     }
     EXPECT_GT(num_drawn_again, 0U);
@@ -119,9 +121,9 @@ TEST(Design, ReplacesADrawThatIsNotAcceptedByAnIndependentOne) {
 }
 
 TEST(Design, KeepsTheDrawsOfEarlierRunsInAnyOrder) {
-  for (const SamplingDesign& design : {latin, net}) {
-    const MicroscopeCampaign campaign = campaign_with(design, design.points);
-    const MicroscopeCampaign extended = campaign_with(design, 3 * design.points);
+  for (const SamplingDesign& design : {latin_of_250, net_of_256}) {
+    const MicroscopeCampaign campaign = campaign_with_design(design, design.points);
+    const MicroscopeCampaign extended = campaign_with_design(design, 3 * design.points);
     std::vector<DrawnValues> backwards;
     for (std::uint64_t run = extended.num_runs; run-- > 0;) {
       backwards.push_back(draw_instrument(extended, RunIndex{run}, {}).values);
@@ -134,53 +136,55 @@ TEST(Design, KeepsTheDrawsOfEarlierRunsInAnyOrder) {
   }
 }
 
-std::string refusal_of(const MicroscopeCampaign& campaign) {
+std::string design_refusal(const MicroscopeCampaign& campaign) {
   return test::message_of<ConfigError>([&] { campaign.validate_without_columns(); });
 }
 
 TEST(Design, RefusesWhatWouldNotBeEven) {
-  MicroscopeCampaign campaign = campaign_with({.kind = DesignKind::sobol, .points = 48}, 96);
-  EXPECT_EQ(refusal_of(campaign),
+  MicroscopeCampaign campaign = campaign_with_design({.kind = DesignKind::sobol, .points = 48}, 96);
+  EXPECT_EQ(design_refusal(campaign),
             "campaign.points = 48 (must be a power of two with campaign.design = \"sobol\", whose "
             "points are even only then)");
   campaign.design.kind = DesignKind::latin_hypercube;
-  EXPECT_EQ(refusal_of(campaign), "");
+  EXPECT_EQ(design_refusal(campaign), "");
   campaign.num_runs = 100;
   EXPECT_EQ(
-      refusal_of(campaign),
+      design_refusal(campaign),
       "campaign.runs = 100 (must be a multiple of campaign.points, 48, with campaign.design = "
       "\"latin_hypercube\": 96 or 144)");
   campaign.num_runs = 40;
-  EXPECT_THAT(refusal_of(campaign), EndsWith("\"latin_hypercube\": 48)"));
+  EXPECT_THAT(design_refusal(campaign), EndsWith("\"latin_hypercube\": 48)"));
   campaign.design.points = 1025;
-  EXPECT_EQ(refusal_of(campaign), "campaign.points = 1025 (must be in [2, 1024])");
+  EXPECT_EQ(design_refusal(campaign), "campaign.points = 1025 (must be in [2, 1024])");
 }
 
 TEST(Design, RefusesWhatDependsOtherwise) {
-  MicroscopeCampaign campaign = campaign_with(net, 256);
+  MicroscopeCampaign campaign = campaign_with_design(net_of_256, 256);
   campaign.realisations = 4;
-  EXPECT_EQ(refusal_of(campaign),
+  EXPECT_EQ(design_refusal(campaign),
             "campaign.design = \"sobol\" (must be \"random\" with campaign.realisations, which "
             "needs independent instruments)");
   campaign.realisations = 1;
   campaign.dispersions[24].law = Law::table;
   campaign.dispersions[24].file = "points.csv";
   campaign.dispersions[24].column = "x";
-  EXPECT_EQ(refusal_of(campaign),
+  EXPECT_EQ(design_refusal(campaign),
             "campaign.design = \"sobol\" (must be \"random\" with a table that is not declared "
             "independent, dispersion.offcentring_m.x)");
   campaign.dispersions[24].is_independent = true;
-  EXPECT_EQ(refusal_of(campaign), "");
+  EXPECT_EQ(design_refusal(campaign), "");
 }
 
-MicroscopeCampaign read(std::string_view text) { return parse_campaign("file", text, {}, {}); }
+MicroscopeCampaign read_design(std::string_view text) {
+  return parse_campaign("file", text, {}, {});
+}
 
 TEST(Design, IsReadAndWritten) {
   const MicroscopeCampaign nominal =
-      read("campaign.name = \"a\"\ncampaign.runs = 64\ncampaign.design = \"sobol\"\n");
+      read_design("campaign.name = \"a\"\ncampaign.runs = 64\ncampaign.design = \"sobol\"\n");
   EXPECT_EQ(nominal.design, (SamplingDesign{.kind = DesignKind::sobol, .points = 32}));
-  const MicroscopeCampaign other =
-      read("[campaign]\nname = \"a\"\nruns = 14\ndesign = \"latin_hypercube\"\npoints = 7\n");
+  const MicroscopeCampaign other = read_design(
+      "[campaign]\nname = \"a\"\nruns = 14\ndesign = \"latin_hypercube\"\npoints = 7\n");
   EXPECT_EQ(other.design, (SamplingDesign{.kind = DesignKind::latin_hypercube, .points = 7}));
   EXPECT_EQ(campaign_of(definition_of(other)).design, other.design);
   EXPECT_THAT(canonical_definition(MicroscopeCampaign{}), Not(HasSubstr("\ndesign")));
@@ -191,7 +195,7 @@ TEST(Design, IsReadAndWritten) {
   EXPECT_EQ(differences[0].second, "latin_hypercube");
   EXPECT_EQ(differences[1].field, "points");
   EXPECT_EQ(test::message_of<DefinitionError>(
-                [] { (void)read("[campaign]\nname = \"a\"\npoints = 32\n"); }),
+                [] { (void)read_design("[campaign]\nname = \"a\"\npoints = 32\n"); }),
             "file:3: campaign.points = 32 (only with campaign.design, which is \"random\")");
 }
 
