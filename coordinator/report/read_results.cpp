@@ -159,8 +159,12 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors;
   std::optional<RunningInstruments> instruments;
-  if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
+  if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
     instruments.emplace(objectives, realisations);
+  }
+  std::optional<RunningReplicates> replicates;
+  if (const SamplingDesign design = campaign.sampling_design(); design.points > 1) {
+    replicates.emplace(objectives, design);
   }
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
@@ -173,6 +177,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       statistics.add(result);
       standard_errors.add(result);
       if (instruments) instruments->add(result);
+      if (replicates) replicates->add(result);
       kept.add(result);
       if (budget && result.is_completed()) {
         add_total(result.run, budget->of_run(result).total, totals, results.totals);
@@ -186,6 +191,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
     results.statistics = statistics.statistics();
     results.standard_errors = standard_errors.statistics();
     if (instruments) results.instruments = instruments->statistics();
+    if (replicates) results.replicates = replicates->statistics();
     for (std::size_t i = 0; i < objectives.size() && results.statistics.num_estimated > 0; ++i) {
       std::vector<double> errors = kept.take(store, i);
       complete(results.statistics.accuracy[i], errors);

@@ -10,6 +10,7 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/instruments.hpp"
+#include "coordinator/report/replicates.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
@@ -76,6 +77,7 @@ struct ReadResults {
   CampaignWarnings warnings;
   StandardErrorStatistics standard_errors;
   std::optional<InstrumentStatistics> instruments = {};  ///< With several realisations for each.
+  std::optional<ReplicateStatistics> replicates = {};    ///< Of a sampling design.
 };
 
 /// Sees what read_results() reads.

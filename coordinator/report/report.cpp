@@ -25,6 +25,7 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
         error_table(statistics, num_given_up, campaign.interpretation()),
         standard_error_table(results.standard_errors), variance_table(instruments),
         instrument_table(instruments),
+        replicate_table(results.replicates.value_or(ReplicateStatistics{})),
         budget_table(campaign.error_budget(), statistics, results.totals)}) {
     if (!table.rows.empty()) text += "\n" + terminal_text(table, {.paint = paint});
   }

@@ -231,6 +231,9 @@ std::string report_json(const Store& store, const Campaign& campaign,
   if (const auto& instruments = checked.results.instruments) {
     json["instruments"] = json_of(*instruments);
   }
+  if (const auto& replicates = checked.results.replicates) {
+    json["replicates"] = json_of(*replicates);
+  }
   json["why_not_independent"] = why_not_independent(campaign);
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
   for (const RequirementAnswer& row : matrix.answers()) {

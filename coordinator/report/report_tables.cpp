@@ -263,8 +263,8 @@ Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_giv
   }
   if (!statistics.are_draws_independent) {
     table.notes.emplace_back(
-        "no intervals: the draws are not independent, as several runs share one, or as they are of "
-        "a table that is not declared independent");
+        "no intervals: the draws are not independent, as several runs share one, or as they are "
+        "those of a design or of a table that is not declared independent");
     return table;
   }
   if (statistics.num_estimated < num_runs_of_bootstrap) {

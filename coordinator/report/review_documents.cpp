@@ -115,6 +115,7 @@ std::string standard_errors_markup(const Review& review) {
 }
 
 std::string instruments_markup(const Review& review) {
+  if (review.results.replicates) return table_part(replicate_table(*review.results.replicates));
   if (!review.results.instruments) return "";
   return table_part(variance_table(*review.results.instruments)) +
          table_part(instrument_table(*review.results.instruments));
@@ -295,7 +296,9 @@ std::string review_markdown(const Review& review) {
                            interval_table(statistics, review.num_given_up),
                            error_table(statistics, review.num_given_up, review.interpretation)}) +
       section("Standard errors", {standard_error_table(review.results.standard_errors)}) +
-      section("Instruments", {variance_table(instruments), instrument_table(instruments)}) +
+      section("Instruments",
+              {variance_table(instruments), instrument_table(instruments),
+               replicate_table(review.results.replicates.value_or(ReplicateStatistics{}))}) +
       section("Budget", {review_budget_table(review)}) +
       section("Causes of the errors", {cause_table(review)}) +
       section("How it was run",

@@ -12,6 +12,7 @@
 
 #include "core/campaign/definition.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/campaign/sampling_design.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/runs.hpp"
 
@@ -183,6 +184,10 @@ class Campaign {
   [[nodiscard]] virtual std::vector<std::size_t> table_quantities() const = 0;
   /// The draw that a run begins with. A pure function, some 11 µs. @pre The run is one of these.
   [[nodiscard]] virtual RunDraw draw(RunIndex run) const = 0;
+  /// Consecutive runs that share one draw and differ in their noise.
+  [[nodiscard]] virtual std::uint64_t num_realisations() const { return 1; }
+  /// How the draws are chosen.
+  [[nodiscard]] virtual SamplingDesign sampling_design() const { return {}; }
   /// What differs from run to run.
   [[nodiscard]] virtual Interpretation interpretation() const { return Interpretation::mixed; }
   /// Nothing if the model has none.

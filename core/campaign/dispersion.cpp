@@ -241,30 +241,34 @@ RandomStream stream_of(std::string_view name, std::uint64_t seed, RunIndex run) 
 
 }  // namespace
 
-double draw_deviate(std::string_view name, std::uint64_t seed, RunIndex run, std::uint32_t draw) {
-  return inverse_normal(uniform(stream_of(name, seed, run).block(draw * blocks_per_draw)));
+double draw_deviate(std::string_view name, std::uint64_t seed, RunIndex run, std::uint32_t draw,
+                    const Stratum& stratum) {
+  const RandomBlock block = stream_of(name, seed, run).block(draw * blocks_per_draw);
+  return inverse_normal(uniform_in(stratum, block));
 }
 
 double draw_value(const Dispersion& dispersion, std::string_view name, std::uint64_t seed,
-                  RunIndex run, std::uint32_t draw, double table_value) {
+                  RunIndex run, std::uint32_t draw, double table_value, const Stratum& stratum) {
   const RandomStream stream = stream_of(name, seed, run);
-  const std::uint32_t block = draw * blocks_per_draw;
+  const std::uint32_t first_block = draw * blocks_per_draw;
+  const auto probability = [&] { return uniform_in(stratum, stream.block(first_block)); };
   switch (dispersion.law) {
     case Law::uniform:
-      return dispersion.minimum +
-             (dispersion.maximum - dispersion.minimum) * uniform(stream.block(block));
+      return dispersion.minimum + (dispersion.maximum - dispersion.minimum) * probability();
     case Law::normal:
-      return dispersion.mean + dispersion.standard_deviation * draw_deviate(name, seed, run, draw);
+      return dispersion.mean +
+             dispersion.standard_deviation * draw_deviate(name, seed, run, draw, stratum);
     case Law::truncated_normal:
-      return draw_truncated(dispersion, stream, block);
+      if (stratum.count > 1) return draw_within_bounds(dispersion, probability());
+      return draw_truncated(dispersion, stream, first_block);
     case Law::fixed:
       return dispersion.value;
     case Law::table:
       return table_value;
     case Law::discrete:
-      return chosen_value(dispersion, uniform(stream.block(block)));
+      return chosen_value(dispersion, probability());
     case Law::truncated:
-      return draw_within_bounds(dispersion, uniform(stream.block(block)));
+      return draw_within_bounds(dispersion, probability());
     case Law::derived:
     case Law::correlated:
       break;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/campaign/sampling_design.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass {
@@ -64,13 +65,15 @@ struct Dispersion {
 ///
 /// @param name         Of the quantity; that of its random stream, so it must never change.
 /// @param table_value  Its value in this run, for the law `table`.
+/// @param stratum      The part of the law in which the value is; in one of several,
+///                     `truncated_normal` is drawn by its distribution function, as `truncated` is.
 /// @pre The law needs no other quantity: it is neither `derived` nor `correlated`.
 [[nodiscard]] double draw_value(const Dispersion& dispersion, std::string_view name,
                                 std::uint64_t seed, RunIndex run, std::uint32_t draw,
-                                double table_value);
+                                double table_value, const Stratum& stratum = {});
 
 /// The standard normal deviate that a quantity with the law `normal` or `correlated` follows.
 [[nodiscard]] double draw_deviate(std::string_view name, std::uint64_t seed, RunIndex run,
-                                  std::uint32_t draw);
+                                  std::uint32_t draw, const Stratum& stratum = {});
 
 }  // namespace proofmass

@@ -12,17 +12,13 @@
 
 namespace proofmass {
 
-std::uint64_t num_realisations(const Campaign& campaign) {
-  for (const DefinitionItem& item : campaign.items()) {
-    if (item.key != "campaign.realisations") continue;
-    return static_cast<std::uint64_t>(std::get<std::int64_t>(item.value));
-  }
-  return 1;
-}
-
 std::string why_not_independent(const Campaign& campaign) {
-  if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
+  if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
     return fmt::format("{} runs each share one draw (campaign.realisations)", realisations);
+  }
+  if (const SamplingDesign design = campaign.sampling_design(); design.points > 1) {
+    return fmt::format("{} runs each are one replicate of a design (campaign.design = \"{}\")",
+                       design.points, name_of(design.kind));
   }
   constexpr std::string_view law_key = ".law";
   const std::vector<DefinitionItem> items = campaign.items();

@@ -1,14 +1,10 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include "core/campaign/campaign.hpp"
 
 namespace proofmass {
-
-/// Runs that share one draw and differ in their noise, `campaign.realisations`; mostly 1.
-[[nodiscard]] std::uint64_t num_realisations(const Campaign& campaign);
 
 /// Why the draws of a campaign are not taken for independent; empty if they are. Intervals,
 /// verdicts about requirements, tests of a difference and p-values need independent draws: each
@@ -16,8 +12,8 @@ namespace proofmass {
 ///
 /// A quantity whose law is a table without `independent = true` may follow any design (Sobol'
 /// points, a Latin hypercube, a grid): `dispersion.offcentring_m.x is a table that is not declared
-/// independent, so that the draws may be those of a design`. Runs that share a draw are not
-/// independent of one another either.
+/// independent, so that the draws may be those of a design`. Runs that share a draw, and those of
+/// a sampling design, are not independent of one another either.
 [[nodiscard]] std::string why_not_independent(const Campaign& campaign);
 
 /// @throws ConfigError with the reason unless the draws are independent.

@@ -101,6 +101,9 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
   if (matches(include, "^boost/math") && file.path != "core/statistics/distribution.cpp") {
     return "laws whose last bits depend on the processor stay in core/statistics/distribution.cpp";
   }
+  if (matches(include, "^boost/random") && file.path != "core/random/sobol.cpp") {
+    return "Boost.Random has direction numbers for core/random/sobol.cpp, and draws nothing";
+  }
   if (matches(include, "^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
     return "what Protobuf itself offers stays in proto/wire/*.cpp";
   }

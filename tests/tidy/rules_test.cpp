@@ -29,6 +29,7 @@ TEST(CheckLayers, CatchesEachForbiddenInclude) {
   EXPECT_THAT(layers("coordinator/dispatch/a.cpp", "<zmq.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/net/a.hpp", "<zmq.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/page/page.cpp", "<boost/asio/post.hpp>"), SizeIs(1));
+  EXPECT_THAT(layers("core/random/stream.cpp", "<boost/random/sobol.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/dispatch/state.hpp", "\"proto/proofmass.pb.h\""), SizeIs(1));
   EXPECT_THAT(layers("coordinator/store/a.hpp", "\"proto/wire/client_codec.hpp\""), SizeIs(1));
   EXPECT_THAT(layers("coordinator/store/a.cpp", "<google/protobuf/message.h>"), SizeIs(1));

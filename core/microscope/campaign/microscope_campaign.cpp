@@ -33,6 +33,23 @@ void check_environment(const MicroscopeCampaign& campaign) {
 
 std::string path_of(std::size_t drawn) { return "dispersion." + drawn_names()[drawn]; }
 
+void check_design(const MicroscopeCampaign& campaign) {
+  const auto refuse = [&](std::string_view reason) {
+    throw ConfigError("campaign.design", fmt::format("\"{}\"", name_of(campaign.design.kind)),
+                      reason);
+  };
+  campaign.design.validate(campaign.num_runs);
+  if (campaign.design.kind == DesignKind::random) return;
+  if (campaign.realisations > 1) {
+    refuse("must be \"random\" with campaign.realisations, which needs independent instruments");
+  }
+  for (const std::size_t element : campaign.table_quantities()) {
+    if (campaign.dispersions[element].is_independent) continue;
+    refuse(fmt::format("must be \"random\" with a table that is not declared independent, {}",
+                       path_of(element)));
+  }
+}
+
 std::vector<TableSource> table_sources(const MicroscopeCampaign& campaign) {
   std::vector<TableSource> sources;
   for (const std::size_t element : campaign.table_quantities()) {
@@ -58,6 +75,7 @@ void MicroscopeCampaign::validate_without_columns() const {
   check_environment(*this);
   for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
   check_relations(dispersions);
+  check_design(*this);
 }
 
 Interpretation MicroscopeCampaign::interpretation() const {
@@ -95,7 +113,7 @@ AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
   AcceptedDraw draw;
   while (draw.num_draws < num_draws_max) {
     draw.values = draw_values(campaign.dispersions, campaign.seed, of_instrument, draw.num_draws,
-                              table_values);
+                              table_values, campaign.design);
     ++draw.num_draws;
     if (!are_in_range(campaign.dispersions, draw.values)) continue;
     const Instrument instrument = make_instrument(draw.values);

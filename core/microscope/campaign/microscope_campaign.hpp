@@ -24,6 +24,7 @@ class MicroscopeCampaign final : public Campaign {
   /// Runs that share one drawn instrument and differ in their noise: those from i·realisations on
   /// have the draws of instrument i.
   std::uint64_t realisations = 1;
+  SamplingDesign design;  ///< Of the instruments.
   Scenario scenario;
   DispersionSet dispersions = nominal_dispersions();
   std::string environment_file;        ///< As written in the campaign file; empty if harmonic.
@@ -44,6 +45,8 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] std::int64_t num_rounds_max() const override;
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override;
   [[nodiscard]] RunDraw draw(RunIndex run) const override;
+  [[nodiscard]] std::uint64_t num_realisations() const override { return realisations; }
+  [[nodiscard]] SamplingDesign sampling_design() const override { return design; }
   [[nodiscard]] Interpretation interpretation() const override;
   [[nodiscard]] std::optional<ErrorBudget> error_budget() const override;
   [[nodiscard]] Warner warner() const override;

@@ -135,7 +135,7 @@ void check_derived(const MicroscopeCampaign& campaign) {
   for (std::uint64_t i = 0; i < num_tried && i * campaign.realisations < campaign.num_runs; ++i) {
     const RunIndex run{i * campaign.realisations};
     const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, RunIndex{i}, 0,
-                                           campaign.table_values(run));
+                                           campaign.table_values(run), campaign.design);
     for (const std::size_t quantity : derived) {
       MagnitudeCheck(quantity).run(campaign.dispersions[quantity], run, values[quantity]);
     }

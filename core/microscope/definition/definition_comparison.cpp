@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -21,10 +23,7 @@ class Comparison {
       : first_(first), second_(second) {}
 
   std::vector<DefinitionDifference> run() {
-    if (first_.realisations != second_.realisations) {
-      differ("realisations", fmt::format("{}", first_.realisations),
-             fmt::format("{}", second_.realisations));
-    }
+    compare_sampling();
     compare_entries("", fields_of(first_), fields_of(second_));
     compare_sessions();
     compare_environment();
@@ -38,12 +37,23 @@ class Comparison {
         {.field = std::string(path), .first = std::string(first), .second = std::string(second)});
   }
 
+  void compare_sampling() {
+    const auto compare = [this](std::string_view path, auto first, auto second) {
+      if (first != second) differ(path, fmt::format("{}", first), fmt::format("{}", second));
+    };
+    compare("realisations", first_.realisations, second_.realisations);
+    compare("design", name_of(first_.design.kind), name_of(second_.design.kind));
+    compare("points", first_.design.points, second_.design.points);
+  }
+
   // More runs extend a campaign; the values of data files are compared, not their names.
   static std::vector<Entry> fields_of(const MicroscopeCampaign& campaign) {
     std::vector<Entry> entries = detail::scenario_entries(campaign);
     std::erase_if(entries, [](const Entry& entry) {
-      return entry.path == "campaign.runs" || entry.path == "campaign.realisations" ||
-             entry.path == "environment.file";
+      static constexpr std::array<std::string_view, 5> left_out{
+          "campaign.runs", "campaign.realisations", "campaign.design", "campaign.points",
+          "environment.file"};
+      return std::ranges::find(left_out, entry.path) != left_out.end();
     });
     for (Entry& entry : entries) {
       constexpr std::string_view table = "campaign.";

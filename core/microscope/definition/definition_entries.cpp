@@ -165,11 +165,19 @@ std::vector<Entry> scenario_entries(const MicroscopeCampaign& campaign) {
                   "All randomness follows from it."),
       whole_entry("campaign.runs", static_cast<std::int64_t>(campaign.num_runs), "May grow later."),
   };
-  // Left out where it is 1, so that the text of a campaign remains the one that it was stored with.
+  // Left out where they are the nominal ones, so that the text of a campaign remains the one that
+  // it was stored with.
   if (campaign.realisations != 1) {
     entries.push_back(whole_entry("campaign.realisations",
                                   static_cast<std::int64_t>(campaign.realisations),
                                   "Runs that share one instrument and differ in their noise."));
+  }
+  if (campaign.design.kind != DesignKind::random) {
+    entries.push_back(choice_entry("campaign.design", campaign.design.kind,
+                                   "\"random\", \"latin_hypercube\" or \"sobol\"."));
+    entries.push_back(whole_entry("campaign.points",
+                                  static_cast<std::int64_t>(campaign.design.points),
+                                  "Runs of a replicate of the design."));
   }
   if (!campaign.environment_file.empty()) {
     entries.push_back(text_entry("environment.file", campaign.environment_file,

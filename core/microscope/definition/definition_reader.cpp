@@ -301,6 +301,20 @@ DispersionSet read_dispersions(Document& document) {
   return dispersions;
 }
 
+void read_design(Document& document, SamplingDesign& design) {
+  constexpr std::int64_t nominal_points = 32;
+  document.read("campaign.design", design.kind);
+  if (design.kind == DesignKind::random) {
+    if (document.find("campaign.points") == nullptr) return;
+    document.refuse("campaign.points", "only with campaign.design, which is \"random\"");
+    return;
+  }
+  std::int64_t points = nominal_points;
+  document.read("campaign.points", points,
+                range::between(2, static_cast<double>(design_points_max)));
+  design.points = static_cast<std::uint64_t>(points);
+}
+
 }  // namespace
 
 MicroscopeCampaign read_definition(Document& document) {
@@ -315,6 +329,7 @@ MicroscopeCampaign read_definition(Document& document) {
   document.read("campaign.realisations", realisations,
                 range::between(1, static_cast<double>(realisations_max)));
   campaign.realisations = static_cast<std::uint64_t>(realisations);
+  read_design(document, campaign.design);
   campaign.seed = static_cast<std::uint64_t>(seed);
   campaign.num_runs = static_cast<std::uint64_t>(num_runs);
   document.read("environment.file", campaign.environment_file);

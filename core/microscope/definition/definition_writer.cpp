@@ -178,7 +178,11 @@ class CommentedWriter {
     }
   }
 
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> table_notes{{
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> table_notes{{
+      {"campaign",
+       "# Further keys: realisations = 4 gives each instrument four runs, which differ in their "
+       "noise;\n"
+       "# design = \"sobol\" or \"latin_hypercube\" with points = 32 covers the laws evenly.\n"},
       {"environment",
        "# External accelerations of the satellite, each axis mean + a1 cos(n t + phase) +\n"
        "# a2 cos(2 n t + phase), n being the mean motion; or rows of a file (kind = \"file\",\n"

@@ -155,15 +155,21 @@ CorrelationFactor correlation_factor(const DispersionSet& dispersions) {
   return factor;
 }
 
+Stratum stratum_in(const SamplingDesign& design, std::size_t quantity, std::uint64_t seed,
+                   RunIndex run, std::uint32_t draw) {
+  return draw == 0 ? stratum_of(design, quantity, seed, run) : Stratum{};
+}
+
 /// Replaces the values of quantities with the law `correlated`.
 void correlate(const DispersionSet& dispersions, std::uint64_t seed, RunIndex run,
-               std::uint32_t draw, DrawnValues& values) {
+               std::uint32_t draw, const SamplingDesign& design, DrawnValues& values) {
   const CorrelationFactor factor = correlation_factor(dispersions);
   std::vector<double> deviates;
   for (std::size_t i = 0; i < factor.rows.size(); ++i) {
     const std::size_t quantity = factor.quantities[i];
     const Dispersion& law = dispersions[quantity];
-    deviates.push_back(draw_deviate(drawn_names()[quantity], seed, run, draw));
+    deviates.push_back(draw_deviate(drawn_names()[quantity], seed, run, draw,
+                                    stratum_in(design, quantity, seed, run, draw)));
     if (law.law != Law::correlated) continue;
     values[quantity] = law.mean + law.standard_deviation * product_of(factor.rows[i], deviates);
   }
@@ -283,7 +289,8 @@ LawMoments sampled_moments(const DispersionSet& dispersions, std::size_t quantit
 }
 
 DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed, RunIndex run,
-                        std::uint32_t draw, std::span<const double> table_values) {
+                        std::uint32_t draw, std::span<const double> table_values,
+                        const SamplingDesign& design) {
   DrawnValues values{};
   std::size_t next_table_value = 0;
   bool is_related = false;
@@ -296,10 +303,11 @@ DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed, Ru
     const bool is_of_table = law == Law::table;
     PROOFMASS_EXPECT(!is_of_table || next_table_value < table_values.size());
     const double table_value = is_of_table ? table_values[next_table_value++] : 0.0;
-    values[i] = draw_value(dispersions[i], drawn_names()[i], seed, run, draw, table_value);
+    values[i] = draw_value(dispersions[i], drawn_names()[i], seed, run, draw, table_value,
+                           stratum_in(design, i, seed, run, draw));
   }
   if (!is_related) return values;
-  correlate(dispersions, seed, run, draw, values);
+  correlate(dispersions, seed, run, draw, design, values);
   Derivation derivation(dispersions, values);
   for (std::size_t i = 0; i < num_drawn; ++i) (void)derivation.value_of(i);
   return values;

@@ -43,13 +43,15 @@ using DispersionSet = std::array<Dispersion, num_drawn>;
 [[nodiscard]] std::vector<std::size_t> table_elements(const DispersionSet& dispersions);
 
 /// The values of a run's draw number `draw` (from 0), before any acceptance rule: a pure function
-/// of its arguments.
+/// of its arguments. Draw 0 is in the strata of the design, whose dimension of a quantity is its
+/// index; later ones are independent of other runs.
 ///
 /// @param table_values  The run's values of the `table` quantities, in the order of
 /// table_elements().
 [[nodiscard]] DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed,
                                       RunIndex run, std::uint32_t draw,
-                                      std::span<const double> table_values);
+                                      std::span<const double> table_values,
+                                      const SamplingDesign& design = {});
 
 /// Checks what the laws say of one another: names in expressions and correlations, cycles, and
 /// that the correlations make a positive definite matrix.

@@ -1,0 +1,249 @@
+#include "coordinator/report/replicates.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "coordinator/report/report_tables.hpp"
+#include "core/error.hpp"
+#include "core/model.hpp"
+
+namespace proofmass::coordinator {
+
+RunningReplicates::RunningReplicates(std::vector<double> objectives, const SamplingDesign& design)
+    : objectives_(std::move(objectives)), quantities_(objectives_.size()) {
+  PROOFMASS_EXPECT(design.points > 1);
+  counts_.design = design;
+}
+
+void RunningReplicates::add(const RunResult& result) {
+  const std::uint64_t replicate = result.run.value / counts_.design.points;
+  if (replicate != replicate_) finish_replicate();
+  replicate_ = replicate;
+  ++num_runs_;
+  if (result.num_draws > 1) ++num_drawn_again_;
+  if (!result.is_completed()) return;
+  ++num_estimated_;
+  bool is_within = true;
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    const double error = result.error(i);
+    const bool is_beyond = std::abs(error) > objectives_[i];
+    quantities_[i].magnitude.sum += std::abs(error);
+    quantities_[i].bias.sum += error;
+    quantities_[i].mean_square.sum += error * error;
+    quantities_[i].beyond.sum += is_beyond ? 1.0 : 0.0;
+    is_within = is_within && !is_beyond;
+  }
+  within_.sum += is_within ? 1.0 : 0.0;
+}
+
+void RunningReplicates::Mean::finish(std::uint64_t num_runs) {
+  total += sum;
+  const double mean = std::exchange(sum, 0.0) / static_cast<double>(num_runs);
+  if (!means) means.emplace(mean);
+  means->add(mean);
+}
+
+ReplicatedMean RunningReplicates::Mean::mean() const {
+  if (!means) return {};
+  const Moments moments = means->moments();
+  ReplicatedMean of{.mean = moments.mean, .interval = {}};
+  if (moments.count < num_replicates_of_interval) return of;
+  of.interval = mean_interval(moments, default_confidence);
+  return of;
+}
+
+ReplicatedMean RunningReplicates::Mean::share(std::uint64_t num_runs) const {
+  ReplicatedMean of = mean();
+  if (!of.interval) return of;
+  const double fewest = std::min(total, static_cast<double>(num_runs) - total);
+  // A share that follows a single quantity may be the same in nearly all replicates. Their scatter
+  // says nothing then, as the shares are whole numbers of runs and the true one is not.
+  const Moments shares = means->moments();
+  const double scatter =
+      shares.standard_deviation * static_cast<double>(num_runs) / static_cast<double>(shares.count);
+  if (fewest < static_cast<double>(num_hits_of_interval) || scatter < count_deviation_min) {
+    of.interval.reset();
+    return of;
+  }
+  of.interval->lower = std::max(of.interval->lower, 0.0);
+  of.interval->upper = std::min(of.interval->upper, 1.0);
+  return of;
+}
+
+namespace {
+
+constexpr std::size_t num_incomplete_named = 5;
+
+}  // namespace
+
+void RunningReplicates::finish_replicate() {
+  const std::uint64_t num_runs = std::exchange(num_runs_, 0);
+  const std::uint64_t num_estimated = std::exchange(num_estimated_, 0);
+  const std::uint64_t num_drawn_again = std::exchange(num_drawn_again_, 0);
+  if (num_runs == counts_.design.points) {
+    ++counts_.num_replicates;
+    counts_.num_estimated += num_estimated;
+    counts_.num_drawn_again += num_drawn_again;
+    within_.finish(num_runs);
+  } else if (num_runs > 0) {
+    ++counts_.num_incomplete;
+    if (counts_.incomplete.size() < num_incomplete_named) counts_.incomplete.push_back(replicate_);
+  }
+  within_.sum = 0.0;
+  for (Quantity& quantity : quantities_) {
+    for (Mean* const mean :
+         {&quantity.magnitude, &quantity.bias, &quantity.mean_square, &quantity.beyond}) {
+      if (num_runs == counts_.design.points && num_estimated > 0) mean->finish(num_estimated);
+      mean->sum = 0.0;
+    }
+  }
+}
+
+ReplicateStatistics RunningReplicates::statistics() const {
+  RunningReplicates all = *this;
+  all.finish_replicate();
+  ReplicateStatistics statistics = all.counts_;
+  statistics.within_objectives =
+      all.within_.share(statistics.num_replicates * statistics.design.points);
+  if (statistics.num_estimated == 0) return statistics;
+  for (const Quantity& quantity : all.quantities_) {
+    statistics.quantities.push_back({.magnitude = quantity.magnitude.mean(),
+                                     .bias = quantity.bias.mean(),
+                                     .mean_square = quantity.mean_square.mean(),
+                                     .beyond = quantity.beyond.share(statistics.num_estimated)});
+  }
+  return statistics;
+}
+
+namespace {
+
+void add_interval(const std::optional<Interval>& interval, double scale, Row& row) {
+  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
+    row.push_back(interval ? figure_cell((*interval).*end, scale) : no_figure());
+  }
+}
+
+/// Of the root of a mean square, whose interval may begin below 0.
+std::optional<Interval> root_of(std::optional<Interval> interval) {
+  if (!interval) return interval;
+  interval->lower = std::sqrt(std::max(interval->lower, 0.0));
+  interval->upper = std::sqrt(interval->upper);
+  return interval;
+}
+
+/// Of |error|, which is not negative.
+std::optional<Interval> not_negative(std::optional<Interval> interval) {
+  if (interval) interval->lower = std::max(interval->lower, 0.0);
+  return interval;
+}
+
+std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) {
+  std::vector<std::string> notes{fmt::format(
+      "{} complete replicates of {} runs (campaign.design = \"{}\"); their means, which "
+      "are independent, make the intervals",
+      statistics.num_replicates, statistics.design.points, name_of(statistics.design.kind))};
+  if (statistics.num_incomplete > 0) {
+    notes.push_back(fmt::format(
+        "left out, as a run has no result: replicate {}{}", fmt::join(statistics.incomplete, ", "),
+        statistics.num_incomplete > statistics.incomplete.size()
+            ? fmt::format(" and others, {} in all", statistics.num_incomplete)
+            : std::string()));
+  }
+  if (statistics.num_drawn_again > 0) {
+    notes.push_back(
+        fmt::format("{} runs are not at their points: a draw that is not accepted is replaced by "
+                    "an independent "
+                    "one",
+                    statistics.num_drawn_again));
+  }
+  if (statistics.num_replicates < num_replicates_of_interval) {
+    notes.push_back(fmt::format("an interval needs {} replicates", num_replicates_of_interval));
+  }
+  const ReplicatedMean& within = statistics.within_objectives;
+  notes.push_back(fmt::format(
+      "all objectives: {:.3g} % of all runs{}", 100.0 * within.mean,
+      within.interval ? fmt::format(", {:.3g} to {:.3g} % of all draws",
+                                    100.0 * within.interval->lower, 100.0 * within.interval->upper)
+                      : std::string()));
+  notes.push_back(
+      fmt::format("the interval of a share needs {} runs on each side, and replicates that differ; "
+                  "worst, percentiles and verdicts need independent runs",
+                  num_hits_of_interval));
+  notes.emplace_back(
+      "no design saves more runs than the inverse of the share of the variance that is noise, "
+      "which "
+      "campaign.realisations tells");
+  return notes;
+}
+
+}  // namespace
+
+Table replicate_table(const ReplicateStatistics& statistics) {
+  if (statistics.quantities.empty()) return {};
+  constexpr const char* magnitude = "mean of |error|";
+  constexpr const char* bias = "bias";
+  constexpr const char* rms = "rms of the error";
+  constexpr const char* beyond = "beyond, %";
+  Table table{.id = "replicate-table",
+              .caption = "95 % intervals from replicates of the design, in the units above",
+              .columns = {{"parameter", true, 11},
+                          {"from", false, 8, magnitude},
+                          {"to", false, 9, magnitude},
+                          {"from", false, 9, bias, true},
+                          {"to", false, 9, bias},
+                          {"from", false, 9, rms, true},
+                          {"to", false, 9, rms},
+                          {"from", false, 8, beyond, true},
+                          {"to", false, 8, beyond}},
+              .notes = replicate_notes(statistics)};
+  for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
+    const proofmass::Quantity& quantity = model().results().quantities[i];
+    const ReplicatedQuantity& of = statistics.quantities[i];
+    const double scale = quantity.display_scale;
+    Row row{quantity.symbol};
+    add_interval(not_negative(of.magnitude.interval), scale, row);
+    add_interval(of.bias.interval, scale, row);
+    add_interval(root_of(of.mean_square.interval), scale, row);
+    add_interval(of.beyond.interval, 0.01, row);
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const ReplicatedMean& of) {
+  Json json{{"mean", of.mean}, {"interval", nullptr}};
+  if (of.interval) json["interval"] = {of.interval->lower, of.interval->upper};
+  return json;
+}
+
+}  // namespace
+
+nlohmann::ordered_json json_of(const ReplicateStatistics& statistics) {
+  Json json{{"design", name_of(statistics.design.kind)},
+            {"points", statistics.design.points},
+            {"num_replicates", statistics.num_replicates},
+            {"num_incomplete", statistics.num_incomplete},
+            {"first_incomplete", statistics.incomplete},
+            {"num_estimated", statistics.num_estimated},
+            {"num_drawn_again", statistics.num_drawn_again},
+            {"within_objectives", json_of(statistics.within_objectives)},
+            {"parameters", Json::array()}};
+  for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
+    const ReplicatedQuantity& of = statistics.quantities[i];
+    json["parameters"].push_back({{"parameter", model().results().quantities[i].name},
+                                  {"magnitude", json_of(of.magnitude)},
+                                  {"bias", json_of(of.bias)},
+                                  {"mean_square", json_of(of.mean_square)},
+                                  {"beyond", json_of(of.beyond)}});
+  }
+  return json;
+}
+
+}  // namespace proofmass::coordinator
