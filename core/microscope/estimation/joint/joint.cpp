@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "core/microscope/control/star_tracker.hpp"
 #include "core/microscope/estimation/joint/joint_model.hpp"
+#include "core/microscope/estimation/low_pass.hpp"
 
 namespace proofmass {
 namespace {
@@ -144,8 +145,8 @@ Priors make_priors(const EstimationInput& input) {
 // Lines.
 
 /// Variance of cosine's and sine's amplitude of Γ_mes,dx, half the difference of two sensors.
-double line_variance(const EstimationInput& input, const Session& session,
-                     const LineMultiple& line) {
+double line_variance(const EstimationInput& input, const Session& session, const LineMultiple& line,
+                     const BandPass& filter) {
   const double f = line_frequency_hz(session, line, input.orbit_period_s);
   const SensorNoise& x = input.noise.linear_x;
   const double rise = x.rise_asd * (f / x.rise_corner_hz) * (f / x.rise_corner_hz);
@@ -154,7 +155,8 @@ double line_variance(const EstimationInput& input, const Session& session,
                          rise * rise / (1.0 + limited * limited * limited * limited);
   const double scale = input.noise.scale > 0.0 ? input.noise.scale : 1.0;
   const double duration_s = session.num_orbits * input.orbit_period_s - input.config.transient_s;
-  return 0.5 * scale * scale * density / duration_s;
+  const double passed = std::norm(response(filter, f, input.sample_period_s));
+  return 0.5 * scale * scale * density * passed / duration_s;
 }
 
 /// An observed line.
@@ -169,15 +171,17 @@ std::vector<Line> observed_lines(const RunPhasors& records, const EstimationInpu
   std::vector<Line> lines;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const Session& session = input.sessions[i];
-    const std::vector<WantedLine> wanted = joint_needs(session).lines;
-    PROOFMASS_EXPECT(records[i].lines.size() == wanted.size());
-    for (std::size_t k = 0; k < wanted.size(); ++k) {
-      const auto& [line, signals] = wanted[k];
+    const RecordNeeds needs = joint_needs(session);
+    const BandPass filter = further_lines_filter(needs, session, input.config, input.orbit_period_s,
+                                                 input.sample_period_s);
+    PROOFMASS_EXPECT(records[i].lines.size() == needs.lines.size());
+    for (std::size_t k = 0; k < needs.lines.size(); ++k) {
+      const auto& [line, signals] = needs.lines[k];
       const LinePhasors& recorded = records[i].lines[k];
       lines.push_back(
           {i, signals,
            signals == LineSignals::squares ? centred(recorded, records[i].means) : recorded,
-           1.0 / line_variance(input, session, line)});
+           1.0 / line_variance(input, session, line, filter)});
     }
   }
   return lines;

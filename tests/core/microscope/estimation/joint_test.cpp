@@ -16,7 +16,9 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/estimation/joint/joint_model.hpp"
 #include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/simulation/session_record.hpp"
 #include "core/random/stream.hpp"
+#include "core/signal/line_weights.hpp"
 
 namespace proofmass {
 namespace {
@@ -326,6 +328,34 @@ TEST(Joint, RefusesSessionsThatCannotTellEveryParameter) {
   EXPECT_EQ(without({a_c12}), "session = 10" + needs + "moves masses in opposition along y)");
   EXPECT_EQ(without({a_c13}), "session = 10" + needs + "moves masses in opposition along z)");
   EXPECT_EQ(without({k2_sensor_1, k2_sensor_2}), "session = 9" + needs + "moves one mass along x)");
+}
+
+// Every session that may be asked for: its lines fit into one set of weights, with the level.
+TEST(Joint, AsksForNoMoreLinesThanAFitHolds) {
+  std::vector<Excitation> kinds;
+  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+    kinds.push_back({ExcitationKind::attitude, axis, 1e-3, 1e-3, MassMotion::opposition});
+    kinds.push_back(push_along(axis));
+    for (const MassMotion motion :
+         {MassMotion::opposition, MassMotion::mass_1, MassMotion::mass_2}) {
+      kinds.push_back({ExcitationKind::test_mass, axis, 1e-5, 1e-2, motion});
+    }
+  }
+  std::size_t num_fitted_max = 0, num_wanted_max = 0;
+  const std::size_t n = kinds.size();
+  ASSERT_EQ(num_excitations_max, 4U);
+  for (std::size_t i = 0; i < n * n * n * n; ++i) {
+    const Session session = session_with(
+        {kinds[i % n], kinds[i / n % n], kinds[i / (n * n) % n], kinds[i / (n * n * n)]});
+    const auto is_moving = [](const Excitation& e) { return e.kind == ExcitationKind::test_mass; };
+    if (std::ranges::count_if(session.excitations, is_moving) > 2) continue;
+    const RecordNeeds needs = joint_needs(session);
+    num_wanted_max = std::max(num_wanted_max, needs.lines.size());
+    num_fitted_max = std::max(num_fitted_max, needs.lines.size() + needs.neighbours.size() + 1);
+  }
+  EXPECT_LE(num_wanted_max, num_line_readers_max);
+  EXPECT_LE(num_fitted_max, LineWeights::num_lines_max);
+  EXPECT_GT(num_fitted_max, 25U);
 }
 
 }  // namespace
