@@ -80,6 +80,24 @@ TEST(JointCampaign, FindsTheTruthWithoutNoise) {
   }
 }
 
+// A rotation at 2 f_TM − 2 f_orb makes a line at f_TM − 2 f_orb by Ω̇, of which Coriolis's
+// acceleration leaves 2 %. With Ω̇ alone in the model, a_c12 would move by its whole objective.
+TEST(JointCampaign, IsNotMovedByARotationAtTwiceTheFrequencyOfAMass) {
+  MicroscopeCampaign campaign;
+  campaign.seed = 44;
+  campaign.scenario.noise.scale = 0.0;
+  Session& session = campaign.scenario.sessions[3];
+  const double f_hz =
+      2.0 * session.excitations[0].frequency_hz - 2.0 / campaign.scenario.orbit.period_s;
+  session.excitations.push_back(
+      {ExcitationKind::attitude, Axis::z, 1e-7, f_hz, MassMotion::opposition});
+  const std::size_t a_c12 = index(Parameter::a_c12);
+  for (const Outcome& run : simulated(campaign, batch_lanes)) {
+    EXPECT_LE(std::abs(run.error(a_c12)), campaign.scenario.objectives[a_c12] / 50.0 +
+                                              hidden_part(run.truth, Parameter::a_c12));
+  }
+}
+
 // A mean of n squares of standard normal numbers scatters by √(2/n). Five of that for each
 // parameter, in 48 draws, tell a standard error that is wrong by half; χ² of all sessions, 3000
 // degrees of freedom, one that is wrong by a tenth. 4 % are left to the filters of the noise, which
