@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <numbers>
 #include <string>
@@ -51,7 +52,8 @@ double size_of(const DispersionSet& dispersions, const DrawnMoments& moments,
 class Sizes {
  public:
   Sizes(const DispersionSet& dispersions, const std::vector<std::vector<double>>& table_columns) {
-    const DrawnMoments moments = drawn_moments(dispersions);
+    constexpr std::uint64_t num_draws = 256;  // A size needs few digits.
+    const DrawnMoments moments = drawn_moments(dispersions, num_draws);
     for (std::size_t i = 0; i < num_drawn; ++i) sizes_[i] = size_of(dispersions, moments, i);
     const std::vector<std::size_t> of_table = table_elements(dispersions);
     for (std::size_t i = 0; i < std::min(of_table.size(), table_columns.size()); ++i) {

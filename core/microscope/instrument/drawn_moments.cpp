@@ -15,11 +15,11 @@ constexpr auto num_values = static_cast<Eigen::Index>(num_drawn);
 
 /// Means and covariances of fixed draws. A draw with a value out of range would be taken again.
 /// @param known  Without tables.
-DrawnMoments sampled_moments(const DispersionSet& known) {
-  constexpr std::uint64_t num_samples = 8192, key = 1;
+DrawnMoments sampled_moments(const DispersionSet& known, std::uint64_t num_draws) {
+  constexpr std::uint64_t key = 1;
   std::vector<Eigen::VectorXd> samples;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(num_values);
-  for (std::uint64_t i = 0; i < num_samples; ++i) {
+  for (std::uint64_t i = 0; i < num_draws; ++i) {
     const DrawnValues values = draw_values(known, key, RunIndex{i}, 0, {});
     const auto is_in_range = [&](std::size_t k) {
       return known[k].law != Law::derived || std::fabs(values[k]) <= drawn_magnitude_max(k);
@@ -66,7 +66,7 @@ DrawnMoments moments_of_laws(const DispersionSet& known) {
 
 }  // namespace
 
-DrawnMoments drawn_moments(const DispersionSet& dispersions) {
+DrawnMoments drawn_moments(const DispersionSet& dispersions, std::uint64_t num_draws) {
   DispersionSet known = dispersions;
   const DispersionSet nominal = nominal_dispersions();
   for (const std::size_t i : table_elements(dispersions)) known[i] = nominal[i];
@@ -75,7 +75,7 @@ DrawnMoments drawn_moments(const DispersionSet& dispersions) {
 
   // Sampled covariances of all quantities are positive definite together. Those of quantities that
   // are not derived get the deviation of their law, for the sake of values that are rare.
-  DrawnMoments moments = sampled_moments(known);
+  DrawnMoments moments = sampled_moments(known, num_draws);
   for (std::size_t i = 0; i < num_drawn; ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double sampled = moments.covariance(row, row);
