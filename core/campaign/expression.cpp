@@ -131,7 +131,7 @@ class Evaluation {
     (void)next();
     const std::size_t first = position_;
     const auto whole = number<int>();
-    if (std::abs(whole) <= exponent_max) return whole_power(argument, whole);
+    if (whole >= -exponent_max && whole <= exponent_max) return whole_power(argument, whole);
     position_ = first;
     refuse(fmt::format("must be a whole number from {} to {}", -exponent_max, exponent_max));
   }

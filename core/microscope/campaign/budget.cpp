@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <numbers>
 #include <string>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/instrument/drawn_moments.hpp"
 #include "core/microscope/results/health.hpp"
 
 namespace proofmass {
@@ -21,7 +23,8 @@ bool is_line(double multiple, double of_line) { return std::abs(multiple - of_li
 
 // The largest value of a law, but for one draw in 370 of a normal one; that of a table is in its
 // column.
-double size_of(const DispersionSet& dispersions, std::size_t quantity) {
+double size_of(const DispersionSet& dispersions, const DrawnMoments& moments,
+               std::size_t quantity) {
   const Dispersion& law = dispersions[quantity];
   switch (law.law) {
     case Law::uniform:
@@ -36,10 +39,9 @@ double size_of(const DispersionSet& dispersions, std::size_t quantity) {
     case Law::discrete:
       return std::abs(
           *std::ranges::max_element(law.values, {}, [](double value) { return std::abs(value); }));
-    case Law::derived: {
-      const LawMoments moments = sampled_moments(dispersions, quantity);
-      return std::abs(moments.mean) + 3.0 * moments.standard_deviation;
-    }
+    case Law::derived:
+      return std::abs(moments.mean[quantity]) +
+             3.0 * std::sqrt(moments.covariance.diagonal()[static_cast<Eigen::Index>(quantity)]);
     case Law::table:
       break;
   }
@@ -50,7 +52,9 @@ double size_of(const DispersionSet& dispersions, std::size_t quantity) {
 class Sizes {
  public:
   Sizes(const DispersionSet& dispersions, const std::vector<std::vector<double>>& table_columns) {
-    for (std::size_t i = 0; i < num_drawn; ++i) sizes_[i] = size_of(dispersions, i);
+    constexpr std::uint64_t num_draws = 256;  // A size needs few digits.
+    const DrawnMoments moments = drawn_moments(dispersions, num_draws);
+    for (std::size_t i = 0; i < num_drawn; ++i) sizes_[i] = size_of(dispersions, moments, i);
     const std::vector<std::size_t> of_table = table_elements(dispersions);
     for (std::size_t i = 0; i < std::min(of_table.size(), table_columns.size()); ++i) {
       for (const double value : table_columns[i]) {

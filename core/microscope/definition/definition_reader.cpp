@@ -175,10 +175,11 @@ std::vector<Session> read_sessions(Document& document) {
 }
 
 constexpr std::string_view independent_key = "independent";
-constexpr std::array<std::string_view, 13> all_keys{
-    "minimum",      "maximum", "mean", "standard_deviation", "value",        "file",
-    "column",       "values",  "with", "probabilities",      "correlations", "expression",
-    independent_key};
+constexpr std::string_view covariances_key = "covariances";  // In place of correlations.
+constexpr std::array<std::string_view, 14> all_keys{
+    "minimum",       "maximum",      "mean", "standard_deviation", "value",        "file",
+    "column",        "values",       "with", "probabilities",      "correlations", "expression",
+    independent_key, covariances_key};
 
 // The only key of a law that may be absent: a table is no draw unless somebody says so.
 void read_independence(Document& document, const std::string& path, Dispersion& dispersion) {
@@ -243,10 +244,36 @@ void refuse_other_keys(Document& document, const std::string& path, Law law, boo
     const std::string key_path = fmt::format("{}.{}", path, key);
     if (std::ranges::find(keys, key) != keys.end()) continue;
     if (law == Law::table && key == independent_key) continue;
+    if (law == Law::correlated && key == covariances_key) continue;
     if (document.find(key_path) == nullptr) continue;
     if (is_assigned && !document.is_assigned(key_path)) continue;
     document.refuse(key_path, fmt::format("not a key of law {}, which has {}", name_of(law),
                                           fmt::join(keys, ", ")));
+  }
+}
+
+/// Reads covariances, which stand for correlations until as_correlations() divides them.
+bool read_covariances(Document& document, const std::string& path, Dispersion& dispersion) {
+  const std::string key_path = fmt::format("{}.{}", path, covariances_key);
+  if (document.find(key_path) == nullptr) return false;
+  if (document.find(path + ".correlations") != nullptr) {
+    document.refuse(key_path, "stands in place of correlations: leave out one of them");
+  } else {
+    (void)read_list(document, key_path, "numbers", dispersion.correlations);
+  }
+  return true;
+}
+
+/// Divides covariances by the standard deviations of both quantities. What is no drawn quantity is
+/// left to be refused.
+void as_correlations(const DispersionSet& dispersions, Dispersion& dispersion) {
+  for (std::size_t k = 0; k < dispersion.correlations.size(); ++k) {
+    if (k >= dispersion.with.size()) return;
+    const auto with = std::ranges::find(drawn_names(), dispersion.with[k]);
+    if (with == drawn_names().end()) continue;
+    const auto place = static_cast<std::size_t>(with - drawn_names().begin());
+    dispersion.correlations[k] /=
+        dispersion.standard_deviation * dispersions[place].standard_deviation;
   }
 }
 
@@ -265,6 +292,7 @@ Dispersion read_dispersion(Document& document, const std::string& path, const Di
   dispersion.law = law;
   for (const std::string_view key : keys_of(law)) {
     const std::string key_path = fmt::format("{}.{}", path, key);
+    if (key == "correlations" && read_covariances(document, path, dispersion)) continue;
     if (document.find(key_path) != nullptr || law == base.law) {
       read_key(document, key_path, key, dispersion);
     } else if (is_assigned && (key == "value" || key == "mean") && base.law != Law::table) {
@@ -285,6 +313,7 @@ Dispersion read_dispersion(Document& document, const std::string& path, const Di
 /// Laws of `[dispersion.<group>]` and, over them, of `[dispersion.<group>.<element>]`.
 DispersionSet read_dispersions(Document& document) {
   DispersionSet dispersions = nominal_dispersions();
+  std::vector<std::size_t> have_covariances;
   for (const DrawGroup& group : draw_groups()) {
     const std::string path = fmt::format("dispersion.{}", group.name);
     const bool is_assigned = document.is_assigned(path + ".law");
@@ -296,8 +325,15 @@ DispersionSet read_dispersions(Document& document) {
       dispersions[i] =
           read_dispersion(document, element, of_group,
                           follows_group ? is_assigned : document.is_assigned(element + ".law"));
+      if (dispersions[i].law != Law::correlated) continue;
+      const bool has_own = document.find(element + ".correlations") != nullptr;
+      const bool has_covariances =
+          document.find(fmt::format("{}.{}", element, covariances_key)) != nullptr ||
+          (!has_own && document.find(fmt::format("{}.{}", path, covariances_key)) != nullptr);
+      if (has_covariances) have_covariances.push_back(i);
     }
   }
+  for (const std::size_t i : have_covariances) as_correlations(dispersions, dispersions[i]);
   return dispersions;
 }
 

@@ -158,8 +158,8 @@ class CommentedWriter {
         "# probabilities), truncated (as truncated_normal, the mean anywhere), derived "
         "(expression:\n"
         "# of other quantities) or correlated (mean, standard_deviation; with: earlier normal\n"
-        "# quantities; correlations: with each). A table such as [dispersion.offcentring_m.x]\n"
-        "# changes the law of one element.\n";
+        "# quantities; correlations, or covariances: with each). A table such as\n"
+        "# [dispersion.offcentring_m.x] changes the law of one element.\n";
     for (const DrawGroup& group : draw_groups()) write_group(group);
   }
 

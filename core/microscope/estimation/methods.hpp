@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/microscope/estimation/estimation_config.hpp"
-#include "core/microscope/instrument/drawn_quantities.hpp"
+#include "core/microscope/instrument/drawn_moments.hpp"
 #include "core/microscope/instrument/noise_config.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
@@ -65,7 +65,7 @@ struct EstimationInput {
   const EstimationConfig& config;
   const ParameterArray& objectives;  ///< SI.
   const NoiseConfig& noise;
-  const DispersionSet& dispersions;  ///< The laws by which instruments are drawn.
+  const DrawnMoments& laws;  ///< Of the laws by which instruments are drawn.
   double orbit_period_s = 0.0;
   double sample_period_s = 0.0;
 };

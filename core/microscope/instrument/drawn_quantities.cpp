@@ -270,24 +270,6 @@ double drawn_magnitude_max(std::size_t quantity) {
   return 1000.0 * std::prev(after)->bound;
 }
 
-LawMoments sampled_moments(const DispersionSet& dispersions, std::size_t quantity) {
-  constexpr std::uint64_t num_samples = 256, key = 1;
-  DispersionSet known = dispersions;
-  const DispersionSet nominal = nominal_dispersions();
-  for (const std::size_t i : table_elements(dispersions)) known[i] = nominal[i];
-  double count = 0.0, sum = 0.0, squares = 0.0;
-  for (std::uint64_t i = 0; i < num_samples; ++i) {
-    const double value = draw_values(known, key, RunIndex{i}, 0, {})[quantity];
-    if (!(std::fabs(value) <= drawn_magnitude_max(quantity))) continue;  // It would be drawn again.
-    ++count;
-    sum += value;
-    squares += value * value;
-  }
-  if (count == 0.0) return {};
-  const double mean = sum / count;
-  return {mean, std::sqrt(std::fmax(squares / count - mean * mean, 0.0))};
-}
-
 DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed, RunIndex run,
                         std::uint32_t draw, std::span<const double> table_values,
                         const SamplingDesign& design) {

@@ -58,14 +58,6 @@ using DispersionSet = std::array<Dispersion, num_drawn>;
 /// @throws ConfigError naming `dispersion.<quantity>.<key>`.
 void check_relations(const DispersionSet& dispersions);
 
-/// Mean and standard deviation of a quantity in a sample of 256 fixed draws, which takes some 3 ms.
-/// Tables have the nominal law in it.
-struct LawMoments {
-  double mean = 0.0;
-  double standard_deviation = 0.0;
-};
-[[nodiscard]] LawMoments sampled_moments(const DispersionSet& dispersions, std::size_t quantity);
-
 /// Unit of a drawn quantity, for people: `rad`, `m`, `s²/m`, `m/s²`, `rad/s²` or `1`.
 /// @param quantity  Index into drawn_names().
 [[nodiscard]] std::string_view drawn_unit(std::size_t quantity);

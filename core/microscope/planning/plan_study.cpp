@@ -88,11 +88,12 @@ class JointStudy final : public PlanStudy {
       measured_s_.push_back(fitted_s(session.num_orbits));
     }
     const RunRecord record = RunPlan(measured, joint_method).record(RunIndex{0}, {});
+    const DrawnMoments laws = drawn_moments(campaign_.dispersions);
     const EstimationInput input{.sessions = measured.scenario.sessions,
                                 .config = scenario.estimation,
                                 .objectives = scenario.objectives,
                                 .noise = scenario.noise,
-                                .dispersions = campaign_.dispersions,
+                                .laws = laws,
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};
     add_instruments(record.phasors, input);

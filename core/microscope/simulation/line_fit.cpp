@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "core/microscope/estimation/low_pass.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 
 namespace proofmass {
@@ -64,7 +65,7 @@ std::vector<double> frequencies_of(const RecordNeeds& needs, const Session& sess
       return std::abs(other_hz - frequency_hz) < resolution_hz;
     };
     if (frequency_hz < resolution_hz || std::ranges::any_of(all_hz, is_close)) continue;
-    if (all_hz.size() < LineWeights::num_lines_max) all_hz.push_back(frequency_hz);
+    all_hz.push_back(frequency_hz);
   }
   return all_hz;
 }
@@ -77,8 +78,8 @@ std::vector<LineGroup> line_groups(const Scenario& scenario, const Session& sess
   if (needs.lines.empty()) return groups;
   const double period_s = scenario.simulation.sample_period_s;
   const std::vector<double> all_hz = frequencies_of(needs, session, scenario.orbit.period_s);
-  const double corner_hz =
-      std::min(scenario.estimation.band_ratio * *std::ranges::max_element(all_hz), 0.25 / period_s);
+  const BandPass filter =
+      further_lines_filter(needs, session, scenario.estimation, scenario.orbit.period_s, period_s);
   for (std::size_t i = 0; i < needs.lines.size();) {
     LineGroup group{line_fit(scenario, session), needs.lines[i].signals, {i}};
     if (i + 1 < needs.lines.size() && needs.lines[i + 1].signals == group.signals) {
@@ -90,7 +91,7 @@ std::vector<LineGroup> line_groups(const Scenario& scenario, const Session& sess
       const bool is_of_group = k >= i && k < i + group.lines.size();
       (is_of_group ? group.fit.fit_hz : group.fit.known_hz).push_back(all_hz[k]);
     }
-    group.fit.filter = {no_filter.high_pass, butterworth_low_pass(corner_hz, period_s)};
+    group.fit.filter = filter;
     i += group.lines.size();
     groups.push_back(std::move(group));
   }

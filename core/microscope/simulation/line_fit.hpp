@@ -25,9 +25,7 @@ struct LineGroup {
 };
 
 /// The lines that a method asks for beside the session's own. Two that follow one another with the
-/// same signals share a fit. A low-pass at band_ratio times the highest line keeps fast noise from
-/// leaking into them. There is no high-pass: what it would make of an excitation as the record
-/// begins lasts for hours, and no line fits it.
+/// same signals share a fit.
 [[nodiscard]] std::vector<LineGroup> line_groups(const Scenario& scenario, const Session& session,
                                                  const RecordNeeds& needs);
 

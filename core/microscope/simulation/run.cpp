@@ -286,7 +286,7 @@ Estimation RunPlan::estimation(const RunRecord& record) const {
                                  .config = scenario.estimation,
                                  .objectives = scenario.objectives,
                                  .noise = scenario.noise,
-                                 .dispersions = impl_->campaign.dispersions,
+                                 .laws = impl_->laws,
                                  .orbit_period_s = scenario.orbit.period_s,
                                  .sample_period_s = scenario.simulation.sample_period_s});
 }

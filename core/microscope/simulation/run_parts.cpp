@@ -41,6 +41,7 @@ void keep_further(const FurtherSums<double>& sums, const std::vector<LineGroup>&
 RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     : campaign(c),
       method(m),
+      laws(drawn_moments(c.dispersions)),
       orbit(c.scenario.orbit),
       environment(campaign.scenario.environment, campaign.environment_table,
                   c.scenario.orbit.period_s),

@@ -53,6 +53,7 @@ struct RunParts {
 
   MicroscopeCampaign campaign;
   EstimationMethodInfo method;
+  DrawnMoments laws;  ///< Of what is drawn.
   KeplerOrbit orbit;
   Environment environment;
   NoiseModel noise;

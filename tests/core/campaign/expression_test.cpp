@@ -51,6 +51,7 @@ TEST(EvaluateExpression, SaysWhereATextIsNoExpression) {
   EXPECT_EQ(refusal_of("1 2"), "character 3 must be an operator or the end");
   EXPECT_EQ(refusal_of("a.x; rm"), "character 4 must be an operator or the end");
   EXPECT_EQ(refusal_of("pow(2, 17)"), "character 8 must be a whole number from -16 to 16");
+  EXPECT_EQ(refusal_of("pow(2, -2147483648)"), "character 8 must be a whole number from -16 to 16");
   EXPECT_EQ(refusal_of("pow(2, 0.5)"), "character 9 must be )");
   EXPECT_EQ(refusal_of("pow(2)"), "character 6 must be ,");
   EXPECT_EQ(refusal_of("1e999"), "character 1 must be a number that a double can hold");

@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "core/microscope/control/star_tracker.hpp"
 #include "core/microscope/estimation/joint/joint_model.hpp"
+#include "core/microscope/estimation/low_pass.hpp"
 
 namespace proofmass {
 namespace {
@@ -25,127 +26,128 @@ using NormalVector = Eigen::Matrix<double, num_rows, 1>;
 
 // Priors.
 
-/// Mean and standard deviation of what is known of a number beforehand.
-struct Prior {
-  double mean = 0.0;
-  double deviation = 0.0;
-};
+constexpr std::size_t num_nuisances = num_unknowns - num_parameters;
+using NuisanceMatrix = Eigen::Matrix<double, num_nuisances, num_nuisances>;
+using NuisanceVector = Eigen::Matrix<double, num_nuisances, 1>;
 
-/// Of one drawn quantity. Its bound is the nominal one: that of a table's column, whose values the
-/// method does not see, and the unit of the least deviation that a prior has.
-Prior prior_of(const DispersionSet& dispersions, std::size_t quantity, double bound) {
-  const Dispersion& dispersion = dispersions[quantity];
-  Prior prior{.mean = 0.0, .deviation = bound / std::sqrt(3.0)};
-  const double middle = 0.5 * (dispersion.minimum + dispersion.maximum);
-  const double flat = (dispersion.maximum - dispersion.minimum) / std::sqrt(12.0);
-  switch (dispersion.law) {
-    case Law::uniform:
-      prior = {middle, flat};
-      break;
-    case Law::normal:
-    case Law::correlated:
-      prior = {dispersion.mean, dispersion.standard_deviation};
-      break;
-    case Law::truncated_normal:
-      prior = {std::clamp(dispersion.mean, dispersion.minimum, dispersion.maximum),
-               std::min(dispersion.standard_deviation, flat)};
-      break;
-    case Law::fixed:
-      prior = {dispersion.value, 0.0};
-      break;
-    case Law::discrete:
-    case Law::truncated:
-    case Law::derived: {
-      const LawMoments moments = sampled_moments(dispersions, quantity);
-      prior = {moments.mean, moments.standard_deviation};
-      break;
-    }
-    case Law::table:
-      break;
-  }
-  prior.deviation = std::max(prior.deviation, 1e-6 * bound);
-  return prior;
+/// Factors of the drawn quantities in a sum of them.
+using Combination = Eigen::Matrix<double, num_drawn, 1>;
+
+const DrawGroup& group_of(std::string_view name) {
+  const auto group = std::ranges::find(draw_groups(), name, &DrawGroup::name);
+  PROOFMASS_EXPECT(group != draw_groups().end());
+  return *group;
 }
 
-double root_of_squares(double a, double b) { return std::sqrt(a * a + b * b); }
-
-/// Priors of linear combinations of a group's elements.
-class GroupPriors {
- public:
-  GroupPriors(const DispersionSet& dispersions, std::string_view name) {
-    const auto group = std::ranges::find(draw_groups(), name, &DrawGroup::name);
-    PROOFMASS_EXPECT(group != draw_groups().end());
-    for (std::size_t i = 0; i < group->count; ++i) {
-      elements_[i] = prior_of(dispersions, group->first + i, group->bound);
-    }
-  }
-
-  /// Of first·(the axis of sensor 1) + second·(that of sensor 2).
-  [[nodiscard]] Prior combined(Axis axis, double first, double second) const {
-    const Prior& one = elements_[index(axis)];
-    const Prior& two = elements_[3 + index(axis)];
-    return {first * one.mean + second * two.mean,
-            root_of_squares(first * one.deviation, second * two.deviation)};
-  }
-  [[nodiscard]] const Prior& operator[](std::size_t i) const { return elements_[i]; }
-
- private:
-  std::array<Prior, 6> elements_{};
-};
-
-using Priors = std::array<Prior, num_unknowns>;
+/// first·(the axis of sensor 1) + second·(that of sensor 2).
+Combination of_pair(std::string_view name, Axis axis, double first, double second) {
+  Combination factors = Combination::Zero();
+  const auto at = static_cast<Eigen::Index>(group_of(name).first + index(axis));
+  factors[at] = first;
+  factors[at + 3] = second;
+  return factors;
+}
 
 /// Bias of the fused angles about an axis, from those of the heads.
-Prior fused_bias(const GroupPriors& heads, const StarTracker& tracker, std::size_t axis) {
-  Prior fused;
-  double variance = 0.0;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const double weight =
-        tracker.weight[i / 3](static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(i % 3));
-    fused.mean += weight * heads[i].mean;
-    variance += weight * weight * heads[i].deviation * heads[i].deviation;
+Combination fused_bias(const StarTracker& tracker, Eigen::Index axis) {
+  Combination factors = Combination::Zero();
+  const auto first = static_cast<Eigen::Index>(group_of("star_tracker_bias_rad").first);
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    factors[first + i] = tracker.weight[static_cast<std::size_t>(i / 3)](axis, i % 3);
   }
-  fused.deviation = std::sqrt(variance);
-  return fused;
+  return factors;
 }
 
-/// The parameters have none; in their places is the unit that they are solved in, the objective.
-Priors make_priors(const EstimationInput& input) {
-  const auto of_group = [&](std::string_view name) { return GroupPriors(input.dispersions, name); };
-  const GroupPriors scale = of_group("scale_factor_error"), coupling = of_group("coupling_rad"),
-                    angle = of_group("misalignment_rad"),
-                    quadratic = of_group("quadratic_factor_s2_m"),
-                    parasitic = of_group("parasitic_acceleration_m_s2"),
-                    heads = of_group("star_tracker_bias_rad");
-  Priors priors;
-  for (std::size_t i = 0; i < num_parameters; ++i) priors[i] = {0.0, input.objectives[i]};
-  const auto at = [&](Unknown unknown) -> Prior& { return priors[index(unknown)]; };
-  at(Unknown::motion_gain) = scale.combined(Axis::x, 0.5, 0.5);
-  at(Unknown::coupling_z) = coupling.combined(Axis::z, 0.5, 0.5);
-  at(Unknown::coupling_y) = coupling.combined(Axis::y, 0.5, 0.5);
-  at(Unknown::alignment_x) = angle.combined(Axis::x, 0.5, 0.5);
-  const StarTracker tracker = make_star_tracker(input.noise, input.sample_period_s);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    priors[index(Unknown::tilt_x) + axis] = fused_bias(heads, tracker, axis);
+/// The means and the covariance of what is drawn, for sums of it. No quantity is known to more than
+/// a millionth of its nominal bound.
+class DrawnSums {
+ public:
+  explicit DrawnSums(const DrawnMoments& moments)
+      : mean_(Eigen::Map<const Combination>(moments.mean.data())), covariance_(moments.covariance) {
+    for (const DrawGroup& group : draw_groups()) {
+      const double least = 1e-6 * group.bound;
+      covariance_.diagonal()
+          .segment(static_cast<Eigen::Index>(group.first), static_cast<Eigen::Index>(group.count))
+          .array() += least * least;
+    }
   }
-  at(Unknown::differential_bias) = parasitic.combined(Axis::x, -0.5, 0.5);
-  at(Unknown::parasitic_y) = parasitic.combined(Axis::y, 0.5, 0.5);
-  at(Unknown::parasitic_z) = parasitic.combined(Axis::z, 0.5, 0.5);
+
+  [[nodiscard]] double mean(const Combination& sum) const { return mean_.dot(sum); }
+  [[nodiscard]] double variance(const Combination& sum) const { return sum.dot(covariance_ * sum); }
+  [[nodiscard]] double mean_square(const Combination& sum) const {
+    return variance(sum) + mean(sum) * mean(sum);
+  }
+  [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
+
+ private:
+  Combination mean_;
+  Eigen::MatrixXd covariance_;
+};
+
+/// What is known of the unknowns beforehand.
+struct Priors {
+  /// Of the nuisances; the parameters start at 0.
+  UnknownArray mean{};
+  /// What the fit counts each unknown in: the deviation of a nuisance, the objective of a
+  /// parameter.
+  UnknownArray unit{};
+  NuisanceMatrix information;  ///< Inverse of the nuisances' correlations.
+};
+
+/// Sums of drawn quantities that the nuisances are, except for scale_y and scale_z.
+Eigen::Matrix<double, num_drawn, num_nuisances> nuisance_sums(const EstimationInput& input) {
+  Eigen::Matrix<double, num_drawn, num_nuisances> sums;
+  sums.setZero();
+  const auto set = [&](Unknown unknown, const Combination& sum) {
+    sums.col(static_cast<Eigen::Index>(index(unknown) - num_parameters)) = sum;
+  };
+  set(Unknown::motion_gain, of_pair("scale_factor_error", Axis::x, 0.5, 0.5));
+  set(Unknown::coupling_z, of_pair("coupling_rad", Axis::z, 0.5, 0.5));
+  set(Unknown::coupling_y, of_pair("coupling_rad", Axis::y, 0.5, 0.5));
+  set(Unknown::alignment_x, of_pair("misalignment_rad", Axis::x, 0.5, 0.5));
+  const StarTracker tracker = make_star_tracker(input.noise, input.sample_period_s);
+  set(Unknown::tilt_x, fused_bias(tracker, 0));
+  set(Unknown::tilt_y, fused_bias(tracker, 1));
+  set(Unknown::tilt_z, fused_bias(tracker, 2));
+  constexpr std::string_view parasitic = "parasitic_acceleration_m_s2";
+  set(Unknown::differential_bias, of_pair(parasitic, Axis::x, -0.5, 0.5));
+  set(Unknown::parasitic_y, of_pair(parasitic, Axis::y, 0.5, 0.5));
+  set(Unknown::parasitic_z, of_pair(parasitic, Axis::z, 0.5, 0.5));
+  return sums;
+}
+
+Priors make_priors(const EstimationInput& input, const DrawnSums& drawn) {
+  const auto sums = nuisance_sums(input);
+  NuisanceMatrix covariance = sums.transpose() * drawn.covariance() * sums;
+  Priors priors;
+  for (std::size_t i = num_parameters; i < num_unknowns; ++i) {
+    priors.mean[i] = drawn.mean(sums.col(static_cast<Eigen::Index>(i - num_parameters)));
+  }
+  // Products of two sums, which are taken for independent.
   for (const auto& [unknown, axis] :
        {std::pair{Unknown::scale_y, Axis::y}, std::pair{Unknown::scale_z, Axis::z}}) {
-    const Prior k2d = quadratic.combined(axis, 0.5, -0.5);
-    const Prior b = parasitic.combined(axis, -0.5, 0.5);
-    at(unknown) = {2.0 * k2d.mean * b.mean, 2.0 * root_of_squares(k2d.deviation, k2d.mean) *
-                                                root_of_squares(b.deviation, b.mean)};
+    const Combination k2d = of_pair("quadratic_factor_s2_m", axis, 0.5, -0.5);
+    const Combination b = of_pair("parasitic_acceleration_m_s2", axis, -0.5, 0.5);
+    const double mean = 2.0 * drawn.mean(k2d) * drawn.mean(b);
+    const auto row = static_cast<Eigen::Index>(index(unknown) - num_parameters);
+    priors.mean[index(unknown)] = mean;
+    covariance(row, row) = 4.0 * drawn.mean_square(k2d) * drawn.mean_square(b) - mean * mean;
   }
+  const NuisanceVector deviation = covariance.diagonal().cwiseSqrt();
+  NuisanceMatrix correlations =
+      deviation.cwiseInverse().asDiagonal() * covariance * deviation.cwiseInverse().asDiagonal();
+  correlations.diagonal().array() += 1e-9;  // Laws may tie one nuisance to another.
+  priors.information = Eigen::LDLT<NuisanceMatrix>(correlations).solve(NuisanceMatrix::Identity());
+  std::ranges::copy(input.objectives, priors.unit.begin());
+  std::copy_n(deviation.data(), num_nuisances, priors.unit.begin() + num_parameters);
   return priors;
 }
 
 // Lines.
 
 /// Variance of cosine's and sine's amplitude of Γ_mes,dx, half the difference of two sensors.
-double line_variance(const EstimationInput& input, const Session& session,
-                     const LineMultiple& line) {
+double line_variance(const EstimationInput& input, const Session& session, const LineMultiple& line,
+                     const BandPass& filter) {
   const double f = line_frequency_hz(session, line, input.orbit_period_s);
   const SensorNoise& x = input.noise.linear_x;
   const double rise = x.rise_asd * (f / x.rise_corner_hz) * (f / x.rise_corner_hz);
@@ -154,7 +156,8 @@ double line_variance(const EstimationInput& input, const Session& session,
                          rise * rise / (1.0 + limited * limited * limited * limited);
   const double scale = input.noise.scale > 0.0 ? input.noise.scale : 1.0;
   const double duration_s = session.num_orbits * input.orbit_period_s - input.config.transient_s;
-  return 0.5 * scale * scale * density / duration_s;
+  const double passed = std::norm(response(filter, f, input.sample_period_s));
+  return 0.5 * scale * scale * density * passed / duration_s;
 }
 
 /// An observed line.
@@ -169,15 +172,17 @@ std::vector<Line> observed_lines(const RunPhasors& records, const EstimationInpu
   std::vector<Line> lines;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const Session& session = input.sessions[i];
-    const std::vector<WantedLine> wanted = joint_needs(session).lines;
-    PROOFMASS_EXPECT(records[i].lines.size() == wanted.size());
-    for (std::size_t k = 0; k < wanted.size(); ++k) {
-      const auto& [line, signals] = wanted[k];
+    const RecordNeeds needs = joint_needs(session);
+    const BandPass filter = further_lines_filter(needs, session, input.config, input.orbit_period_s,
+                                                 input.sample_period_s);
+    PROOFMASS_EXPECT(records[i].lines.size() == needs.lines.size());
+    for (std::size_t k = 0; k < needs.lines.size(); ++k) {
+      const auto& [line, signals] = needs.lines[k];
       const LinePhasors& recorded = records[i].lines[k];
       lines.push_back(
           {i, signals,
            signals == LineSignals::squares ? centred(recorded, records[i].means) : recorded,
-           1.0 / line_variance(input, session, line)});
+           1.0 / line_variance(input, session, line, filter)});
     }
   }
   return lines;
@@ -185,7 +190,7 @@ std::vector<Line> observed_lines(const RunPhasors& records, const EstimationInpu
 
 // The fit.
 
-/// Normal equations of the unknowns in units of their priors' deviations.
+/// Normal equations of the unknowns, these in Priors::unit.
 struct NormalEquations {
   NormalMatrix matrix = NormalMatrix::Zero();
   NormalVector vector = NormalVector::Zero();
@@ -203,18 +208,15 @@ struct NormalEquations {
 class JointFit {
  public:
   JointFit(const RunPhasors& records, const EstimationInput& input)
-      : records_(records),
-        input_(input),
-        priors_(make_priors(input)),
-        lines_(observed_lines(records, input)),
-        read_out_bias_(
-            GroupPriors(input.dispersions, "read_out_bias_m_s2").combined(Axis::x, 0.5, -0.5)) {}
-
-  [[nodiscard]] UnknownArray start() const {
-    UnknownArray unknowns;
-    for (std::size_t i = 0; i < num_unknowns; ++i) unknowns[i] = priors_[i].mean;
-    return unknowns;
+      : records_(records), input_(input), lines_(observed_lines(records, input)) {
+    const DrawnSums drawn(input.laws);
+    priors_ = make_priors(input, drawn);
+    const Combination bias = of_pair("read_out_bias_m_s2", Axis::x, 0.5, -0.5);
+    read_out_bias_m_s2_ = drawn.mean(bias);
+    read_out_variance_ = drawn.variance(bias);
   }
+
+  [[nodiscard]] UnknownArray start() const { return priors_.mean; }
 
   /// Of each session's lines, about these values.
   [[nodiscard]] std::vector<NormalEquations> of_sessions(const UnknownArray& unknowns) const {
@@ -229,8 +231,8 @@ class JointFit {
           line.phasors[index(Signal::differential_x)] - model.value;
       NormalVector cosine, sine;
       for (std::size_t i = 0; i < num_unknowns; ++i) {
-        cosine[static_cast<Eigen::Index>(i)] = model.slope[i].real() * priors_[i].deviation;
-        sine[static_cast<Eigen::Index>(i)] = model.slope[i].imag() * priors_[i].deviation;
+        cosine[static_cast<Eigen::Index>(i)] = model.slope[i].real() * priors_.unit[i];
+        sine[static_cast<Eigen::Index>(i)] = model.slope[i].imag() * priors_.unit[i];
       }
       equations[line.session].add(cosine, residual.real(), line.weight);
       equations[line.session].add(sine, residual.imag(), line.weight);
@@ -241,35 +243,39 @@ class JointFit {
   /// What is known beside the lines: the priors, and the mean of the first session's Γ_mes,dx.
   [[nodiscard]] NormalEquations beside(const UnknownArray& unknowns) const {
     NormalEquations equations;
+    NuisanceVector residual;
     for (std::size_t i = num_parameters; i < num_unknowns; ++i) {
-      const NormalVector slope = NormalVector::Unit(static_cast<Eigen::Index>(i));
-      equations.add(slope, (priors_[i].mean - unknowns[i]) / priors_[i].deviation, 1.0);
+      residual[static_cast<Eigen::Index>(i - num_parameters)] =
+          (priors_.mean[i] - unknowns[i]) / priors_.unit[i];
     }
+    equations.matrix.bottomRightCorner<num_nuisances, num_nuisances>() = priors_.information;
+    equations.vector.tail<num_nuisances>() = priors_.information * residual;
     const Dual constant = differential_constant(records_[0].means, unknowns);
     NormalVector slope;
     for (std::size_t i = 0; i < num_unknowns; ++i) {
-      slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_[i].deviation;
+      slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_.unit[i];
     }
     equations.add(
         slope,
-        records_[0].means[index(Signal::differential_x)] - read_out_bias_.mean - constant.value,
-        1.0 / (read_out_bias_.deviation * read_out_bias_.deviation));
+        records_[0].means[index(Signal::differential_x)] - read_out_bias_m_s2_ - constant.value,
+        1.0 / read_out_variance_);
     return equations;
   }
 
-  [[nodiscard]] double unit(std::size_t unknown) const { return priors_[unknown].deviation; }
+  [[nodiscard]] double unit(std::size_t unknown) const { return priors_.unit[unknown]; }
 
  private:
   const RunPhasors& records_;
   const EstimationInput& input_;
-  Priors priors_;
   std::vector<Line> lines_;
-  Prior read_out_bias_;
+  Priors priors_;
+  double read_out_bias_m_s2_ = 0.0;  ///< Half difference along X, expected.
+  double read_out_variance_ = 0.0;   ///< Of it, m²/s⁴.
 };
 
 /// The solution of a fit linearised about some values.
 struct Solution {
-  NormalMatrix covariance;  ///< In units of the priors' deviations, as the step.
+  NormalMatrix covariance;  ///< In Priors::unit, as the step.
   NormalVector step;
 };
 

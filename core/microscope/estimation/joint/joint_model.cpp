@@ -82,6 +82,17 @@ Matrix tilted_product(const Vector& gain, const Vector& v, const Unknowns& x) {
   return sum;
 }
 
+/// What the symmetric part of G makes of w: that of the angular acceleration is taken out.
+Matrix symmetric(const Matrix& w) {
+  Matrix result;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      result[3 * i + j] = Dual(0.5) * (w[3 * i + j] + w[3 * j + i]);
+    }
+  }
+  return result;
+}
+
 /// Constant part c₀ of the common acceleration that the drag-free loop leaves.
 Dual common_constant(DragFreeSource source, const Dual& a, const Dual& b, const Unknowns& x) {
   const Dual cross =
@@ -192,8 +203,9 @@ LineCoefficients line_coefficients(const Session& session,
   of.gradients[0] = of.gradients[0] + rectified_gradient(session, k2_1, k2_2);
   const MassExcitations motions = mass_excitations(session);
   for (std::size_t i = 0; i < motions.size() && motions[i] != nullptr; ++i) {
-    of.moved[i] =
-        tilted_product({a_c11 + kappa, a_c12, a_c13}, motion_direction(*motions[i], x), x);
+    // Coriolis's acceleration cancels that of Ω̇ at these lines.
+    of.moved[i] = symmetric(
+        tilted_product({a_c11 + kappa, a_c12, a_c13}, motion_direction(*motions[i], x), x));
   }
   return of;
 }

@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "core/definition/definition_text.hpp"
+#include "core/error.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -202,6 +203,29 @@ TEST(CampaignOf, MayLackTheColumns) {
     campaign.table_columns.clear();
     EXPECT_EQ(bits_of(campaign_of(definition, TableColumns::left_out)), bits_of(campaign));
   }
+}
+
+std::string with_laws(const std::string& of_y) {
+  return "[campaign]\nname = \"a\"\n[dispersion.offcentring_m.x]\nlaw = \"normal\"\nmean = 0\n"
+         "standard_deviation = 2e-6\n[dispersion.offcentring_m.y]\nlaw = \"correlated\"\nmean = 0\n"
+         "standard_deviation = 4e-6\nwith = [\"offcentring_m.x\"]\n" +
+         of_y;
+}
+
+TEST(ParseCampaign, TakesCovariancesInPlaceOfCorrelations) {
+  const MicroscopeCampaign campaign =
+      parse_campaign("a.toml", with_laws("covariances = [4e-12]\n"), {}, {});
+  EXPECT_NEAR(campaign.dispersions[25].correlations.at(0), 0.5, 1e-15);
+  const auto refusal_of = [](const std::string& of_y) {
+    return test::message_of<Error>(
+        [&] { (void)parse_campaign("a.toml", with_laws(of_y), {}, {}); });
+  };
+  EXPECT_THAT(refusal_of("covariances = [4e-12]\ncorrelations = [0.5]\n"),
+              HasSubstr("stands in place of correlations: leave out one of them"));
+  EXPECT_THAT(refusal_of("covariances = [9e-12]\n"), HasSubstr("must be positive definite"));
+  EXPECT_THAT(refusal_of("covariances = [1e-12, 0]\n"), HasSubstr("2 of them (must be 1"));
+  EXPECT_THAT(refusal_of("covariances = [\"x\"]\n"), HasSubstr("numbers"));
+  EXPECT_THAT(refusal_of(""), HasSubstr("law correlated needs it"));
 }
 
 TEST(CampaignOf, HasLinesWithoutNegativeZeros) {

@@ -157,7 +157,7 @@ Estimation calibrate(const RunPhasors& record, const EstimationConfig& config,
                                      .config = config,
                                      .objectives = scenario.objectives,
                                      .noise = scenario.noise,
-                                     .dispersions = nominal_dispersions()});
+                                     .laws = drawn_moments(nominal_dispersions())});
 }
 
 /// The paper's sessions are in the order of their targets, as ModelRecord makes its records.

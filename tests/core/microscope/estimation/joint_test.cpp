@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -16,7 +17,9 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/estimation/joint/joint_model.hpp"
 #include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/simulation/session_record.hpp"
 #include "core/random/stream.hpp"
+#include "core/signal/line_weights.hpp"
 
 namespace proofmass {
 namespace {
@@ -28,6 +31,11 @@ constexpr std::size_t num_samples = 1024;
 // Whole numbers of cycles in the record: what varies with the orbit, what is shaken, what moves.
 constexpr double cycles_orbit = 5.0, cycles_shaken = 31.0, cycles_moved = 101.0;
 constexpr double cycles_moved_again = 137.0;
+// What turns, twice as fast as what moves but for a cycle of the orbit.
+constexpr double cycles_turned = 2.0 * cycles_moved - cycles_orbit;
+constexpr double duration_s = 14'875.0;  // In which 2 f_orb has cycles_orbit.
+constexpr double turned_rad_s = 2.0 * std::numbers::pi * cycles_turned / duration_s;
+constexpr double moved_rad_s = 2.0 * std::numbers::pi * cycles_moved / duration_s;
 
 double turn(double cycles, std::size_t k) {
   return 2.0 * std::numbers::pi * cycles * static_cast<double>(k) / num_samples;
@@ -56,8 +64,9 @@ Instrument drawn_instrument(std::uint64_t run) {
 /// [Hardy2013] eq:measurement has it.
 class Record {
  public:
-  Record(const Instrument& instrument, const Session& session)
-      : instrument_(instrument), session_(session) {
+  /// @param turn_rad  Amplitude of the satellite's rotation about Y and Z.
+  Record(const Instrument& instrument, const Session& session, double turn_rad = 0.0)
+      : instrument_(instrument), session_(session), turn_rad_(turn_rad) {
     // The loop holds the mean of its input at the read-out bias.
     for (int i = 0; i < 5; ++i) {
       measure();
@@ -87,11 +96,15 @@ class Record {
  private:
   using Signals = std::vector<std::vector<double>>;
 
-  static Eigen::Matrix3d gradient_at(std::size_t k) {
-    Eigen::Matrix3d constant, varying;
+  /// Of [T] − [In], with the part of Ω̇ in [In].
+  [[nodiscard]] Eigen::Matrix3d gradient_at(std::size_t k) const {
+    const double rate_rad_s2 =
+        -turn_rad_ * turned_rad_s * turned_rad_s * std::sin(turn(cycles_turned, k));
+    Eigen::Matrix3d constant, varying, turning;
+    turning << 0.0, -1.0, 1.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0;
     constant << 5.6e-7, 1e-9, 2e-9, 1e-9, -1.1e-6, 0.0, 2e-9, 0.0, 5.6e-7;
     varying << 1.0, 0.3, 0.8, 0.3, 0.4, 0.2, 0.8, 0.2, -1.0;
-    return constant + 1.67e-6 * varying * std::cos(turn(cycles_orbit, k));
+    return constant + 1.67e-6 * varying * std::cos(turn(cycles_orbit, k)) - rate_rad_s2 * turning;
   }
 
   /// Γ_App,k + p_k in S.
@@ -100,13 +113,18 @@ class Record {
     const double side = mass == 0 ? -0.5 : 0.5;
     Eigen::Vector3d r = side * instrument_.offcentring_S_m;
     Eigen::Vector3d a = held_;
+    const double omega_rad_s = turn_rad_ * turned_rad_s * std::cos(turn(cycles_turned, k));
+    const Eigen::Vector3d omega(0.0, omega_rad_s, omega_rad_s);
     for (const Excitation& e : session_.excitations) {
       const auto axis = static_cast<Eigen::Index>(index(e.axis));
       if (e.kind == ExcitationKind::drag_free) {
         a[axis] += e.amplitude * std::sin(turn(cycles_shaken, k));
       } else {
-        r += side * position(&e == mass_excitations(session_)[1] ? 1 : 0, k) *
-             instrument_.sensors[mass].alignment_KS().transpose().col(axis);
+        const Eigen::Vector3d direction =
+            side * instrument_.sensors[mass].alignment_KS().transpose().col(axis);
+        const double speed_m_s = e.amplitude * moved_rad_s * std::cos(turn(cycles_moved, k));
+        r += position(&e == mass_excitations(session_)[1] ? 1 : 0, k) * direction;
+        a += 2.0 * speed_m_s * omega.cross(direction);
       }
     }
     return a - gradient * r;
@@ -167,6 +185,7 @@ class Record {
 
   const Instrument& instrument_;
   const Session& session_;
+  double turn_rad_;
   Eigen::Vector3d held_ = Eigen::Vector3d::Zero();
   Signals bases_, squares_, further_rows_;
   std::array<Signals, 2> moved_;
@@ -232,6 +251,25 @@ TEST(JointModel, IsWhatTwoSensorsMeasure) {
       EXPECT_LT(largest_misfit(session, LineSignals::moved_again, cycles_moved_again + side),
                 bound);
     }
+  }
+}
+
+// A rotation ψ(t) displaces a mass at q along Y by −ψq along X of inertial space. Of the second
+// derivative of ψq, the sensor feels ψ̈q + 2ψ̇q̇ along X. With frequencies ν and f, these two have
+// the amplitudes −ν² and 2νf at ν − f, together ν(2f − ν): 5/197 of the first here.
+TEST(JointModel, LeavesOutOfAMotionWhatCoriolissAccelerationCancels) {
+  const double turn_rad = 1e-4;
+  for (const Axis axis : {Axis::y, Axis::z}) {
+    const Session session = session_with({move_along(axis)});
+    const Instrument instrument = drawn_instrument(0);
+    const Record record(instrument, session, turn_rad);
+    const LinePhasors line = record.line(LineSignals::moved, cycles_moved - cycles_orbit);
+    const LineCoefficients model =
+        line_coefficients(session, record.means(), true_unknowns(instrument, 0.0));
+    const double of_rotation = 0.25 * turn_rad * turned_rad_s * turned_rad_s * 1e-5;
+    const double misfit = std::abs(predict(model, LineSignals::moved, line).value - line[0]);
+    EXPECT_LT(misfit, 1.05 * cycles_orbit / cycles_turned * of_rotation);
+    EXPECT_GT(misfit, 0.95 * cycles_orbit / cycles_turned * of_rotation);
   }
 }
 
@@ -326,6 +364,34 @@ TEST(Joint, RefusesSessionsThatCannotTellEveryParameter) {
   EXPECT_EQ(without({a_c12}), "session = 10" + needs + "moves masses in opposition along y)");
   EXPECT_EQ(without({a_c13}), "session = 10" + needs + "moves masses in opposition along z)");
   EXPECT_EQ(without({k2_sensor_1, k2_sensor_2}), "session = 9" + needs + "moves one mass along x)");
+}
+
+// Every session that may be asked for: its lines fit into one set of weights, with the level.
+TEST(Joint, AsksForNoMoreLinesThanAFitHolds) {
+  std::vector<Excitation> kinds;
+  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+    kinds.push_back({ExcitationKind::attitude, axis, 1e-3, 1e-3, MassMotion::opposition});
+    kinds.push_back(push_along(axis));
+    for (const MassMotion motion :
+         {MassMotion::opposition, MassMotion::mass_1, MassMotion::mass_2}) {
+      kinds.push_back({ExcitationKind::test_mass, axis, 1e-5, 1e-2, motion});
+    }
+  }
+  std::size_t num_fitted_max = 0, num_wanted_max = 0;
+  const std::size_t n = kinds.size();
+  ASSERT_EQ(num_excitations_max, 4U);
+  for (std::size_t i = 0; i < n * n * n * n; ++i) {
+    const Session session = session_with(
+        {kinds[i % n], kinds[i / n % n], kinds[i / (n * n) % n], kinds[i / (n * n * n)]});
+    const auto is_moving = [](const Excitation& e) { return e.kind == ExcitationKind::test_mass; };
+    if (std::ranges::count_if(session.excitations, is_moving) > 2) continue;
+    const RecordNeeds needs = joint_needs(session);
+    num_wanted_max = std::max(num_wanted_max, needs.lines.size());
+    num_fitted_max = std::max(num_fitted_max, needs.lines.size() + needs.neighbours.size() + 1);
+  }
+  EXPECT_LE(num_wanted_max, num_line_readers_max);
+  EXPECT_LE(num_fitted_max, LineWeights::num_lines_max);
+  EXPECT_GT(num_fitted_max, 25U);
 }
 
 }  // namespace

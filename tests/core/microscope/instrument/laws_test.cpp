@@ -2,7 +2,7 @@
 
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "core/microscope/instrument/drawn_quantities.hpp"
+#include "core/microscope/instrument/drawn_moments.hpp"
 #include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
 #include "tests/test.hpp"
@@ -152,6 +152,80 @@ TEST(DerivedLaw, RefusesWhatIsNoFunctionOfOthers) {
   EXPECT_EQ(refusal_of(laws),
             "dispersion.scale_factor_error.sensor_1_y.expression = 1025 bytes (must be at most "
             "1024)");
+}
+
+// Every quantity but the first follows from the one before it, by expressions as deep as they may
+// be: the deepest that evaluation becomes.
+TEST(DerivedLaw, MayBeAChainOfAllQuantities) {
+  DispersionSet laws = nominal_dispersions();
+  for (std::size_t i = 1; i < num_drawn; ++i) {
+    laws[i] = derived(std::string(30, '(') + "2 * " + drawn_names()[i - 1] + std::string(30, ')'));
+  }
+  ASSERT_EQ(refusal_of(laws), "");
+  const DrawnValues values = draw(laws, 7);
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    EXPECT_EQ(values[i], std::ldexp(values[0], static_cast<int>(i)));
+  }
+  laws[0] = derived(drawn_names()[num_drawn - 1]);
+  EXPECT_EQ(refusal_of(laws), "dispersion.scale_factor_error.sensor_1_y.expression = \"" +
+                                  laws[1].expression +
+                                  "\" (scale_factor_error.sensor_1_x depends on it in turn)");
+}
+
+double deviation_of(const DrawnMoments& moments, std::size_t quantity) {
+  return std::sqrt(moments.covariance.diagonal()[static_cast<Eigen::Index>(quantity)]);
+}
+
+// x is uniform on ±b: x² has the mean b²/3 and the variance 4 b⁴/45, and no correlation with x; 3 x
+// has three times the deviation of x. Five standard errors of 8192 draws, √((κ − 1)/4n) of a
+// deviation with κ = 1.8 for x and 2.14 for x².
+TEST(DrawnMoments, OfDerivedQuantitiesAreThoseOfTheirFunction) {
+  DispersionSet laws = nominal_dispersions();
+  laws[24].law = Law::table;  // Counts as nominal, on ±b.
+  laws[25] = derived("pow(offcentring_m.x, 2)");
+  laws[26] = derived("3 * offcentring_m.x");
+  const double b = nominal_dispersions()[24].maximum, n = 8192.0;
+  const DrawnMoments moments = drawn_moments(laws);
+  EXPECT_EQ(moments.mean[24], 0.0);
+  EXPECT_DOUBLE_EQ(deviation_of(moments, 24), b / std::sqrt(3.0));
+  const double of_square = b * b * std::sqrt(4.0 / 45.0);
+  EXPECT_NEAR(moments.mean[25], b * b / 3.0, 5.0 * of_square / std::sqrt(n));
+  EXPECT_NEAR(deviation_of(moments, 25) / of_square, 1.0, 5.0 * std::sqrt(1.14 / (4.0 * n)));
+  EXPECT_NEAR(deviation_of(moments, 26) / (3.0 * b / std::sqrt(3.0)), 1.0,
+              5.0 * std::sqrt(0.8 / (4.0 * n)));
+  const auto correlation = [&](Eigen::Index i, Eigen::Index j) {
+    return moments.covariance(i, j) /
+           std::sqrt(moments.covariance(i, i) * moments.covariance(j, j));
+  };
+  EXPECT_NEAR(correlation(24, 26), 1.0, 1e-12);
+  EXPECT_NEAR(correlation(24, 25), 0.0, 5.0 / std::sqrt(n));
+  EXPECT_NEAR(correlation(25, 30), 0.0, 5.0 / std::sqrt(n));
+}
+
+// Of 8192 draws some 8 have the rare value: its law counts, not they.
+TEST(DrawnMoments, OfOtherQuantitiesDoNotDependOnDerivedOnes) {
+  DispersionSet laws = nominal_dispersions();
+  laws[0].law = Law::discrete;
+  laws[0].values = {0.0, 1.0};
+  laws[0].probabilities = {0.999, 1e-3};
+  laws[24] = normal_law(Law::normal, 1.0, 2.0);
+  laws[25] = correlated(-1.0, 0.5, {"offcentring_m.x"}, {0.8});
+  const DrawnMoments plain = drawn_moments(laws);
+  EXPECT_DOUBLE_EQ(plain.mean[0], 1e-3);
+  EXPECT_DOUBLE_EQ(deviation_of(plain, 0), std::sqrt(0.999e-3));
+  EXPECT_DOUBLE_EQ(plain.covariance(25, 24), 0.8);
+  EXPECT_EQ(plain.covariance(24, 25), plain.covariance(25, 24));
+  EXPECT_EQ(plain.covariance(24, 26), 0.0);
+  laws[5] = derived("scale_factor_error.sensor_1_x");
+  const DrawnMoments sampled = drawn_moments(laws);
+  for (const std::size_t i : {0U, 24U, 25U, 30U}) {
+    EXPECT_EQ(sampled.mean[i], plain.mean[i]);
+    EXPECT_DOUBLE_EQ(deviation_of(sampled, i), deviation_of(plain, i));
+  }
+  EXPECT_NEAR(sampled.covariance(25, 24), 0.8, 5.0 * 0.36 / std::sqrt(8192.0));
+  const Eigen::LLT<Eigen::MatrixXd> factors(
+      sampled.covariance + 1e-12 * Eigen::MatrixXd(sampled.covariance.diagonal().asDiagonal()));
+  EXPECT_EQ(factors.info(), Eigen::Success);
 }
 
 // Sample covariances of three quantities: each within five standard errors, √((1 + ρ²)/n).

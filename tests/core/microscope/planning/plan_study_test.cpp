@@ -35,7 +35,7 @@ MicroscopeCampaign perfect_campaign() {
 
 // Γ_mes,dx = a_d12 Γ_mes,cy with the amplitude C: cosine and sine have the variance ½A²/T each, of
 // which the part in phase tells, so that σ = A/(C √(2T)). The loop follows C_y to L/(1 + L), L as
-// in [Hardy2013] 5.1: f_c/f at 40 times f.
+// in [Hardy2013] 5.1: f_c/f at 40 times f. The low-pass takes as much of the noise as of the line.
 TEST(PlanStudy, IsTheClosedFormOfOneLineInWhiteNoise) {
   const MicroscopeCampaign campaign = perfect_campaign();
   const Scenario& scenario = campaign.scenario;
@@ -49,8 +49,7 @@ TEST(PlanStudy, IsTheClosedFormOfOneLineInWhiteNoise) {
     const std::complex<double> s(0.0, turn_rad * push.frequency_hz);
     const std::complex<double> loop = turn_rad * scenario.drag_free.bandwidth_hz / s *
                                       (1.0 + turn_rad * scenario.drag_free.integral_hz / s);
-    const double filtered = 1.0 / std::sqrt(1.0 + std::pow(scenario.estimation.band_ratio, -4.0));
-    const double amplitude = filtered * push.amplitude * std::abs(loop / (1.0 + loop));
+    const double amplitude = push.amplitude * std::abs(loop / (1.0 + loop));
     const double sigma =
         scenario.noise.linear_x.white_asd / amplitude / std::sqrt(2.0 * duration_s);
     const PlanBound bound = study->bound(orbits);
