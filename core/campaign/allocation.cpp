@@ -15,8 +15,8 @@ namespace {
 /// Slopes of the value in the steps of one part. A concave value rises by no more than `before` and
 /// falls by no less than `after` for each step that the part gets or gives.
 struct Slopes {
-  double before;  ///< Rise by the part's last step.
-  double after;   ///< Rise by one step more.
+  double before = 0.0;  ///< Rise by the part's last step.
+  double after = 0.0;   ///< Rise by one step more.
 
   [[nodiscard]] double middle() const { return 0.5 * (before + after); }
 };
@@ -28,49 +28,62 @@ class Exchanges {
  public:
   Exchanges(const AllocationRule& rule, const std::function<double(std::span<const int>)>& value,
             std::vector<int>& steps)
-      : rule_(rule), value_(value), steps_(steps), best_(value(steps)) {}
+      : rule_(rule), value_(value), steps_(steps), best_(value(steps)), slopes_(steps.size()) {}
 
   /// Exchanges so many steps between two parts for as long as that is a gain; false if it is none
-  /// for any two. Those come first that promise most.
+  /// for any two.
   bool make(int count) {
-    const std::vector<Slopes> slopes = slopes_here();
+    if (try_exchange(count)) return true;
+    if (are_slopes_new_) return false;
+    for (std::size_t i = 0; i < steps_.size(); ++i) slopes_[i] = slopes_of(i);
+    are_slopes_new_ = true;
+    return try_exchange(count);
+  }
+
+ private:
+  /// Tries those first that promise most. Slopes from before other exchanges say nothing for
+  /// certain, but a promise is worth a try.
+  bool try_exchange(int count) {
     std::vector<std::size_t> order(steps_.size());  // Of rising slope.
     std::iota(order.begin(), order.end(), 0U);
-    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return slopes[i].middle(); });
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return slopes_[i].middle(); });
     for (auto to = order.rbegin(); to != order.rend(); ++to) {
       for (const std::size_t from : order) {
-        if (from == *to || slopes[*to].before <= slopes[from].after) continue;
-        if (!gain(from, *to, count)) continue;
-        while (gain(from, *to, count)) {
+        if (from == *to || slopes_[*to].before <= slopes_[from].after) continue;
+        if (!is_possible(from, *to, count)) continue;
+        if (gain(from, *to, count)) {
+          while (gain(from, *to, count)) {
+          }
+          slopes_[from] = slopes_of(from);
+          slopes_[*to] = slopes_of(*to);
+          are_slopes_new_ = false;
+          return true;
         }
-        return true;
+        if (!are_slopes_new_) return false;
       }
     }
     return false;
   }
 
- private:
-  [[nodiscard]] std::vector<Slopes> slopes_here() {
-    constexpr double unknown = std::numeric_limits<double>::infinity();
-    std::vector<Slopes> slopes;
-    for (int& steps : steps_) {
-      ++steps;
-      const double after = difference(value_(steps_), best_);
-      --steps;
-      double before = unknown;
-      if (steps > 1) {
-        --steps;
-        before = difference(best_, value_(steps_));
-        ++steps;
-      }
-      slopes.push_back({before, after});
-    }
+  [[nodiscard]] Slopes slopes_of(std::size_t i) {
+    Slopes slopes{.before = std::numeric_limits<double>::infinity(), .after = 0.0};
+    ++steps_[i];
+    slopes.after = difference(value_(steps_), best_);
+    --steps_[i];
+    if (steps_[i] == 1) return slopes;
+    --steps_[i];
+    slopes.before = difference(best_, value_(steps_));
+    ++steps_[i];
     return slopes;
+  }
+
+  [[nodiscard]] bool is_possible(std::size_t from, std::size_t to, int count) const {
+    return steps_[from] - count >= rule_.minimum && steps_[to] <= rule_.maximum - count;
   }
 
   /// Exchanges steps if that is a gain.
   bool gain(std::size_t from, std::size_t to, int count) {
-    if (steps_[from] - count < rule_.minimum || steps_[to] > rule_.maximum - count) return false;
+    if (!is_possible(from, to, count)) return false;
     move(from, to, count);
     const double value = value_(steps_);
     if (value > best_) {
@@ -90,6 +103,8 @@ class Exchanges {
   const std::function<double(std::span<const int>)>& value_;
   std::vector<int>& steps_;
   double best_;
+  std::vector<Slopes> slopes_;
+  bool are_slopes_new_ = false;  ///< All are those at `steps_`.
 };
 
 }  // namespace

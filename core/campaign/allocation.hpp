@@ -19,8 +19,7 @@ struct AllocationRule {
 /// each, that is the best allocation. If the parts share in the value it is nearly the best:
 /// several exchanges at once may still be a gain of the second order in a step.
 ///
-/// @param value  Of the steps of each part, ≥ 1: concave, or −∞. Called some 2 or 3 times a part
-///               for every exchange.
+/// @param value  Of the steps of each part, ≥ 1: concave, or −∞. Called some tens of times a part.
 /// @throws InvalidArgument if the parts need more than `num_steps`, or cannot hold them.
 [[nodiscard]] std::vector<int> allocate(std::size_t num_parts, const AllocationRule& rule,
                                         const std::function<double(std::span<const int>)>& value);

@@ -68,7 +68,8 @@ class PlanStudy {
 
   /// What grows with the goal, in runs that are not lost: the logarithm of the odds that all
   /// objectives hold, which has a slope also where the chance rounds to 0 or 1, or the mean budget
-  /// with its sign changed. Takes some 4 µs an instrument, more with tens of sessions.
+  /// with its sign changed. Takes some 10 µs an instrument, and three times as long with 64
+  /// sessions.
   /// @pre For `budget` the bounds have a mean_budget.
   [[nodiscard]] virtual double merit(PlanGoal goal, std::span<const int> num_steps) const = 0;
 

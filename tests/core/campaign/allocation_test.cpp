@@ -125,9 +125,9 @@ class Determinacy {
 };
 
 // Where parts share in the value, an exchange of a single step from the best allocation loses what
-// is of the second order in a step. Of 120 such problems the worst is 0.4 % beside the best value;
-// an even allocation is 15 % beside it in the mean.
-TEST(Allocation, IsNearlyTheBestOfAllThereAreIfPartsShare) {
+// is of the second order in a step: nothing in these 120 problems, in which an even allocation is
+// 10 % beside the best value in the mean.
+TEST(Allocation, IsTheBestOfAllThereAreInMostProblemsWhereTheyShare) {
   Numbers number(2);
   double even = 0.0;
   for (int problem = 0; problem < 120; ++problem) {
@@ -136,7 +136,7 @@ TEST(Allocation, IsNearlyTheBestOfAllThereAreIfPartsShare) {
     const AllocationRule rule{.num_steps = static_cast<int>(num_parts) * (2 + problem / 40)};
     const double best = largest(num_parts, rule, value);
     std::vector<int> found = allocate(num_parts, rule, value);
-    EXPECT_LE(value(found) / best, 1.005) << problem;
+    EXPECT_NEAR(value(found) / best, 1.0, 1e-12) << problem;
     even += value(std::vector(num_parts, 2 + problem / 40)) / best / 120;
     const double at = value(found);
     for (int& from : found) {
