@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -8,13 +9,40 @@
 
 namespace proofmass {
 
+/// Probed runs that are lost for one reason.
+struct PlanLoss {
+  std::string cause;         ///< One of ResultSchema::loss_causes.
+  std::string session;       ///< Where, as RunResult::loss has it or by its name.
+  std::string detail;        ///< What is beyond which limit, for people.
+  std::size_t num_runs = 0;  ///< ≥ 1.
+};
+
 /// How well the estimates of a run can be known, before any run is computed.
 struct PlanBound {
-  std::vector<double> standard_errors;  ///< Of each quantity, SI: mean over the instruments.
-  std::vector<double> misses;           ///< Of each: probability of an error beyond its objective.
-  double misses_any = 0.0;              ///< Probability that one or more objectives are missed.
-  std::optional<double>
-      mean_budget{};  ///< Mean total of the campaign's ErrorBudget, if it has one.
+  /// Of each quantity, SI: mean over the instruments.
+  std::vector<double> standard_errors;
+  /// Of each: probability that a run is lost or has an error beyond the objective.
+  std::vector<double> misses;
+  /// Probability that a run is lost or misses one or more objectives; at most so much if errors are
+  /// correlated.
+  double misses_any = 0.0;
+  /// Mean total of the campaign's ErrorBudget, if it has one, in runs that are not lost.
+  std::optional<double> mean_budget{};
+  /// What loses probed runs, most of them first.
+  std::vector<PlanLoss> losses{};
+
+  /// Probed runs that are lost.
+  [[nodiscard]] std::size_t num_lost() const {
+    std::size_t sum = 0;
+    for (const PlanLoss& loss : losses) sum += loss.num_runs;
+    return sum;
+  }
+};
+
+/// What an allocation is to make best.
+enum class PlanGoal : std::uint8_t {
+  objectives = 1,  ///< The chance that all objectives hold.
+  budget = 2,      ///< The mean budget.
 };
 
 /// What the sessions of a campaign's runs find out together, whatever their lengths are.
@@ -27,16 +55,27 @@ class PlanStudy {
   [[nodiscard]] virtual std::vector<std::string> session_names() const = 0;
   /// Steps of each session in the campaign.
   [[nodiscard]] virtual std::vector<int> num_steps() const = 0;
+  /// Most steps that a session may have.
+  [[nodiscard]] virtual int num_steps_max() const = 0;
   /// Drawn instruments that a bound is the mean over.
   [[nodiscard]] virtual std::size_t num_instruments() const = 0;
+  /// Runs whose loops were simulated, with their noise.
+  [[nodiscard]] virtual std::size_t num_probed() const = 0;
 
-  /// The bound if the sessions had these lengths. Takes some 100 µs.
+  /// The bound if the sessions had these lengths.
   /// @param num_steps  Of each session, ≥ 1.
   [[nodiscard]] virtual PlanBound bound(std::span<const int> num_steps) const = 0;
 
+  /// What grows with the goal, in runs that are not lost: the logarithm of the odds that all
+  /// objectives hold, which has a slope also where the chance rounds to 0 or 1, or the mean budget
+  /// with its sign changed. Takes some 10 µs an instrument, and three times as long with 64
+  /// sessions.
+  /// @pre For `budget` the bounds have a mean_budget.
+  [[nodiscard]] virtual double merit(PlanGoal goal, std::span<const int> num_steps) const = 0;
+
   /// The campaign file, commented, in which the sessions have these lengths and runs are estimated
   /// as the bound says.
-  /// @throws ConfigError if a session cannot be so short.
+  /// @throws ConfigError if a session cannot have its length.
   [[nodiscard]] virtual std::string campaign_file(std::span<const int> num_steps) const = 0;
 };
 

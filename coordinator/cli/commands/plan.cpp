@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -42,14 +44,21 @@ struct Planned {
   PlanBound bound;
   std::vector<double> objectives;
   std::size_t num_instruments;
+  std::size_t num_probed;
   std::string method;
 };
 
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
   const int in_all = std::accumulate(num_steps.begin(), num_steps.end(), 0);
   PlanBound bound = study.bound(num_steps);
-  return {study.session_names(), std::move(num_steps),    in_all,        std::move(bound),
-          campaign.objectives(), study.num_instruments(), study.method()};
+  return {.sessions = study.session_names(),
+          .num_steps = std::move(num_steps),
+          .num_steps_in_all = in_all,
+          .bound = std::move(bound),
+          .objectives = campaign.objectives(),
+          .num_instruments = study.num_instruments(),
+          .num_probed = study.num_probed(),
+          .method = study.method()};
 }
 
 /// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing.
@@ -57,6 +66,43 @@ std::string percent_text(double miss) {
   if (miss < 1e-12) return "100";
   const int decimals = static_cast<int>(std::ceil(-std::log10(miss))) - 1;
   return fmt::format("{:.{}f}", 100.0 * (1.0 - miss), std::clamp(decimals, 1, 10));
+}
+
+/// `16 of 16 probed runs are lost`.
+std::string losses_text(const PlanBound& bound, std::size_t num_probed) {
+  const std::size_t num_lost = bound.num_lost();
+  return fmt::format("{} of {} probed runs {} lost", num_lost, num_probed,
+                     num_lost == 1 ? "is" : "are");
+}
+
+/// What loses runs, and what follows from it.
+void add_losses(const Planned& plan, Table& table) {
+  const std::vector<PlanLoss>& losses = plan.bound.losses;
+  if (losses.empty()) {
+    table.notes.push_back(fmt::format("none of {} probed runs is lost", plan.num_probed));
+    return;
+  }
+  table.remarks.push_back({losses_text(plan.bound, plan.num_probed), Tone::bad});
+  for (const PlanLoss& loss : losses) {
+    table.notes.push_back(fmt::format("lost, {}: {}; {}", loss.num_runs, loss.cause, loss.detail));
+  }
+  table.notes.push_back(
+      "lost runs count as misses of every objective; remove what loses them before the campaign is "
+      "run");
+}
+
+/// Names what the sessions do not determine.
+void add_undetermined(const Planned& plan, Table& table) {
+  std::vector<std::string_view> symbols;
+  for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
+    if (plan.bound.standard_errors[i] <= plan.objectives[i]) continue;
+    symbols.push_back(model().results().quantities[i].symbol);
+  }
+  if (symbols.empty()) return;
+  table.notes.push_back(
+      fmt::format("the sessions do not determine {} to the objective, because σ "
+                  "is larger",
+                  fmt::join(symbols, ", ")));
 }
 
 Table bound_table(const Planned& plan) {
@@ -81,9 +127,12 @@ Table bound_table(const Planned& plan) {
         {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});
   }
   table.notes.push_back(fmt::format(
-      "σ: standard error of estimates by the method {}, mean of {} instruments; the errors of runs "
-      "are taken to be normal, and no run to be lost",
+      "σ: standard error of estimates by the method {}, mean of {} instruments; errors are taken "
+      "to be normal, and the chance of all objectives is the product of theirs, below which no "
+      "correlation of the errors brings it",
       plan.method, plan.num_instruments));
+  add_undetermined(plan, table);
+  add_losses(plan, table);
   return table;
 }
 
@@ -111,11 +160,19 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"num_steps", plan.num_steps_in_all},
             {"step_name", model().step_name()},
             {"num_instruments", plan.num_instruments},
+            {"num_probed", plan.num_probed},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", nullptr},
+            {"losses", Json::array()},
             {"parameters", Json::array()},
             {"sessions", Json::array()}};
   if (plan.bound.mean_budget) json["mean_budget"] = *plan.bound.mean_budget;
+  for (const PlanLoss& loss : plan.bound.losses) {
+    json["losses"].push_back({{"cause", loss.cause},
+                              {"session", loss.session},
+                              {"detail", loss.detail},
+                              {"num_runs", loss.num_runs}});
+  }
   const std::vector<Quantity>& quantities = model().results().quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     json["parameters"].push_back({{"parameter", quantities[i].name},
@@ -144,22 +201,35 @@ std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& 
 std::vector<int> allocated(const PlanOptions& options, const PlanStudy& study) {
   const std::vector<int> of_file = study.num_steps();
   const int in_all = options.num_steps.value_or(std::accumulate(of_file.begin(), of_file.end(), 0));
-  const auto least = static_cast<std::size_t>(options.minimum) * of_file.size();
-  if (static_cast<std::size_t>(in_all) < least) {
-    throw UsageError(fmt::format("--{} = {} (must be {} or more, --minimum {} for each of {})",
-                                 model().step_name(), in_all, least, options.minimum,
-                                 of_file.size()));
-  }
+  const AllocationRule rule{
+      .num_steps = in_all, .minimum = options.minimum, .maximum = study.num_steps_max()};
+  const auto refuse = [&](std::string_view limit, std::size_t number, std::string_view each) {
+    throw UsageError(fmt::format("--{} = {} (must be {} or {}, {} for each of {} sessions)",
+                                 model().step_name(), in_all, number, limit, each, of_file.size()));
+  };
+  const std::size_t least = static_cast<std::size_t>(rule.minimum) * of_file.size();
+  const std::size_t most = static_cast<std::size_t>(rule.maximum) * of_file.size();
+  const auto number = static_cast<std::size_t>(in_all);
+  if (number < least) refuse("more", least, fmt::format("--minimum {}", rule.minimum));
+  if (number > most) refuse("fewer", most, fmt::format("at most {}", rule.maximum));
+  const PlanBound bound = study.bound(of_file);
   const bool is_for_budget = options.goal == "budget";
-  if (is_for_budget && !study.bound(of_file).mean_budget) {
+  if (is_for_budget && !bound.mean_budget) {
     throw UsageError("--for = budget (the campaign has no budget of errors)");
   }
-  return allocate(of_file.size(), {.num_steps = in_all, .minimum = options.minimum},
-                  [&](std::span<const int> num_steps) {
-                    const PlanBound bound = study.bound(num_steps);
-                    if (is_for_budget) return -bound.mean_budget.value_or(0.0);
-                    return (1.0 - bound.misses_any) / bound.misses_any;  // Exact at both ends.
-                  });
+  if (bound.num_lost() == study.num_probed()) {
+    throw UsageError(fmt::format("{}: {} ({}); remove what loses them before time is allocated",
+                                 options.file.string(), losses_text(bound, study.num_probed()),
+                                 bound.losses.front().detail));
+  }
+  const PlanGoal goal = is_for_budget ? PlanGoal::budget : PlanGoal::objectives;
+  return allocate(of_file.size(), rule,
+                  [&](std::span<const int> num_steps) { return study.merit(goal, num_steps); });
+}
+
+/// Lost runs have an exit code of their own, because the figures are those of the others.
+int exit_code_of(const Planned& plan) {
+  return plan.bound.losses.empty() ? exit_done : exit_not_met;
 }
 
 int plan_campaign(const PlanOptions& options) {
@@ -167,12 +237,14 @@ int plan_campaign(const PlanOptions& options) {
   if (!options.new_file.empty()) check_new_file("--optimise", options.new_file);
   const std::unique_ptr<const PlanStudy> study = study_of(options, *campaign);
   if (options.new_file.empty()) {
-    print_plan(options, planned(*campaign, *study, study->num_steps()));
-    return exit_done;
+    const Planned plan = planned(*campaign, *study, study->num_steps());
+    print_plan(options, plan);
+    return exit_code_of(plan);
   }
   const Planned plan = planned(*campaign, *study, allocated(options, *study));
   try {
-    write_document(options.new_file, wire::IfThere::keep, study->campaign_file(plan.num_steps));
+    wire::write_whole_file("--optimise", options.new_file, study->campaign_file(plan.num_steps),
+                           wire::public_mode, wire::IfThere::keep);
   } catch (const ConfigError& error) {
     throw UsageError(
         fmt::format("no campaign file can hold the best allocation: {}; choose another "
@@ -183,7 +255,7 @@ int plan_campaign(const PlanOptions& options) {
   if (options.format == OutputFormat::text) {
     print_lines(fmt::format("wrote {}\n", options.new_file.string()));
   }
-  return exit_done;
+  return exit_code_of(plan);
 }
 
 }  // namespace
@@ -191,6 +263,7 @@ int plan_campaign(const PlanOptions& options) {
 void add_plan(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<PlanOptions>(
       app, chosen, "plan", "Predict the errors of a campaign, or plan it", plan_campaign);
+  command.footer(exit_codes_text({exit_not_met}));
   add_campaign_file(command, options.file);
   add_override_options(command, options.overrides);
   CLI::Option* const optimise = command.add_option(

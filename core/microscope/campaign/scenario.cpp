@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -87,7 +88,8 @@ void check_transient(const Scenario& scenario) {
     const double duration_s = scenario.sessions[i].num_orbits * scenario.orbit.period_s;
     if (scenario.estimation.transient_s <= duration_s / 2) continue;
     throw ConfigError("estimation.transient_s", fmt::format("{}", scenario.estimation.transient_s),
-                      fmt::format("must leave half of session[{}], {} s", i, duration_s));
+                      fmt::format("must leave half of session[{}] with orbits = {}, {} s", i,
+                                  scenario.sessions[i].num_orbits, duration_s));
   }
 }
 
@@ -119,11 +121,13 @@ void check_wanted_lines(const Scenario& scenario) {
       const double line_hz = line_frequency_hz(session, wanted.line, scenario.orbit.period_s);
       for (const double other_hz : lines_hz) {
         if (line_hz < nyquist_hz && std::abs(line_hz - other_hz) >= resolution_hz) continue;
-        throw ConfigError(fmt::format("session[{}].excitations", i),
-                          fmt::format("a line at {:.6g} Hz", line_hz),
-                          fmt::format("the estimation must tell it from that at {:.6g} Hz, and "
+        const std::string line = fmt::format("a line at {:.6g} Hz", line_hz);
+        const std::string other = fmt::format("a line at {:.6g} Hz", other_hz);
+        const std::string named = line == other ? "another one there" : other;
+        throw ConfigError(fmt::format("session[{}].excitations", i), line,
+                          fmt::format("the estimation must tell it from {} with orbits = {}, and "
                                       "from the Nyquist frequency, {} Hz",
-                                      other_hz, nyquist_hz));
+                                      named, session.num_orbits, nyquist_hz));
       }
       lines_hz.push_back(line_hz);
     }

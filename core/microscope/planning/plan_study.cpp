@@ -1,16 +1,21 @@
 #include "core/microscope/planning/plan_study.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/math/elementary.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "core/microscope/simulation/run_health.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass {
@@ -23,14 +28,17 @@ constexpr std::uint64_t num_instruments_max = 256;
 /// Orbits in which a session's lines are measured, if they can be told apart in so few.
 constexpr int num_measured_orbits = 3;
 
+/// Most orbits of a session that a campaign file may have.
+constexpr int num_session_orbits_max = 10'000;
+
 EstimationMethod method_named(std::string_view name) {
   const auto methods = estimation_methods();
   const auto found = std::ranges::find(methods, name, &EstimationMethodInfo::name);
   return static_cast<EstimationMethod>(found - methods.begin() + 1);
 }
 
-/// Whether the session's record tells all lines apart that the method fits in it, and is long
-/// against the transient.
+/// Whether the session's record tells all lines apart that are fitted in it, by the method or as
+/// the session's own, and is long against the transient.
 bool tells_lines_apart(const Scenario& scenario, const Session& session) {
   const double duration_s = session.num_orbits * scenario.orbit.period_s;
   if (duration_s < 4.0 * scenario.estimation.transient_s) return false;
@@ -41,6 +49,8 @@ bool tells_lines_apart(const Scenario& scenario, const Session& session) {
   };
   for (const WantedLine& wanted : needs.lines) add(wanted.line);
   for (const LineMultiple& neighbour : needs.neighbours) add(neighbour);
+  for (const LineMultiple& line : session.fit_lines) add(line);
+  for (const LineMultiple& line : session.known_lines) add(line);
   std::ranges::sort(lines_hz);
   for (std::size_t i = 1; i < lines_hz.size(); ++i) {
     const double difference = (lines_hz[i] - lines_hz[i - 1]) * duration_s;
@@ -50,31 +60,139 @@ bool tells_lines_apart(const Scenario& scenario, const Session& session) {
   return true;
 }
 
-/// The session with as few orbits as leave its lines what they are, and nothing that other methods
-/// record.
-Session measured_session(const Scenario& scenario, Session session) {
-  const int num_orbits = session.num_orbits;
-  session.num_orbits = std::min(num_orbits, num_measured_orbits);
-  while (session.num_orbits < num_orbits && !tells_lines_apart(scenario, session)) {
-    ++session.num_orbits;
+/// The campaign with as few orbits of each session as leave its lines what they are.
+MicroscopeCampaign short_campaign(MicroscopeCampaign campaign) {
+  for (Session& session : campaign.scenario.sessions) {
+    const int num_orbits = session.num_orbits;
+    session.num_orbits = std::min(num_orbits, num_measured_orbits);
+    while (session.num_orbits < num_orbits && !tells_lines_apart(campaign.scenario, session)) {
+      ++session.num_orbits;
+    }
   }
-  session.target = SessionTarget::no_target;
-  session.fit_lines = {{2.0}};
-  session.known_lines.clear();
-  return session;
+  return campaign;
 }
 
-/// The campaign with short sessions, without noise and without the errors of instruments, which
-/// change the amplitudes of lines by a percent.
+/// A short campaign without noise and without the errors of instruments, which change the
+/// amplitudes of lines by a percent, and without what other methods record.
 MicroscopeCampaign measured_campaign(MicroscopeCampaign campaign) {
   campaign.scenario.noise.scale = 0.0;
   for (Dispersion& dispersion : campaign.dispersions) {
     dispersion = {.law = Law::fixed, .file = {}, .column = {}};
   }
   for (Session& session : campaign.scenario.sessions) {
-    session = measured_session(campaign.scenario, std::move(session));
+    session.target = SessionTarget::no_target;
+    session.fit_lines = {{2.0}};
+    session.known_lines.clear();
   }
   return campaign;
+}
+
+/// Records what the health of the loops is judged by, and nothing else.
+constexpr EstimationMethodInfo probe_method{
+    .name = "probe",
+    .needs = [](const Session&) { return RecordNeeds{.signals = SignalSet::health}; },
+    .check = joint_method.check,
+    .estimate = joint_method.estimate,
+};
+
+/// The first runs that have an instrument, with noise.
+std::vector<RunRecord> probe_records(const MicroscopeCampaign& campaign,
+                                     const std::vector<RunIndex>& runs) {
+  const RunPlan plan(campaign, probe_method);
+  const InstructionSet set = best_instruction_set();
+  std::vector<RunRequest> requests;
+  std::vector<RunRecord> records;
+  for (std::size_t i = 0; i < std::min(runs.size(), batch_lanes); ++i) {
+    const std::vector<double> values = campaign.table_values(runs[i]);
+    if (set == InstructionSet::scalar) {
+      records.push_back(plan.record(runs[i], values));
+    } else {
+      requests.push_back({runs[i], values});
+    }
+  }
+  return set == InstructionSet::scalar ? records : plan.record_batch(requests, set);
+}
+
+/// What the squares of a record would have been, had it been longer.
+void lengthen(SessionHealth& health, double factor) {
+  health.quadratic_squares *= factor;
+  health.common_squares *= factor;
+  for (double& squares : health.sensor_squares) squares *= factor;
+}
+
+/// What a run is lost by.
+/// @param record  That `finding` is of.
+PlanLoss plan_loss(const Scenario& scenario, const HealthRecord& record,
+                   const HealthFinding& finding) {
+  PlanLoss loss{.cause = std::string(name_of(finding.loss.cause)), .session = {}, .detail = {}};
+  if (finding.loss.cause != LossCause::saturation) {
+    loss.session = name_of(finding.loss.session);
+    loss.detail = fmt::format("may move the estimate of {} beyond its objective", loss.session);
+    return loss;
+  }
+  const double range_m_s2 = scenario.sensor.range_m_s2;
+  const auto is_beyond = [range_m_s2](const SessionHealth& health) {
+    return !(health.acceleration_m_s2 <= range_m_s2);
+  };
+  const auto first = std::ranges::find_if(record, is_beyond);
+  const auto i = static_cast<std::size_t>(first - record.begin());
+  loss.session = scenario.sessions[std::min(i, record.size() - 1)].name;
+  loss.detail = fmt::format("a sensor measures more than sensor.range_m_s2 = {} in session {}",
+                            range_m_s2, loss.session);
+  return loss;
+}
+
+// The chance that all objectives hold, in logarithms: they have slopes where it rounds to 0 or 1.
+
+/// Probability that a normal variable is beyond x standard deviations, x ≥ 0.
+double beyond(double x) { return 2.0 * normal_cumulative(-x); }
+
+/// log beyond(x).
+double log_beyond(double x) {
+  if (x < 36.0) return logarithm(beyond(x));
+  const double y = 1.0 / (x * x);  // √(2/π) e^(−x²/2)/x (1 − y + 3y² − 15y³ + …).
+  return -0.5 * x * x + logarithm(std::sqrt(2.0 / std::numbers::pi) / x *
+                                  (1.0 - y * (1.0 - 3.0 * y * (1.0 - 5.0 * y))));
+}
+
+/// log(1 − beyond(x)).
+double log_within(double x) {
+  if (x == 0.0) return -std::numeric_limits<double>::infinity();
+  if (x > 0.05) return logarithm(1.0 - beyond(x));
+  const double y = x * x;  // √(2/π) x (1 − y/6 + y²/40 − …).
+  return logarithm(std::sqrt(2.0 / std::numbers::pi) * x * (1.0 - y * (1.0 / 6.0 - y / 40.0)));
+}
+
+/// log of the sum of e^x.
+double log_sum_exp(std::span<const double> x) {
+  const double largest = std::ranges::max(x);
+  if (std::isinf(largest)) return largest;
+  double sum = 0.0;
+  for (const double each : x) sum += exponential(std::max(each - largest, -699.0));
+  return largest + logarithm(sum);
+}
+
+/// That one or more objectives are missed.
+struct MissChance {
+  double miss = 0.0;
+  double log_miss = 0.0;  ///< Also where `miss` is 0 to double precision.
+  double log_hold = 0.0;  ///< log(1 − miss), also where that is.
+};
+
+MissChance miss_chance(const ParameterArray& objectives, const ParameterArray& errors) {
+  MissChance chance;
+  ParameterArray log_misses;
+  double log_hold = 0.0;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    const double x = objectives[i] / errors[i];
+    const double miss = beyond(x);
+    chance.miss += miss - chance.miss * miss;
+    log_misses[i] = log_beyond(x);
+    log_hold += log_within(x);
+  }
+  chance.log_miss = chance.miss > 1e-290 ? logarithm(chance.miss) : log_sum_exp(log_misses);
+  chance.log_hold = chance.miss < 0.5 ? logarithm(1.0 - chance.miss) : log_hold;
+  return chance;
 }
 
 class JointStudy final : public PlanStudy {
@@ -83,10 +201,11 @@ class JointStudy final : public PlanStudy {
     campaign_.scenario.estimation.method = method_named(joint_method.name);
     campaign_.scenario.validate();
     const Scenario& scenario = campaign_.scenario;
-    const MicroscopeCampaign measured = measured_campaign(campaign_);
-    for (const Session& session : measured.scenario.sessions) {
-      measured_s_.push_back(fitted_s(session.num_orbits));
+    const MicroscopeCampaign brief = short_campaign(campaign_);
+    for (const Session& session : brief.scenario.sessions) {
+      measured_orbits_.push_back(session.num_orbits);
     }
+    const MicroscopeCampaign measured = measured_campaign(brief);
     const RunRecord record = RunPlan(measured, joint_method).record(RunIndex{0}, {});
     const DrawnMoments laws = drawn_moments(campaign_.dispersions);
     const EstimationInput input{.sessions = measured.scenario.sessions,
@@ -96,7 +215,7 @@ class JointStudy final : public PlanStudy {
                                 .laws = laws,
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};
-    add_instruments(record.phasors, input);
+    probes_ = probe_records(brief, add_instruments(record.phasors, input));
   }
 
   [[nodiscard]] std::string method() const override { return std::string(joint_method.name); }
@@ -110,41 +229,46 @@ class JointStudy final : public PlanStudy {
     for (const Session& session : campaign_.scenario.sessions) orbits.push_back(session.num_orbits);
     return orbits;
   }
+  [[nodiscard]] int num_steps_max() const override { return num_session_orbits_max; }
   [[nodiscard]] std::size_t num_instruments() const override { return instruments_.size(); }
+  [[nodiscard]] std::size_t num_probed() const override { return probes_.size(); }
 
   [[nodiscard]] PlanBound bound(std::span<const int> num_orbits) const override {
-    std::vector<double> factors;
-    for (std::size_t i = 0; i < num_orbits.size(); ++i) {
-      factors.push_back(std::max(0.0, fitted_s(num_orbits[i])) / measured_s_[i]);
-    }
-    PlanBound bound{.standard_errors = std::vector<double>(num_parameters),
-                    .misses = std::vector<double>(num_parameters)};
-    const double part = 1.0 / static_cast<double>(instruments_.size());
-    for (const JointInformation& instrument : instruments_) {
-      const ParameterArray errors = instrument.standard_errors(factors);
-      double misses_any = 0.0;
+    const std::vector<ParameterArray> errors = standard_errors(num_orbits);
+    PlanBound bound{.standard_errors = means(errors),
+                    .misses = std::vector<double>(num_parameters),
+                    .losses = losses(num_orbits, errors)};
+    const double part = 1.0 / static_cast<double>(errors.size());
+    const ParameterArray& objectives = campaign_.scenario.objectives;
+    for (const ParameterArray& of_instrument : errors) {
       for (std::size_t i = 0; i < num_parameters; ++i) {
-        const double miss = 2.0 * normal_cumulative(-campaign_.scenario.objectives[i] / errors[i]);
-        bound.standard_errors[i] += part * errors[i];
-        bound.misses[i] += part * miss;
-        misses_any += miss - misses_any * miss;
+        bound.misses[i] += part * beyond(objectives[i] / of_instrument[i]);
       }
-      bound.misses_any += part * misses_any;
+      bound.misses_any += part * miss_chance(objectives, of_instrument).miss;
     }
-    if (const std::optional<ErrorBudget> budget = campaign_.error_budget()) {
-      // The mean of |x| of a normal law.
-      std::vector<double> means = bound.standard_errors;
-      for (double& mean : means) mean *= std::sqrt(2.0 / std::numbers::pi);
-      bound.mean_budget = budget->after(means, budget->assumed_level).total;
-    }
+    // A run that is lost misses everything.
+    const double lost = static_cast<double>(bound.num_lost()) / static_cast<double>(num_probed());
+    for (double& miss : bound.misses) miss += lost * (1.0 - miss);
+    bound.misses_any += lost * (1.0 - bound.misses_any);
+    if (campaign_.error_budget()) bound.mean_budget = mean_budget(bound.standard_errors);
     return bound;
+  }
+
+  [[nodiscard]] double merit(PlanGoal goal, std::span<const int> num_orbits) const override {
+    const std::vector<ParameterArray> errors = standard_errors(num_orbits);
+    if (goal == PlanGoal::budget) return -mean_budget(means(errors));
+    std::vector<double> hold, miss;
+    for (const ParameterArray& of_instrument : errors) {
+      const MissChance chance = miss_chance(campaign_.scenario.objectives, of_instrument);
+      hold.push_back(chance.log_hold);
+      miss.push_back(chance.log_miss);
+    }
+    return log_sum_exp(hold) - log_sum_exp(miss);
   }
 
   [[nodiscard]] std::string campaign_file(std::span<const int> num_orbits) const override {
     MicroscopeCampaign campaign = campaign_;
-    for (std::size_t i = 0; i < num_orbits.size(); ++i) {
-      campaign.scenario.sessions[i].num_orbits = num_orbits[i];
-    }
+    campaign.scenario = scenario_of(num_orbits);
     campaign.validate();
     return commented_campaign(campaign);
   }
@@ -156,7 +280,73 @@ class JointStudy final : public PlanStudy {
            campaign_.scenario.estimation.transient_s;
   }
 
-  void add_instruments(const RunPhasors& phasors, const EstimationInput& input) {
+  [[nodiscard]] Scenario scenario_of(std::span<const int> num_orbits) const {
+    Scenario scenario = campaign_.scenario;
+    for (std::size_t i = 0; i < num_orbits.size(); ++i) {
+      scenario.sessions[i].num_orbits = num_orbits[i];
+    }
+    return scenario;
+  }
+
+  /// Of each instrument, if the sessions had these lengths.
+  [[nodiscard]] std::vector<ParameterArray> standard_errors(std::span<const int> num_orbits) const {
+    std::vector<double> factors;
+    for (std::size_t i = 0; i < num_orbits.size(); ++i) {
+      factors.push_back(std::max(0.0, fitted_s(num_orbits[i])) / fitted_s(measured_orbits_[i]));
+    }
+    std::vector<ParameterArray> errors;
+    errors.reserve(instruments_.size());
+    for (const JointInformation& instrument : instruments_) {
+      errors.push_back(instrument.standard_errors(factors));
+    }
+    return errors;
+  }
+
+  [[nodiscard]] static std::vector<double> means(const std::vector<ParameterArray>& errors) {
+    std::vector<double> means(num_parameters);
+    for (const ParameterArray& of_instrument : errors) {
+      for (std::size_t i = 0; i < num_parameters; ++i) {
+        means[i] += of_instrument[i] / static_cast<double>(errors.size());
+      }
+    }
+    return means;
+  }
+
+  /// Of the mean of |error|, which is σ √(2/π) of a normal law.
+  [[nodiscard]] double mean_budget(std::vector<double> errors) const {
+    for (double& error : errors) error *= std::sqrt(2.0 / std::numbers::pi);
+    const ErrorBudget budget = campaign_.error_budget().value();
+    return budget.after(errors, budget.assumed_level).total;
+  }
+
+  /// What loses probed runs if the sessions have these lengths, most of them first.
+  /// @param errors  Of each instrument.
+  [[nodiscard]] std::vector<PlanLoss> losses(std::span<const int> num_orbits,
+                                             const std::vector<ParameterArray>& errors) const {
+    const Scenario scenario = scenario_of(num_orbits);
+    const ShiftBounds bounds(scenario);
+    std::vector<PlanLoss> losses;
+    for (std::size_t k = 0; k < probes_.size(); ++k) {
+      HealthRecord record = probes_[k].health;
+      for (std::size_t i = 0; i < record.size(); ++i) {
+        lengthen(record[i], static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
+      }
+      const bool are_usable = std::ranges::all_of(errors[k], is_in_range);
+      const HealthFinding finding =
+          judge_health(scenario, bounds, record, probes_[k].phasors, probes_[k].truth,
+                       are_usable ? std::span<const double>(errors[k]) : std::span<const double>());
+      if (finding.loss.cause == LossCause::none) continue;
+      PlanLoss loss = plan_loss(scenario, record, finding);
+      auto same = std::ranges::find(losses, loss.detail, &PlanLoss::detail);
+      if (same == losses.end()) same = losses.insert(same, std::move(loss));
+      ++same->num_runs;
+    }
+    std::ranges::stable_sort(losses, std::greater<>(), &PlanLoss::num_runs);
+    return losses;
+  }
+
+  /// @return The runs that have these instruments.
+  std::vector<RunIndex> add_instruments(const RunPhasors& phasors, const EstimationInput& input) {
     // A table has values for the runs of the campaign only.
     const std::uint64_t each = campaign_.realisations;
     const std::uint64_t num_drawn =
@@ -164,26 +354,26 @@ class JointStudy final : public PlanStudy {
             ? num_instruments_max
             : std::min((campaign_.num_runs + each - 1) / each, num_instruments_max);
     const double bias_m_s2 = campaign_.scenario.drag_free.bias_compensation_error_x_m_s2;
+    std::vector<RunIndex> runs;
     for (std::uint64_t i = 0; i < num_drawn; ++i) {
       const RunIndex run{i * each};
       const AcceptedDraw draw = draw_instrument(campaign_, run, campaign_.table_values(run));
       if (!draw.instrument) continue;
       instruments_.emplace_back(phasors, input, true_unknowns(*draw.instrument, bias_m_s2));
+      runs.push_back(run);
     }
-    const auto is_finite = [&](const JointInformation& information) {
-      return std::ranges::all_of(information.standard_errors(std::vector(measured_s_.size(), 1.0)),
-                                 is_in_range);
-    };
     if (instruments_.empty()) throw Error("no bound: no instrument is accepted");
-    if (!std::ranges::all_of(instruments_, is_finite)) {
+    if (!std::ranges::all_of(means(standard_errors(measured_orbits_)), is_in_range)) {
       throw Error(
           "no bound: the sessions do not determine all parameters, or the loops are not stable");
     }
+    return runs;
   }
 
   MicroscopeCampaign campaign_;
-  std::vector<double> measured_s_;  ///< Of each session: what `instruments_` is of.
+  std::vector<int> measured_orbits_;  ///< Of each session: what `instruments_` is of.
   std::vector<JointInformation> instruments_;
+  std::vector<RunRecord> probes_;  ///< Of the first instruments.
 };
 
 }  // namespace

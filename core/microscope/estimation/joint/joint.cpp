@@ -1,6 +1,7 @@
 #include "core/microscope/estimation/joint/joint.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -451,12 +453,12 @@ RecordNeeds joint_needs(const Session& session) {
 }
 
 void check_joint(const std::vector<Session>& sessions) {
+  std::vector<std::string> lacks;
   const auto require = [&](std::string_view what, const auto& is_it) {
     for (const Session& session : sessions) {
       if (std::ranges::any_of(session.excitations, is_it)) return;
     }
-    throw ConfigError("session", fmt::format("{} sessions", sessions.size()),
-                      fmt::format("estimation.method = \"joint\" needs one that {}", what));
+    lacks.push_back(fmt::format("one that {}", what));
   };
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     if (sessions[i].spin_rate_rad_s == 0.0) continue;
@@ -480,6 +482,10 @@ void check_joint(const std::vector<Session>& sessions) {
   require("moves one mass along x", [](const Excitation& e) {
     return e.kind == ExcitationKind::test_mass && tells_of_squares(e);
   });
+  if (lacks.empty()) return;
+  throw ConfigError("session",
+                    fmt::format("{} session{}", sessions.size(), sessions.size() == 1 ? "" : "s"),
+                    fmt::format("estimation.method = \"joint\" needs {}", fmt::join(lacks, ", ")));
 }
 
 }  // namespace proofmass

@@ -159,8 +159,8 @@ TEST(Scenario, WantsLinesOfAMethodThatTheRecordCanTellApart) {
   EXPECT_EQ(pushed_at(3.6e-4), "");
   EXPECT_EQ(
       pushed_at(3.5e-4),
-      "session[6].excitations = a line at 0.00035 Hz (the estimation must tell it from that at "
-      "0.000336134 Hz, and from the Nyquist frequency, 2 Hz)");
+      "session[6].excitations = a line at 0.00035 Hz (the estimation must tell it from a line at "
+      "0.000336134 Hz with orbits = 10, and from the Nyquist frequency, 2 Hz)");
 }
 
 TEST(NoisePresets, AreThoseOfTheDesignAndOfTheFlight) {

@@ -364,6 +364,9 @@ TEST(Joint, RefusesSessionsThatCannotTellEveryParameter) {
   EXPECT_EQ(without({a_c12}), "session = 10" + needs + "moves masses in opposition along y)");
   EXPECT_EQ(without({a_c13}), "session = 10" + needs + "moves masses in opposition along z)");
   EXPECT_EQ(without({k2_sensor_1, k2_sensor_2}), "session = 9" + needs + "moves one mass along x)");
+  EXPECT_EQ(without({a_d12, a_c13}), "session = 9" + needs +
+                                         "pushes along y, one that moves masses in opposition "
+                                         "along z)");
 }
 
 // Every session that may be asked for: its lines fit into one set of weights, with the level.
