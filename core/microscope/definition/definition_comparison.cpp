@@ -22,7 +22,7 @@ class Comparison {
 
   std::vector<DefinitionDifference> run() {
     if (first_.realisations != second_.realisations) {
-      differ("realisations", fmt::format("{}", first_.realisations),
+      differ("campaign.realisations", fmt::format("{}", first_.realisations),
              fmt::format("{}", second_.realisations));
     }
     compare_entries("", fields_of(first_), fields_of(second_));

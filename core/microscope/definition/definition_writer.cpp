@@ -178,7 +178,11 @@ class CommentedWriter {
     }
   }
 
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> table_notes{{
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> table_notes{{
+      {"campaign",
+       "# realisations = 4 lets every four runs share one drawn instrument and differ in their "
+       "noise;\n"
+       "# it is 1 where it is left out.\n"},
       {"environment",
        "# External accelerations of the satellite, each axis mean + a1 cos(n t + phase) +\n"
        "# a2 cos(2 n t + phase), n being the mean motion; or rows of a file (kind = \"file\",\n"
