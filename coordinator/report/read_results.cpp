@@ -159,14 +159,14 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors;
   std::optional<RunningInstruments> instruments;
-  if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
-    instruments.emplace(objectives, realisations);
-  }
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   const Warner warner = campaign.warner();
   store.read_one_state([&] {
+    if (const std::uint64_t realisations = num_realisations(campaign); realisations > 1) {
+      instruments.emplace(objectives, realisations, store.given_up_runs());
+    }
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());
