@@ -115,7 +115,6 @@ void adjust_together(std::span<ComparedMember> members);
 struct MemberNames {
   std::string title;               ///< `campaign`, or the key that was varied.
   std::vector<std::string> names;  ///< Of each: `A`, or the value of the key.
-  std::vector<std::string> notes;  ///< What the list of campaigns says of each beside its file.
 };
 
 /// `A` to `Z`, `AA`, `AB` and so on.

@@ -74,7 +74,7 @@ Table definition_table(std::span<const ComparedMember> members, const MemberName
 }
 
 std::string how_compared(const CampaignComparison& comparison) {
-  if (!comparison.why_not_compared.empty()) return "cannot be: " + comparison.why_not_compared;
+  if (!comparison.why_not_compared.empty()) return "not at all";
   if (!comparison.is_paired()) return "as a whole, as " + comparison.why_unpaired;
   return fmt::format("run by run, {} {} of the same draws", comparison.num_first,
                      comparison.num_first == 1 ? "run" : "runs");
@@ -87,9 +87,13 @@ Table campaign_table(std::span<const ComparedMember> members, const MemberNames&
                           {"compared with " + names.names.front(), true}}};
   for (std::size_t i = 0; i < members.size(); ++i) {
     const ComparedMember& member = members[i];
-    table.rows.push_back({names.names[i], names.notes[i] + member.file.string(),
+    table.rows.push_back({names.names[i], member.file.string(),
                           std::to_string(member.statistics.num_estimated),
                           member.comparison ? how_compared(*member.comparison) : ""});
+    if (member.comparison && !member.comparison->why_not_compared.empty()) {
+      table.notes.push_back(fmt::format("{} cannot be compared: {}", names.names[i],
+                                        member.comparison->why_not_compared));
+    }
     if (member.missing.total() == 0) continue;
     table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.", names.names[i],
                                          reasons_text(member.missing))});
@@ -286,7 +290,7 @@ Table magnitude_table(std::span<const ComparedMember> members, const MemberNames
 
 MemberNames lettered(std::size_t count) {
   constexpr std::size_t num_letters = 26;
-  MemberNames names{.title = "campaign", .names = {}, .notes = std::vector<std::string>(count)};
+  MemberNames names{.title = "campaign", .names = {}};
   for (std::size_t i = 0; i < count; ++i) {
     std::string name;
     for (std::size_t rest = i + 1; rest > 0; rest = (rest - 1) / num_letters) {

@@ -57,6 +57,8 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
     return fail(error.what(), exit_wrong_usage);
   } catch (const UsageError& error) {
     return fail(error.what(), exit_wrong_usage);
+  } catch (const ConfigError& error) {
+    return fail(error.what(), exit_wrong_usage);
   } catch (const InvalidArgument& error) {
     return fail(error.what(), exit_wrong_usage);
   } catch (const std::exception& error) {

@@ -142,13 +142,8 @@ MemberNames sweep_names(std::span<const SweptValues> campaigns) {
     are_short = are_short && display_width(name) <= columns_max;
     names.names.push_back(std::move(name));
   }
-  if (are_short && display_width(names.title) <= columns_max) {
-    names.notes.resize(campaigns.size());
-    return names;
-  }
-  names = lettered(campaigns.size());
-  for (std::size_t i = 0; i < campaigns.size(); ++i) names.notes[i] = text_of(campaigns[i]) + ": ";
-  return names;
+  if (are_short && display_width(names.title) <= columns_max) return names;
+  return lettered(campaigns.size());
 }
 
 }  // namespace proofmass::coordinator

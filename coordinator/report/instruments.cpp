@@ -12,6 +12,7 @@
 #include "coordinator/report/standard_errors.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "core/statistics/moments.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -27,131 +28,196 @@ std::optional<std::size_t> standard_error_of(std::size_t quantity) {
   return position;
 }
 
-/// Mean over the runs of an instrument.
-template <typename ValueOf>
-double mean_over(std::span<const RunResult> runs, const ValueOf& value_of) {
-  double sum = 0.0;
-  for (const RunResult& run : runs) sum += value_of(run);
-  return sum / static_cast<double>(runs.size());
+GroupedShare share_of(const GroupedHits& hits) {
+  return {hits.share(), hits.interval(default_confidence)};
 }
 
-GroupedShare share_of(const MomentSums& sums, std::uint64_t realisations) {
-  const Moments shares = sums.moments();
-  return {shares.mean, grouped_probability_interval(shares, realisations, default_confidence)};
+template <typename IsHit>
+std::uint64_t count_of(std::span<const RunResult> runs, const IsHit& is_hit) {
+  return static_cast<std::uint64_t>(std::ranges::count_if(runs, is_hit));
 }
 
 }  // namespace
 
-RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint64_t realisations)
-    : objectives_(std::move(objectives)), realisations_(realisations) {
+RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint64_t realisations,
+                                       std::vector<RunRange> given_up)
+    : objectives_(std::move(objectives)),
+      realisations_(realisations),
+      given_up_(std::move(given_up)),
+      within_(realisations) {
   PROOFMASS_EXPECT(realisations_ > 1);
   counts_.realisations = realisations_;
-  counts_.temporal = 1.0;
+  std::ranges::reverse(given_up_);
+  const GroupedHits hits(realisations_);
+  quantities_.assign(objectives_.size(), {.errors = GroupedValues(realisations_),
+                                          .beyond = hits,
+                                          .covered = hits,
+                                          .covered_within = hits});
 }
 
 void RunningInstruments::add(const RunResult& result) {
-  const auto instrument_of = [&](const RunResult& run) { return run.run.value / realisations_; };
-  if (!runs_.empty() && instrument_of(runs_.front()) != instrument_of(result)) {
+  add_given_up_before(result.run.value);
+  add_run(result);
+}
+
+void RunningInstruments::add_given_up_before(std::uint64_t run) {
+  while (!given_up_.empty() && given_up_.back().first.value < run) {
+    const RunRange range = given_up_.back();
+    given_up_.pop_back();
+    for (std::uint64_t i = range.first.value; i < range.end(); ++i) {
+      RunResult lost;
+      lost.run = RunIndex{i};
+      lost.status = RunStatus::lost;
+      add_run(lost);
+    }
+  }
+}
+
+void RunningInstruments::add_run(const RunResult& run) {
+  const auto instrument_of = [&](const RunResult& of) { return of.run.value / realisations_; };
+  if (!runs_.empty() && instrument_of(runs_.front()) != instrument_of(run)) {
     ++counts_.num_incomplete;
     runs_.clear();
   }
-  runs_.push_back(result);
+  runs_.push_back(run);
   if (runs_.size() < realisations_) return;
   finish_instrument();
   runs_.clear();
 }
 
-std::uint64_t RunningInstruments::num_within(const std::vector<RunResult>& runs) const {
-  std::uint64_t count = 0;
-  for (const RunResult& run : runs) {
-    bool is_within = run.is_completed();
-    for (std::size_t i = 0; is_within && i < objectives_.size(); ++i) {
-      is_within = std::abs(run.error(i)) <= objectives_[i];
-    }
-    if (is_within) ++count;
+bool RunningInstruments::is_within_objectives(const RunResult& run) const {
+  if (!run.is_completed()) return false;
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    if (std::abs(run.error(i)) > objectives_[i]) return false;
   }
-  return count;
+  return true;
 }
 
 void RunningInstruments::finish_instrument() {
-  ++counts_.num_instruments;
-  const double share = static_cast<double>(num_within(runs_)) / static_cast<double>(realisations_);
-  within_.add(share);
-  if (share == 1.0) ++num_within_always_;
-  if (share < counts_.temporal) {
-    counts_.temporal = share;
+  add_objectives();
+  for (std::size_t i = 0; i < objectives_.size(); ++i) add_shares(i);
+  if (!std::ranges::all_of(runs_, &RunResult::is_completed)) {
+    ++counts_.num_not_estimated;
+    return;
+  }
+  for (std::size_t i = 0; i < objectives_.size(); ++i) add_values(i);
+}
+
+void RunningInstruments::add_objectives() {
+  const std::uint64_t num_within =
+      count_of(runs_, [&](const RunResult& run) { return is_within_objectives(run); });
+  within_.add(num_within);
+  if (num_within == realisations_) ++num_within_always_;
+  if (counts_.num_instruments == 0 || num_within < counts_.temporal) {
+    counts_.temporal = num_within;
+    counts_.num_temporal = 0;
     counts_.temporal_instrument = runs_.front().run.value / realisations_;
   }
-  if (std::ranges::all_of(runs_, &RunResult::is_completed)) return add_quantities();
-  ++counts_.num_not_estimated;
+  if (num_within == counts_.temporal) ++counts_.num_temporal;
+  ++counts_.num_instruments;
 }
 
-void RunningInstruments::add_quantities() {
-  const double correction =
-      std::sqrt(static_cast<double>(realisations_) / static_cast<double>(realisations_ - 1));
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    std::vector<double> errors;
-    for (const RunResult& run : runs_) errors.push_back(run.error(i));
-    const double magnitude =
-        mean_over(runs_, [i](const RunResult& run) { return std::abs(run.error(i)); });
-    if (i == quantities_.size()) {
-      const MomentSums shares(0.5);
-      quantities_.push_back({.errors = GroupedValues(realisations_),
-                             .magnitudes = MomentSums(magnitude),
-                             .beyond = shares,
-                             .covered = shares,
-                             .covered_within = shares});
-    }
-    Quantity& quantity = quantities_[i];
-    quantity.errors.add(errors);
-    quantity.magnitudes.add(magnitude);
-    quantity.beyond.add(mean_over(
-        runs_, [&](const RunResult& run) { return std::abs(run.error(i)) > objectives_[i]; }));
-    const std::optional<std::size_t> position = standard_error_of(i);
-    if (!position || runs_.front().standard_error.empty()) continue;
-    const double mean = mean_over(runs_, [i](const RunResult& run) { return run.error(i); });
-    const auto sigma = [&](const RunResult& run) { return run.standard_error.at(*position); };
-    quantity.has_standard_errors = true;
-    quantity.squared_standard_errors +=
-        mean_over(runs_, [&](const RunResult& run) { return sigma(run) * sigma(run); });
-    quantity.covered.add(mean_over(runs_, [&](const RunResult& run) {
-      return std::abs(run.error(i)) < normal_95 * sigma(run);
-    }));
-    quantity.covered_within.add(mean_over(runs_, [&](const RunResult& run) {
-      return correction * std::abs(run.error(i) - mean) < normal_95 * sigma(run);
-    }));
+void RunningInstruments::add_shares(std::size_t i) {
+  Quantity& quantity = quantities_[i];
+  quantity.beyond.add(count_of(runs_, [&](const RunResult& run) {
+    return !run.is_completed() || std::abs(run.error(i)) > objectives_[i];
+  }));
+  const std::optional<std::size_t> position = standard_error_of(i);
+  if (!position) return;
+  const auto is_covered = [&](const RunResult& run, double error) {
+    return std::abs(error) < normal_95 * run.standard_error[*position];
+  };
+  std::vector<RunResult> runs;
+  CompensatedSum errors;
+  for (const RunResult& run : runs_) {
+    if (!run.is_completed() || run.standard_error.empty()) continue;
+    have_standard_errors_ = true;
+    runs.push_back(run);
+    errors.add(run.error(i));
   }
+  quantity.covered.add(
+      count_of(runs, [&](const RunResult& run) { return is_covered(run, run.error(i)); }));
+  const auto count = static_cast<double>(runs.size());
+  quantity.covered_within.add(count_of(runs, [&](const RunResult& run) {
+    return count > 1.0 && is_covered(run, (run.error(i) - errors.value() / count) *
+                                              std::sqrt(count / (count - 1.0)));
+  }));
 }
 
-InstrumentStatistics RunningInstruments::statistics() const {
+void RunningInstruments::add_values(std::size_t i) {
+  Quantity& quantity = quantities_[i];
+  const std::optional<std::size_t> position = standard_error_of(i);
+  std::vector<double> errors;
+  CompensatedSum magnitudes;
+  for (const RunResult& run : runs_) {
+    errors.push_back(run.error(i));
+    magnitudes.add(std::abs(run.error(i)));
+    if (!position || run.standard_error.empty()) continue;
+    const double sigma = run.standard_error[*position];
+    quantity.squared_standard_errors += sigma * sigma;
+  }
+  quantity.errors.add(errors);
+  quantity.magnitudes.add(magnitudes.value() / static_cast<double>(realisations_));
+}
+
+InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
+  const Quantity& quantity = quantities_[i];
+  InstrumentQuantity of{.error = quantity.errors.analysis(default_confidence),
+                        .magnitude_interval = {},
+                        .beyond = share_of(quantity.beyond),
+                        .standard_errors = {}};
+  if (of.error.num_groups > 0) {
+    const Moments magnitudes = quantity.magnitudes.moments();
+    of.mean_magnitude = magnitudes.mean;
+    of.magnitude_interval = mean_interval(magnitudes, default_confidence);
+    // Of few instruments the symmetric interval may begin below 0, where no mean can lie.
+    if (of.magnitude_interval) {
+      of.magnitude_interval->lower = std::fmax(of.magnitude_interval->lower, 0.0);
+    }
+  }
+  if (!have_standard_errors_ || !standard_error_of(i)) return of;
+  of.standard_errors = {.within_ratio = {},
+                        .covered = share_of(quantity.covered),
+                        .covered_within = share_of(quantity.covered_within)};
+  if (quantity.squared_standard_errors > 0.0) {
+    const auto runs = static_cast<double>(of.error.num_groups * of.error.group_size);
+    of.standard_errors->within_ratio =
+        of.error.within_mean_square * runs / quantity.squared_standard_errors;
+  }
+  return of;
+}
+
+InstrumentStatistics RunningInstruments::statistics() {
+  add_given_up_before(num_runs_max);
+  if (!runs_.empty()) ++counts_.num_incomplete;
+  runs_.clear();
   InstrumentStatistics statistics = counts_;
-  if (!runs_.empty()) ++statistics.num_incomplete;
   if (statistics.num_instruments == 0) return statistics;
   const auto instruments = static_cast<double>(statistics.num_instruments);
   const auto always = static_cast<double>(num_within_always_);
-  statistics.mixed = share_of(within_, realisations_);
+  statistics.mixed = share_of(within_);
   statistics.ensemble = {always / instruments,
                          probability_interval(always, instruments, default_confidence)};
-  for (const Quantity& quantity : quantities_) {
-    const Moments magnitudes = quantity.magnitudes.moments();
-    InstrumentQuantity of{.error = quantity.errors.analysis(default_confidence),
-                          .mean_magnitude = magnitudes.mean,
-                          .magnitude_interval = mean_interval(magnitudes, default_confidence),
-                          .beyond = share_of(quantity.beyond, realisations_),
-                          .standard_errors = {}};
-    const double squares =
-        quantity.squared_standard_errors / static_cast<double>(of.error.num_groups);
-    if (quantity.has_standard_errors && squares > 0.0) {
-      of.standard_errors = {.within_ratio = of.error.within_mean_square / squares,
-                            .covered = share_of(quantity.covered, realisations_),
-                            .covered_within = share_of(quantity.covered_within, realisations_)};
-    }
-    statistics.quantities.push_back(std::move(of));
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    statistics.quantities.push_back(statistics_of(i));
   }
   return statistics;
 }
 
 namespace {
+
+/// To a tenth of a per cent; two digits of less than one per cent.
+std::string percent_text(double share) {
+  const double percent = 100.0 * share;
+  return percent > 0.0 && percent < 1.0 ? fmt::format("{:.2g}", percent)
+                                        : fmt::format("{:.1f}", percent);
+}
+
+Cell percent_cell(double share) {
+  Cell cell(percent_text(share));
+  cell.value = share;
+  return cell;
+}
 
 void add_ends(const std::optional<Interval>& interval, double scale, Row& row) {
   for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
@@ -159,58 +225,109 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row) {
   }
 }
 
+void add_percent_ends(const std::optional<Interval>& interval, Row& row) {
+  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
+    row.push_back(interval ? percent_cell((*interval).*end) : no_figure());
+  }
+}
+
+Cell optional_cell(const std::optional<double>& value, double scale) {
+  return value ? figure_cell(*value, scale) : no_figure();
+}
+
 std::string share_text(const GroupedShare& of) {
-  return fmt::format("{:.3g} % ({:.3g} to {:.3g} %)", 100.0 * of.share, 100.0 * of.interval.lower,
-                     100.0 * of.interval.upper);
+  return fmt::format("{} % ({} to {} %)", percent_text(of.share), percent_text(of.interval.lower),
+                     percent_text(of.interval.upper));
 }
 
 std::string count_text(const InstrumentStatistics& statistics) {
-  std::string text = fmt::format("{} instruments with {} realisations of the noise each",
-                                 statistics.num_instruments, statistics.realisations);
+  std::string text = fmt::format(
+      "{} {} with {} realisations of the noise each", statistics.num_instruments,
+      statistics.num_instruments == 1 ? "instrument" : "instruments", statistics.realisations);
   if (statistics.num_incomplete > 0) {
-    text += fmt::format("; {} more left out, being incomplete", statistics.num_incomplete);
-  }
-  if (statistics.num_not_estimated > 0) {
-    text += fmt::format("; {} have a run without an estimate and count for shares of runs alone",
-                        statistics.num_not_estimated);
+    text += fmt::format("; {} more left out, as not all of their runs are finished",
+                        statistics.num_incomplete);
   }
   return text;
+}
+
+std::string temporal_text(const InstrumentStatistics& statistics) {
+  const bool is_one = statistics.num_temporal == 1;
+  const std::string worst =
+      statistics.num_temporal == statistics.num_instruments ? "every instrument"
+      : is_one ? fmt::format("the worst instrument, {},", statistics.temporal_instrument)
+               : fmt::format("each of the worst {} instruments", statistics.num_temporal);
+  return fmt::format("all objectives (temporal): {} meets them in {} of {} realisations", worst,
+                     statistics.temporal, statistics.realisations);
+}
+
+Table no_instruments(const InstrumentStatistics& statistics) {
+  Table table{.id = "variance-table",
+              .caption = "Variance between instruments and within",
+              .columns = {{"instruments", true}}};
+  if (statistics.realisations > 0) {
+    table.rows.push_back(
+        {fmt::format("none of which all {} realisations are finished", statistics.realisations)});
+  }
+  return table;
+}
+
+Row variance_row(const proofmass::Quantity& quantity, const InstrumentQuantity& of) {
+  Row row{quantity.symbol, unit_cell(quantity)};
+  if (of.error.num_groups == 0) {
+    row.insert(row.end(), 8, no_figure());
+    return row;
+  }
+  const double scale = quantity.display_scale;
+  row.push_back(figure_cell(of.mean_magnitude, scale));
+  add_ends(of.magnitude_interval, scale, row);
+  row.push_back(optional_cell(of.error.between_deviation, scale));
+  row.push_back(figure_cell(of.error.within_deviation, scale));
+  row.push_back(of.error.within_share ? percent_cell(*of.error.within_share) : no_figure());
+  add_percent_ends(of.error.within_share_interval, row);
+  return row;
+}
+
+std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) {
+  std::vector<std::string> notes{count_text(statistics)};
+  if (statistics.num_not_estimated > 0) {
+    notes.push_back(fmt::format("left out: {} {} with a run that has no estimate",
+                                statistics.num_not_estimated,
+                                statistics.num_not_estimated == 1 ? "instrument" : "instruments"));
+  }
+  notes.emplace_back("from, to: 95 % interval with the instrument as the unit");
+  notes.emplace_back(
+      "noise: no choice of the instruments reduces the runs that a bias needs by more than the "
+      "inverse of this share");
+  if (statistics.num_instruments - statistics.num_not_estimated < num_groups_min) {
+    notes.push_back(
+        fmt::format("noise: there is no interval from fewer than {} instruments", num_groups_min));
+  }
+  return notes;
 }
 
 }  // namespace
 
 Table variance_table(const InstrumentStatistics& statistics) {
-  if (statistics.quantities.empty()) return {};
+  if (statistics.quantities.empty()) return no_instruments(statistics);
   constexpr const char* mean = "mean of |error|";
   constexpr const char* deviation = "std of the error";
-  constexpr const char* noise = "noise, % of variance";
-  Table table{
-      .id = "variance-table",
-      .caption = "Variance between instruments and within, 95 % intervals",
-      .columns = {{"parameter", true, 11},
-                  {"unit", true, 9},
-                  {"mean", false, 8, mean},
-                  {"from", false, 8, mean},
-                  {"to", false, 8, mean},
-                  {"between", false, 9, deviation, true},
-                  {"within", false, 9, deviation},
-                  {"share", false, 6, noise, true},
-                  {"from", false, 6, noise},
-                  {"to", false, 6, noise}},
-      .notes = {count_text(statistics), "the unit of all intervals is the instrument",
-                "that of the share holds for normal errors that scatter alike in every instrument",
-                "noise: no choice of the instruments saves more than the inverse of its share"}};
+  constexpr const char* noise = "noise, %";
+  Table table{.id = "variance-table",
+              .caption = "Variance between instruments and within",
+              .columns = {{"parameter", true, 10},
+                          {"unit", true, 9},
+                          {"mean", false, 7, mean},
+                          {"from", false, 8, mean},
+                          {"to", false, 8, mean},
+                          {"between", false, 9, deviation, true},
+                          {"within", false, 8, deviation},
+                          {"share", false, 7, noise, true},
+                          {"from", false, 6, noise},
+                          {"to", false, 6, noise}},
+              .notes = variance_notes(statistics)};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    const proofmass::Quantity& quantity = model().results().quantities[i];
-    const InstrumentQuantity& of = statistics.quantities[i];
-    const double scale = quantity.display_scale;
-    Row row{quantity.symbol, unit_cell(quantity), figure_cell(of.mean_magnitude, scale)};
-    add_ends(of.magnitude_interval, scale, row);
-    row.push_back(figure_cell(of.error.between_deviation, scale));
-    row.push_back(figure_cell(of.error.within_deviation, scale));
-    row.push_back(figure_cell(of.error.within_share, 0.01));
-    add_ends(of.error.within_share_interval, 0.01, row);
-    table.rows.push_back(std::move(row));
+    table.rows.push_back(variance_row(model().results().quantities[i], statistics.quantities[i]));
   }
   return table;
 }
@@ -219,39 +336,45 @@ Table instrument_table(const InstrumentStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   constexpr const char* beyond = "beyond, %";
   constexpr const char* covered = "in 1.96 σ, %";
-  constexpr const char* within = "within, in 1.96 σ, %";
-  Table table{
-      .id = "instrument-table",
-      .caption = "Bias, runs beyond the objective and standard errors by instruments, 95 %",
-      .columns = {{"parameter", true, 10},
-                  {"from", false, 9, "bias"},
-                  {"to", false, 10, "bias"},
-                  {"from", false, 7, beyond, true},
-                  {"to", false, 7, beyond},
-                  {"from", false, 7, covered, true},
-                  {"to", false, 7, covered},
-                  {"s²/σ²", false, 8, within, true},
-                  {"from", false, 7, within},
-                  {"to", false, 7, within}},
-      .notes = {
-          "within: about the mean of each instrument; s² is the variance there",
-          fmt::format("all objectives (mixed): {} of all runs", share_text(statistics.mixed)),
-          fmt::format("all objectives (ensemble): {} of all instruments, in all {} realisations",
-                      share_text(statistics.ensemble), statistics.realisations),
-          fmt::format("all objectives (temporal): {:.0f} of {} realisations or more of every "
-                      "instrument, fewest of instrument {}",
-                      statistics.temporal * static_cast<double>(statistics.realisations),
-                      statistics.realisations, statistics.temporal_instrument)}};
+  constexpr const char* within = "within, in 1.96 σ";
+  const bool have_sigma = std::ranges::any_of(
+      statistics.quantities, [](const auto& of) { return of.standard_errors.has_value(); });
+  Table table{.id = "instrument-table",
+              .caption = "95 % intervals with the instrument as the unit",
+              .columns = {{"parameter", true, 10},
+                          {"from", false, 8, "bias"},
+                          {"to", false, 9, "bias"},
+                          {"from", false, 7, beyond, true},
+                          {"to", false, 7, beyond}},
+              .notes = {"beyond: runs whose error exceeds the objective, or without an estimate"}};
+  if (have_sigma) {
+    table.columns.insert(table.columns.end(), {{"from", false, 7, covered, true},
+                                               {"to", false, 7, covered},
+                                               {"s²/σ²", false, 7, within, true},
+                                               {"from", false, 7, within},
+                                               {"to", false, 7, within}});
+    table.notes.emplace_back(
+        "within: about the mean of each instrument, whose variance there is s²; from, to in %");
+  }
+  table.notes.insert(
+      table.notes.end(),
+      {fmt::format("all objectives (mixed): in {} of all runs", share_text(statistics.mixed)),
+       fmt::format("all objectives (ensemble): {} of all instruments meet them in all {} "
+                   "realisations",
+                   share_text(statistics.ensemble), statistics.realisations),
+       temporal_text(statistics)});
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     const proofmass::Quantity& quantity = model().results().quantities[i];
     const InstrumentQuantity& of = statistics.quantities[i];
     Row row{quantity.symbol};
     add_ends(of.error.mean_interval, quantity.display_scale, row);
-    add_ends(of.beyond.interval, 0.01, row);
-    const auto& sigma = of.standard_errors;
-    add_ends(sigma ? std::optional(sigma->covered.interval) : std::nullopt, 0.01, row);
-    row.push_back(sigma ? figure_cell(sigma->within_ratio) : no_figure());
-    add_ends(sigma ? std::optional(sigma->covered_within.interval) : std::nullopt, 0.01, row);
+    add_percent_ends(of.beyond.interval, row);
+    if (const auto& sigma = of.standard_errors) {
+      add_percent_ends(sigma->covered.interval, row);
+      row.push_back(optional_cell(sigma->within_ratio, 1.0));
+      add_percent_ends(sigma->covered_within.interval, row);
+    }
+    row.resize(table.columns.size(), no_figure());
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -260,6 +383,11 @@ Table instrument_table(const InstrumentStatistics& statistics) {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+template <typename Value>
+Json or_null(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
 
 Json ends_of(const std::optional<Interval>& interval) {
   if (!interval) return nullptr;
@@ -271,23 +399,22 @@ Json json_of(const GroupedShare& of) {
 }
 
 Json json_of(const InstrumentQuantity& of) {
-  Json json{{"mean", of.mean_magnitude},
+  const bool is_known = of.error.num_groups > 0;
+  const auto if_known = [&](double value) { return is_known ? Json(value) : Json(nullptr); };
+  Json json{{"mean", if_known(of.mean_magnitude)},
             {"mean_interval", ends_of(of.magnitude_interval)},
-            {"bias", of.error.mean},
+            {"bias", if_known(of.error.mean)},
             {"bias_interval", ends_of(of.error.mean_interval)},
-            {"between_mean_square", of.error.between_mean_square},
-            {"within_mean_square", of.error.within_mean_square},
-            {"p_value", of.error.p_value},
-            {"between_standard_deviation", of.error.between_deviation},
-            {"between_interval", ends_of(of.error.between_interval)},
-            {"within_standard_deviation", of.error.within_deviation},
-            {"within_interval", ends_of(of.error.within_interval)},
-            {"noise_share", of.error.within_share},
+            {"between_mean_square", or_null(of.error.between_mean_square)},
+            {"within_mean_square", if_known(of.error.within_mean_square)},
+            {"between_standard_deviation", or_null(of.error.between_deviation)},
+            {"within_standard_deviation", if_known(of.error.within_deviation)},
+            {"noise_share", or_null(of.error.within_share)},
             {"noise_share_interval", ends_of(of.error.within_share_interval)},
             {"beyond", json_of(of.beyond)},
             {"standard_errors", nullptr}};
   if (of.standard_errors) {
-    json["standard_errors"] = {{"within_ratio", of.standard_errors->within_ratio},
+    json["standard_errors"] = {{"within_ratio", or_null(of.standard_errors->within_ratio)},
                                {"covered", json_of(of.standard_errors->covered)},
                                {"covered_within", json_of(of.standard_errors->covered_within)}};
   }
@@ -301,12 +428,16 @@ nlohmann::ordered_json json_of(const InstrumentStatistics& statistics) {
             {"num_instruments", statistics.num_instruments},
             {"num_incomplete", statistics.num_incomplete},
             {"num_not_estimated", statistics.num_not_estimated},
-            {"all_objectives",
-             {{"mixed", json_of(statistics.mixed)},
-              {"ensemble", json_of(statistics.ensemble)},
-              {"temporal", statistics.temporal},
-              {"temporal_instrument", statistics.temporal_instrument}}},
+            {"all_objectives", nullptr},
             {"parameters", Json::array()}};
+  if (statistics.num_instruments > 0) {
+    json["all_objectives"] = {{"mixed", json_of(statistics.mixed)},
+                              {"ensemble", json_of(statistics.ensemble)},
+                              {"temporal",
+                               {{"num_realisations", statistics.temporal},
+                                {"num_instruments", statistics.num_temporal},
+                                {"first_instrument", statistics.temporal_instrument}}}};
+  }
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     Json row{{"parameter", model().results().quantities[i].name}};
     row.update(json_of(statistics.quantities[i]));

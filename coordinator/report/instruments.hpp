@@ -21,36 +21,40 @@ struct GroupedShare {
   Interval interval;
 };
 
-/// Whether standard errors are honest over instruments and within each of them.
+/// Whether standard errors are honest over instruments and within each of them. A run without an
+/// estimate is not covered.
 struct GroupedStandardErrors {
-  double within_ratio = 0.0;  ///< Variance within instruments over the mean of σ².
-  GroupedShare covered;       ///< |error| within normal_95 σ: 95 % if σ is honest over all.
-  /// |error − mean of its instrument|·√(M/(M − 1)) within normal_95 σ: 95 % if σ is all noise, and
-  /// more the more of it is the instrument's.
+  std::optional<double> within_ratio;  ///< Variance within instruments over the mean of σ².
+  GroupedShare covered;  ///< |error| within normal_95 σ: 95 % if σ is honest over all.
+  /// Of n runs of an instrument with an estimate |error − their mean|·√(n/(n − 1)) within normal_95
+  /// σ: 95 % if σ is all noise, and more the more of it is the instrument's.
   GroupedShare covered_within;
 };
 
-/// Errors of one quantity in the instruments whose runs are all completed.
+/// One quantity in all instruments.
 struct InstrumentQuantity {
-  OneWayAnalysis error;
-  double mean_magnitude = 0.0;
-  std::optional<Interval> magnitude_interval;  ///< Of the mean |error|.
-  GroupedShare beyond;                         ///< Runs whose |error| is above the objective.
+  OneWayAnalysis error;         ///< Of the instruments all of whose runs have an estimate.
+  double mean_magnitude = 0.0;  ///< Of |error|, over the same ones.
+  std::optional<Interval> magnitude_interval;
+  /// Of the runs whose |error| is above the objective, and of those without an estimate.
+  GroupedShare beyond;
   std::optional<GroupedStandardErrors> standard_errors;
 };
 
-/// What several realisations of the noise for each instrument tell.
+/// What several realisations of the noise for each instrument tell. Shares are over all runs of the
+/// instruments that are counted.
 struct InstrumentStatistics {
   std::uint64_t realisations = 0;
-  std::uint64_t num_instruments = 0;  ///< Whose runs are all finished; so is the basis of `mixed`.
-  std::uint64_t num_incomplete = 0;   ///< Of which a run has no result: left out.
-  std::uint64_t num_not_estimated = 0;         ///< Finished, with a run without estimate.
-  std::vector<InstrumentQuantity> quantities;  ///< Empty without a completed instrument.
+  std::uint64_t num_instruments = 0;           ///< All of whose runs are finished or given up.
+  std::uint64_t num_incomplete = 0;            ///< Of which a run is not finished yet: left out.
+  std::uint64_t num_not_estimated = 0;         ///< With a run that has no estimate.
+  std::vector<InstrumentQuantity> quantities;  ///< Empty without an instrument.
   // All objectives hold, in the three interpretations of ECSS-E-ST-60-10C.
-  GroupedShare mixed;     ///< Of all runs.
-  GroupedShare ensemble;  ///< Of the instruments: in each of their realisations.
-  double temporal = 0.0;  ///< Share of the realisations of the instrument that has the smallest.
-  std::uint64_t temporal_instrument = 0;
+  GroupedShare mixed;          ///< Of all runs.
+  GroupedShare ensemble;       ///< Of the instruments: in each of their realisations.
+  std::uint64_t temporal = 0;  ///< Realisations of the instrument in which they hold least often.
+  std::uint64_t num_temporal = 0;         ///< Instruments in which they hold that often.
+  std::uint64_t temporal_instrument = 0;  ///< The first of them.
 };
 
 /// Computes them from results in run order. Memory is fixed.
@@ -58,37 +62,48 @@ class RunningInstruments {
  public:
   /// @param objectives    Of each quantity, SI.
   /// @param realisations  At least 2.
-  RunningInstruments(std::vector<double> objectives, std::uint64_t realisations);
+  /// @param given_up      Runs that have no result and never will, ascending.
+  RunningInstruments(std::vector<double> objectives, std::uint64_t realisations,
+                     std::vector<RunRange> given_up);
 
   void add(const RunResult& result);
-  [[nodiscard]] InstrumentStatistics statistics() const;
+  /// @pre Every result was added; to be called once.
+  [[nodiscard]] InstrumentStatistics statistics();
 
  private:
   struct Quantity {
     GroupedValues errors;
-    MomentSums magnitudes, beyond, covered, covered_within;  ///< Of the instruments' means.
-    double squared_standard_errors = 0.0;
-    bool has_standard_errors = false;
+    MomentSums magnitudes{0.0};  ///< Of the instruments' means.
+    GroupedHits beyond, covered, covered_within;
+    double squared_standard_errors = 0.0;  ///< Sum over the runs in `errors`.
   };
+  void add_given_up_before(std::uint64_t run);
+  void add_run(const RunResult& run);
   void finish_instrument();
-  void add_quantities();
-  [[nodiscard]] std::uint64_t num_within(const std::vector<RunResult>& runs) const;
+  void add_objectives();
+  void add_shares(std::size_t i);
+  void add_values(std::size_t i);
+  [[nodiscard]] InstrumentQuantity statistics_of(std::size_t i) const;
+  [[nodiscard]] bool is_within_objectives(const RunResult& run) const;
 
   std::vector<double> objectives_;
   std::uint64_t realisations_;
-  std::vector<RunResult> runs_;  ///< Of the instrument that is not complete yet.
+  std::vector<RunRange> given_up_;  ///< Not added yet, the next one last.
+  std::vector<RunResult> runs_;     ///< Of the instrument that is not complete yet.
   InstrumentStatistics counts_;
-  MomentSums within_{0.5};
+  GroupedHits within_;
   std::uint64_t num_within_always_ = 0;
+  bool have_standard_errors_ = false;
   std::vector<Quantity> quantities_;
 };
 
-/// Variances between instruments and within, and shares of runs. No rows without a complete
-/// instrument.
+/// Variances between instruments and within; says so if there is no complete instrument.
 [[nodiscard]] Table variance_table(const InstrumentStatistics& statistics);
+
+/// Biases, and shares of runs. No rows without a complete instrument.
 [[nodiscard]] Table instrument_table(const InstrumentStatistics& statistics);
 
-/// The same for programs.
+/// All of it for programs.
 [[nodiscard]] nlohmann::ordered_json json_of(const InstrumentStatistics& statistics);
 
 }  // namespace proofmass::coordinator

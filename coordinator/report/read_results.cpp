@@ -159,9 +159,6 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors;
   std::optional<RunningInstruments> instruments;
-  if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
-    instruments.emplace(objectives, realisations);
-  }
   std::optional<RunningReplicates> replicates;
   if (const SamplingDesign design = campaign.sampling_design(); design.points > 1) {
     replicates.emplace(objectives, design);
@@ -171,6 +168,9 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   const Warner warner = campaign.warner();
   store.read_one_state([&] {
+    if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
+      instruments.emplace(objectives, realisations, store.given_up_runs());
+    }
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());

@@ -5,6 +5,7 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -22,7 +23,8 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
   const InstrumentStatistics instruments = results.instruments.value_or(InstrumentStatistics{});
   for (const Table& table :
        {accuracy_table(campaign.objectives(), statistics), interval_table(statistics, num_given_up),
-        error_table(statistics, num_given_up, campaign.interpretation()),
+        error_table(statistics, num_given_up, campaign.interpretation(),
+                    why_not_independent(campaign)),
         standard_error_table(results.standard_errors), variance_table(instruments),
         instrument_table(instruments),
         replicate_table(results.replicates.value_or(ReplicateStatistics{})),

@@ -140,7 +140,7 @@ Json standard_errors_of(const StandardErrorStatistics& statistics) {
                                   {"num_runs", of.num_runs},
                                   {"mean", of.mean},
                                   {"squared_ratio", of.squared_ratio},
-                                  {"squared_ratio_standard_error", of.squared_ratio_error},
+                                  {"squared_ratio_standard_error", or_null(of.squared_ratio_error)},
                                   {"num_within_95", of.num_within},
                                   {"fraction_within_95_interval", bounds_of(of.within)}});
   }

@@ -77,6 +77,13 @@ void add_triple(double value, const std::optional<Interval>& interval, double sc
   row.push_back(interval ? figure_cell(interval->upper, scale) : no_figure());
 }
 
+Cell skewness_cell(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
+  if (num_runs < 3) return no_figure();
+  Cell cell = figure_cell(accuracy.error.skewness);
+  cell.text = fmt::format("{:.2f}", accuracy.error.skewness);
+  return cell;
+}
+
 Row interval_row(const Quantity& quantity, const AccuracyStatistic& accuracy,
                  std::uint64_t num_runs) {
   const double scale = quantity.display_scale;
@@ -88,8 +95,7 @@ Row interval_row(const Quantity& quantity, const AccuracyStatistic& accuracy,
     add_triple(accuracy.standard_deviation, accuracy.deviation_interval, scale, row);
   }
   row.push_back(figure_cell(accuracy.error.bias, scale));
-  row.push_back(num_runs < 3 ? no_figure() : figure_cell(accuracy.error.skewness));
-  if (num_runs >= 3) row.back().text = fmt::format("{:.2f}", accuracy.error.skewness);
+  row.push_back(skewness_cell(accuracy, num_runs));
   return row;
 }
 
@@ -117,9 +123,8 @@ Row error_row(const Quantity& quantity, const AccuracyStatistic& accuracy) {
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
     row.push_back(figure_cell(percentile.value, scale));
   }
-  const bool is_known = accuracy.beyond_objective.upper - accuracy.beyond_objective.lower < 1.0;
   for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
-    row.push_back(is_known ? figure_cell(share, 0.01) : no_figure());
+    row.push_back(figure_cell(share, 0.01));
   }
   return row;
 }
@@ -169,6 +174,34 @@ std::string level_sentence(const ErrorBudget& budget, const CampaignStatistics& 
   const HealthStatistic& level = statistics.health.at(budget.level);
   return fmt::format("{} is that of the runs: worst {:.3g}, mean {:.3g} {}; assumed was {:.3g}",
                      budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
+}
+
+/// What error_table() shows where draws are not independent and there is no interval.
+Table dependent_error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                            Interpretation interpretation, const std::string& why) {
+  constexpr const char* percentiles = "percentiles of |error|";
+  Table table{.id = "error-table",
+              .caption = "Errors, in the units above",
+              .columns = {{"parameter", true, 11},
+                          {"bias", false, 9},
+                          {"skew", false, 8},
+                          {"50 %", false, 8, percentiles, true},
+                          {"90 %", false, 8, percentiles},
+                          {"95 %", false, 8, percentiles},
+                          {"99 %", false, 8, percentiles}},
+              .notes = {"no intervals over runs: " + why,
+                        joint_sentence(statistics, num_given_up, interpretation)}};
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    const Quantity& quantity = model().results().quantities[i];
+    const AccuracyStatistic& accuracy = statistics.accuracy[i];
+    Row row{quantity.symbol, figure_cell(accuracy.error.bias, quantity.display_scale),
+            skewness_cell(accuracy, statistics.num_estimated)};
+    for (const PercentileStatistic& percentile : accuracy.percentiles) {
+      row.push_back(figure_cell(percentile.value, quantity.display_scale));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
 }
 
 // Published totals, too, add up the worst errors of all parameters, which no single run has.
@@ -243,7 +276,7 @@ Table accuracy_table(std::span<const double> objectives, const CampaignStatistic
 }
 
 Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  if (statistics.num_estimated == 0) return {};
+  if (statistics.num_estimated == 0 || !statistics.are_draws_independent) return {};
   constexpr const char* mean = "mean of |error|";
   constexpr const char* deviation = "std of |error|";
   Table table{.id = "interval-table",
@@ -261,12 +294,6 @@ Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_giv
     table.rows.push_back(interval_row(model().results().quantities[i], statistics.accuracy[i],
                                       statistics.num_estimated));
   }
-  if (!statistics.are_draws_independent) {
-    table.notes.emplace_back(
-        "no intervals: the draws are not independent, as several runs share one, or as they are "
-        "those of a design or of a table that is not declared independent");
-    return table;
-  }
   if (statistics.num_estimated < num_runs_of_bootstrap) {
     table.notes.emplace_back(
         "std: an interval from fewer than 200 runs is too narrow, see core/statistics");
@@ -277,8 +304,11 @@ Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_giv
 }
 
 Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                  Interpretation interpretation) {
+                  Interpretation interpretation, const std::string& why_not_independent) {
   if (statistics.num_estimated == 0) return {};
+  if (!why_not_independent.empty()) {
+    return dependent_error_table(statistics, num_given_up, interpretation, why_not_independent);
+  }
   constexpr const char* percentiles = "percentiles of |error|";
   static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
   Table table{.id = "error-table",
@@ -295,7 +325,7 @@ Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
     table.rows.push_back(error_row(model().results().quantities[i], statistics.accuracy[i]));
   }
-  if (statistics.are_draws_independent) table.notes.push_back(bias_sentence(statistics));
+  table.notes.push_back(bias_sentence(statistics));
   table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
   return table;
 }

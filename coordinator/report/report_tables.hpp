@@ -26,7 +26,7 @@ namespace proofmass::coordinator {
                                    const CampaignStatistics& statistics);
 
 /// What the draws that were made say about all draws: 95 % intervals of mean and standard
-/// deviation, and the errors' bias and skewness.
+/// deviation, and the errors' bias and skewness. No rows if they are not independent.
 /// @param num_given_up  Runs that have no result, beside those in the statistics.
 [[nodiscard]] Table interval_table(const CampaignStatistics& statistics,
                                    std::uint64_t num_given_up);
@@ -37,8 +37,11 @@ namespace proofmass::coordinator {
 /// invites to look for one without 0, which chance alone makes in 40 % of all campaigns.
 /// @param num_given_up    Runs that have no result, beside those in the statistics.
 /// @param interpretation  What the probabilities are over.
+/// @param why_not_independent  Of the draws: then bias, skewness and percentiles without intervals,
+///                             and this reason.
 [[nodiscard]] Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                                Interpretation interpretation);
+                                Interpretation interpretation,
+                                const std::string& why_not_independent = "");
 
 /// Budget before and after estimation beside the published one, and what single runs have. A
 /// campaign without a budget has no rows; one without an estimate has.

@@ -175,7 +175,8 @@ std::vector<Section> sections_of(const Review& review) {
            flow(table_part(accuracy_table(review.objectives, statistics)) +
                 characteristics_markup(review)) +
                table_part(interval_table(statistics, review.num_given_up)) +
-               table_part(error_table(statistics, review.num_given_up, review.interpretation))},
+               table_part(error_table(statistics, review.num_given_up, review.interpretation,
+                                      review.why_not_independent))},
           {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
           {"instruments-section", "Instruments", instruments_markup(review)},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
@@ -290,20 +291,20 @@ std::string review_markdown(const Review& review) {
     text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
   }
   text += "\n";
-  text +=
-      section("Verification matrix", {matrix_table(review)}) +
-      section("Accuracy", {accuracy_table(review.objectives, statistics),
-                           interval_table(statistics, review.num_given_up),
-                           error_table(statistics, review.num_given_up, review.interpretation)}) +
-      section("Standard errors", {standard_error_table(review.results.standard_errors)}) +
-      section("Instruments",
-              {variance_table(instruments), instrument_table(instruments),
-               replicate_table(review.results.replicates.value_or(ReplicateStatistics{}))}) +
-      section("Budget", {review_budget_table(review)}) +
-      section("Causes of the errors", {cause_table(review)}) +
-      section("How it was run",
-              {identity_table(review), execution_table(review), host_table(review)}) +
-      "## How to reproduce it\n\n";
+  text += section("Verification matrix", {matrix_table(review)}) +
+          section("Accuracy", {accuracy_table(review.objectives, statistics),
+                               interval_table(statistics, review.num_given_up),
+                               error_table(statistics, review.num_given_up, review.interpretation,
+                                           review.why_not_independent)}) +
+          section("Standard errors", {standard_error_table(review.results.standard_errors)}) +
+          section("Instruments",
+                  {variance_table(instruments), instrument_table(instruments),
+                   replicate_table(review.results.replicates.value_or(ReplicateStatistics{}))}) +
+          section("Budget", {review_budget_table(review)}) +
+          section("Causes of the errors", {cause_table(review)}) +
+          section("How it was run",
+                  {identity_table(review), execution_table(review), host_table(review)}) +
+          "## How to reproduce it\n\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     text += fmt::format("- {} {}\n", code_span(command), markdown_text(effect));
   }

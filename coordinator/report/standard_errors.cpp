@@ -67,7 +67,10 @@ Chart pull_chart(const StandardErrorStatistic& statistic, bool is_first) {
 }  // namespace
 
 void leave_out_intervals(StandardErrorStatistics& statistics) {
-  for (StandardErrorStatistic& statistic : statistics.quantities) statistic.within.reset();
+  for (StandardErrorStatistic& statistic : statistics.quantities) {
+    statistic.squared_ratio_error.reset();
+    statistic.within.reset();
+  }
 }
 
 void RunningStandardErrors::add(const RunResult& result) {
@@ -116,33 +119,36 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
 
 Table standard_error_table(const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
+  // Draws that are not independent have neither intervals nor a standard error of the ratio.
+  const bool have_intervals = statistics.quantities.front().within.has_value();
   constexpr const char* ratio = "error²/σ²";
   constexpr const char* within = "within 1.96 σ, %";
-  Table table{
-      .id = "standard-error-table",
-      .caption = fmt::format("Standard errors σ of the estimates of {} {}",
-                             statistics.quantities.front().num_runs,
-                             statistics.quantities.front().num_runs == 1 ? "run" : "runs"),
-      .columns = {{"parameter", true, 11},
-                  {"unit", true, 9},
-                  {"mean", false, 9},
-                  {"mean", false, 10, ratio, true},
-                  {"±", false, 9, ratio},
-                  {"runs", false, 9, within, true},
-                  {"from", false, 9, within},
-                  {"to", false, 9, within}},
-      .notes = {
-          "honest ones have a ratio of 1, and 95 % of the errors within; from, to: 95 % interval"}};
+  Table table{.id = "standard-error-table",
+              .caption = fmt::format("Standard errors σ of the estimates of {} {}",
+                                     statistics.quantities.front().num_runs,
+                                     statistics.quantities.front().num_runs == 1 ? "run" : "runs"),
+              .columns = {{"parameter", true, 11},
+                          {"unit", true, 9},
+                          {"mean", false, 9},
+                          {"mean", false, 10, ratio, true}},
+              .notes = {"honest ones have a ratio of 1, and 95 % of the errors within"}};
+  if (have_intervals) table.columns.push_back({"±", false, 9, ratio});
+  table.columns.push_back({"runs", false, have_intervals ? 9U : 18U, within, true});
+  if (have_intervals) {
+    table.columns.insert(table.columns.end(),
+                         {{"from", false, 9, within}, {"to", false, 9, within}});
+    table.notes.back() += "; from, to: 95 % interval";
+  }
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
     const Quantity& quantity = quantity_of(statistic);
-    Row row{quantity.symbol,
-            unit_cell(quantity),
+    Row row{quantity.symbol, unit_cell(quantity),
             figure_cell(statistic.mean, quantity.display_scale),
-            figure_cell(statistic.squared_ratio),
-            figure_cell(statistic.squared_ratio_error),
-            figure_cell(share_within(statistic), 0.01)};
-    for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
-      row.push_back(statistic.within ? figure_cell((*statistic.within).*end, 0.01) : no_figure());
+            figure_cell(statistic.squared_ratio)};
+    if (have_intervals) row.push_back(figure_cell(*statistic.squared_ratio_error));
+    row.push_back(figure_cell(share_within(statistic), 0.01));
+    if (have_intervals) {
+      row.push_back(figure_cell(statistic.within->lower, 0.01));
+      row.push_back(figure_cell(statistic.within->upper, 0.01));
     }
     table.rows.push_back(std::move(row));
   }

@@ -21,10 +21,10 @@ struct StandardErrorStatistic {
   std::uint64_t num_runs = 0;
   double mean = 0.0;           ///< Of the standard errors, SI.
   double squared_ratio = 0.0;  ///< Mean of error² over the mean of the standard errors' squares.
-  double squared_ratio_error = 0.0;  ///< Its own standard error.
-  std::uint64_t num_within = 0;      ///< Runs whose |error| is within normal_95 standard errors.
-  std::optional<Interval> within;    ///< Of their share among all draws, 95 %.
-  Histogram pulls;                   ///< Of error / standard error.
+  std::optional<double> squared_ratio_error;  ///< Its standard error.
+  std::uint64_t num_within = 0;    ///< Runs whose |error| is within normal_95 standard errors.
+  std::optional<Interval> within;  ///< Of their share among all draws, 95 %.
+  Histogram pulls;                 ///< Of error / standard error.
 };
 
 /// Half the width of the interval, in standard deviations, that holds 95 % of a normal law.
@@ -35,7 +35,7 @@ struct StandardErrorStatistics {
   std::vector<double> fit;                         ///< Means of the fit quantities of these runs.
 };
 
-/// For draws that are not independent.
+/// Intervals and the standard error of the ratio, for draws that are not independent.
 void leave_out_intervals(StandardErrorStatistics& statistics);
 
 /// Computes them from results that are seen once. Memory is fixed.
@@ -46,8 +46,8 @@ class RunningStandardErrors {
 
  private:
   struct Sums {
-    double errors = 0.0;   ///< Of the standard errors; below of their squares.
-    double squares = 0.0;  ///< Those of all the others are of what they are called.
+    double errors = 0.0;   ///< Of the standard errors.
+    double squares = 0.0;  ///< Of the squares of the standard errors.
     double squared_errors = 0.0;
     double fourth_powers = 0.0;  ///< Of the errors.
     std::uint64_t num_within = 0;
@@ -58,7 +58,7 @@ class RunningStandardErrors {
   std::vector<double> fit_;
 };
 
-/// No rows without standard errors.
+/// No rows without standard errors; no columns of intervals without those.
 [[nodiscard]] Table standard_error_table(const StandardErrorStatistics& statistics);
 
 /// Error over standard error of each quantity beside the normal law that it should follow; nothing

@@ -18,8 +18,9 @@ void check_table_column(const std::vector<double>& column, const TableSource& so
   const std::string field = source.path + ".column";
   const std::string value = fmt::format("\"{}\"", source.column);
   if (column.size() < num_runs) {
-    throw ConfigError(field, value,
-                      fmt::format("has {} rows, {} runs need one each", column.size(), num_runs));
+    throw ConfigError(
+        field, value,
+        fmt::format("has values for {} runs, {} are needed", column.size(), num_runs));
   }
   const auto bad = std::ranges::find_if_not(column, [](double x) { return std::isfinite(x); });
   if (bad != column.end()) {

@@ -2,100 +2,163 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.hpp"
+#include "core/math/elementary.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass {
 namespace {
 
-double f_quantile(double probability, double degrees_1, double degrees_2) {
-  const double x = beta_quantile(probability, 0.5 * degrees_1, 0.5 * degrees_2);
-  return degrees_2 * x / (degrees_1 * (1.0 - x));
-}
+/// Above as many groups the jackknife leaves out several at a time.
+constexpr std::size_t num_blocks_max = 1024;
 
-double root_of_positive(double square) { return std::sqrt(std::fmax(square, 0.0)); }
+/// Of F beyond it the share within is 0 in any report.
+constexpr double log_max = 600.0;
 
-/// Intervals of an analysis that has its mean squares, both of them positive.
-void add_intervals(OneWayAnalysis& of, double confidence) {
-  const auto size = static_cast<double>(of.group_size);
-  const double between = static_cast<double>(of.num_groups) - 1.0;
-  const double within = static_cast<double>(of.num_groups) * (size - 1.0);
-  const double low = 0.5 * (1.0 - confidence), high = 1.0 - low;
-  const double f = of.between_mean_square / of.within_mean_square;
-  const double f_low = f_quantile(low, between, within);
-  const double f_high = f_quantile(high, between, within);
-  of.within_interval = {
-      .lower = std::sqrt(within * of.within_mean_square / chi_square_quantile(high, within)),
-      .upper = std::sqrt(within * of.within_mean_square / chi_square_quantile(low, within)),
-      .confidence = confidence};
-  // F is (1 + size σ_b²/σ_w²) times a value of its law.
-  const auto share = [&](double quantile) {
-    return 1.0 / (1.0 + std::fmax(f / quantile - 1.0, 0.0) / size);
-  };
-  of.within_share_interval = {
-      .lower = share(f_low), .upper = share(f_high), .confidence = confidence};
-  const double sum = between * of.between_mean_square;
-  of.between_interval = {
-      .lower =
-          root_of_positive(sum * (1.0 - f_high / f) / (size * chi_square_quantile(high, between))),
-      .upper =
-          root_of_positive(sum * (1.0 - f_low / f) / (size * chi_square_quantile(low, between))),
-      .confidence = confidence};
-}
+/// Degrees of freedom that are left at least: the kurtosis of few values is not known, and fewer
+/// would stretch intervals manyfold for hardly any coverage.
+constexpr double degrees_min = 4.0;
+
+/// Fewest groups with a hit, and with a member without one, for which the variance between groups
+/// tells how much their members depend on one another.
+constexpr std::uint64_t num_telling_groups_min = 10;
 
 }  // namespace
+
+GroupedValues::Block& GroupedValues::Block::operator+=(const Block& other) {
+  num_groups += other.num_groups;
+  sum += other.sum;
+  squares += other.squares;
+  within += other.within;
+  return *this;
+}
 
 void GroupedValues::add(std::span<const double> group) {
   PROOFMASS_EXPECT(group.size() == group_size_ && group_size_ > 1);
   const double mean = compensated_sum(group) / static_cast<double>(group_size_);
-  if (!means_) means_.emplace(mean);
+  if (!means_) {
+    means_.emplace(mean);
+    centre_ = mean;
+  }
   means_->add(mean);
-  for (const double value : group) within_.add((value - mean) * (value - mean));
+  double within = 0.0;
+  for (const double value : group) within += (value - mean) * (value - mean);
+  within_.add(within);
+  const double difference = mean - centre_;
+  add_to_blocks({1, difference, difference * difference, within});
+}
+
+void GroupedValues::add_to_blocks(const Block& group) {
+  if (!blocks_.empty() && blocks_.back().num_groups < block_size_) {
+    blocks_.back() += group;
+    return;
+  }
+  if (blocks_.size() == num_blocks_max) {
+    for (std::size_t i = 0; i < num_blocks_max / 2; ++i) {
+      blocks_[i] = blocks_[2 * i];
+      blocks_[i] += blocks_[2 * i + 1];
+    }
+    blocks_.resize(num_blocks_max / 2);
+    block_size_ *= 2;
+  }
+  blocks_.push_back(group);
 }
 
 OneWayAnalysis GroupedValues::analysis(double confidence) const {
-  PROOFMASS_EXPECT(means_.has_value());
+  if (!means_) return {.group_size = group_size_};
   const Moments means = means_->moments();
   const auto size = static_cast<double>(group_size_);
-  const auto groups = static_cast<double>(means.count);
   OneWayAnalysis of{.num_groups = means.count, .group_size = group_size_, .mean = means.mean};
   of.mean_interval = mean_interval(means, confidence);
-  of.within_mean_square = within_.value() / (groups * (size - 1.0));
+  of.within_mean_square = within_.value() / (static_cast<double>(means.count) * (size - 1.0));
   of.within_deviation = std::sqrt(of.within_mean_square);
-  of.within_share = of.within_mean_square > 0.0 ? 1.0 : 0.0;
   if (means.count < 2) return of;
   of.between_mean_square = size * means.standard_deviation * means.standard_deviation;
-  const double variance = std::fmax((of.between_mean_square - of.within_mean_square) / size, 0.0);
-  of.between_deviation = std::sqrt(variance);
-  if (of.within_mean_square > 0.0) {
-    of.within_share = of.within_mean_square / (variance + of.within_mean_square);
-  }
-  if (of.within_mean_square <= 0.0 || of.between_mean_square <= 0.0) return of;
-  const double a = 0.5 * (groups - 1.0), b = 0.5 * groups * (size - 1.0);
-  const double odds = a * of.between_mean_square / (b * of.within_mean_square);
-  of.p_value = beta_above(odds / (1.0 + odds), a, b);
-  add_intervals(of, confidence);
+  const double between = std::fmax((*of.between_mean_square - of.within_mean_square) / size, 0.0);
+  of.between_deviation = std::sqrt(between);
+  const double variance = between + of.within_mean_square;
+  if (variance > 0.0) of.within_share = of.within_mean_square / variance;
+  of.within_share_interval = share_interval(confidence);
   return of;
 }
 
-Interval grouped_probability_interval(const Moments& shares, std::size_t group_size,
-                                      double confidence) {
-  const auto groups = static_cast<double>(shares.count);
-  const double members = groups * static_cast<double>(group_size);
-  const double p = shares.mean;
-  const double of_independent = p * (1.0 - p) / members;
-  const double found = shares.standard_deviation * shares.standard_deviation / groups;
-  double effective = members;
-  if (p <= 0.0 || p >= 1.0) {
-    effective = groups;
-  } else if (shares.count > 1 && found > 0.0) {
+/// ln F of some of the groups; not a number if all variance is within or between groups.
+double GroupedValues::log_ratio(const Block& groups) const {
+  const auto size = static_cast<double>(group_size_);
+  const auto count = static_cast<double>(groups.num_groups);
+  const double between = size * (groups.squares - groups.sum * groups.sum / count) / (count - 1.0);
+  const double within = groups.within / (count * (size - 1.0));
+  if (between <= 0.0 || within <= 0.0) return std::numeric_limits<double>::quiet_NaN();
+  return logarithm(between) - logarithm(within);
+}
+
+std::optional<Interval> GroupedValues::share_interval(double confidence) const {
+  Block all;
+  for (const Block& block : blocks_) all += block;
+  if (all.num_groups < num_groups_min) return std::nullopt;
+  const double log_of_all = log_ratio(all);
+  const auto count = static_cast<double>(blocks_.size());
+  std::vector<double> pseudo_values;
+  for (const Block& block : blocks_) {
+    const Block others{all.num_groups - block.num_groups, all.sum - block.sum,
+                       all.squares - block.squares, all.within - block.within};
+    pseudo_values.push_back(count * log_of_all - (count - 1.0) * log_ratio(others));
+    if (!std::isfinite(pseudo_values.back())) return std::nullopt;
+  }
+  const Moments about = moments(pseudo_values);
+  // The degrees of freedom that a χ² law with the variance of the pseudo-values' variance has.
+  const double degrees =
+      std::clamp(2.0 * count / (2.0 + about.excess_kurtosis), degrees_min, count - 1.0);
+  const double half_width = student_quantile(0.5 * (1.0 + confidence), degrees) *
+                            about.standard_deviation / std::sqrt(count);
+  // F estimates 1 + size σ_b²/σ_w², which is never below 1.
+  const auto share = [&](double log_of_ratio) {
+    return 1.0 / (1.0 + (exponential(std::clamp(log_of_ratio, 0.0, log_max)) - 1.0) /
+                            static_cast<double>(group_size_));
+  };
+  return Interval{.lower = share(std::fmax(about.mean, 0.0) + half_width),
+                  .upper = share(about.mean - half_width),
+                  .confidence = confidence};
+}
+
+void GroupedHits::add(std::uint64_t num_hits) {
+  PROOFMASS_EXPECT(num_hits <= group_size_);
+  ++num_groups_;
+  if (num_hits > 0) ++num_with_hit_;
+  if (num_hits < group_size_) ++num_with_miss_;
+  const auto hits = static_cast<double>(num_hits);
+  hits_ += hits;
+  squared_hits_ += hits * hits;
+}
+
+double GroupedHits::share() const {
+  PROOFMASS_EXPECT(num_groups_ > 0);
+  return hits_ / (static_cast<double>(num_groups_) * static_cast<double>(group_size_));
+}
+
+Interval GroupedHits::interval(double confidence) const {
+  const double p = share();
+  const auto groups = static_cast<double>(num_groups_);
+  const double members = groups * static_cast<double>(group_size_);
+  double effective = groups;
+  if (std::min(num_with_hit_, num_with_miss_) >= num_telling_groups_min) {
+    // Of the number of hits in a group; that of independent members is size p (1 − p).
+    const double variance = (squared_hits_ - hits_ * hits_ / groups) / (groups - 1.0);
     const double probability = 0.5 * (1.0 + confidence);
     const double t_ratio =
         student_quantile(probability, members - 1.0) / student_quantile(probability, groups - 1.0);
-    effective = std::fmin(members, members * of_independent / found * t_ratio * t_ratio);
+    const double of_independent = static_cast<double>(group_size_) * p * (1.0 - p);
+    if (variance > 0.0) {
+      effective = members * std::fmin(1.0, of_independent / variance * t_ratio * t_ratio);
+    }
   }
-  return probability_interval(std::clamp(p, 0.0, 1.0) * effective, effective, confidence);
+  Interval interval = probability_interval(p * effective, effective, confidence);
+  // Less than one hit, or miss, excludes no probability, however small.
+  if (p * effective < 1.0) interval.lower = 0.0;
+  if ((1.0 - p) * effective < 1.0) interval.upper = 1.0;
+  return interval;
 }
 
 }  // namespace proofmass

@@ -34,8 +34,8 @@ struct ReportOptions {
   std::vector<std::string> requirements;    ///< See parse_requirement().
   std::filesystem::path requirements_file;  ///< Empty: there is none.
   OutputFormat format = OutputFormat::text;
-  std::filesystem::path html;  ///< `-`: standard output. Empty: not wanted; so is the next.
-  std::filesystem::path markdown;
+  std::filesystem::path html;      ///< `-` is standard output; not written if empty.
+  std::filesystem::path markdown;  ///< `-` is standard output; not written if empty.
   wire::IfThere if_there = wire::IfThere::keep;
   ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 
@@ -53,14 +53,8 @@ std::vector<StatedRequirement> stated_in(const ReportOptions& options) {
 
 std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
                                           const std::vector<StatedRequirement>& stated) {
-  try {
-    if (!stated.empty()) {
-      require_independent(campaign, "requirement", stated.front().requirement);
-    }
-    return check_requirements(store, campaign.objectives(), stated, campaign.error_budget());
-  } catch (const ConfigError& error) {
-    throw UsageError(error.what());
-  }
+  if (!stated.empty()) require_independent(campaign, "requirement", stated.front().requirement);
+  return check_requirements(store, campaign.objectives(), stated, campaign.error_budget());
 }
 
 std::string answers_text(const std::vector<RequirementAnswer>& answers, Paint paint) {
@@ -105,26 +99,21 @@ void check_standard_output(const ReportOptions& options) {
 /// @return What print_report() returns.
 int write_documents(const ReportOptions& options, const Store& store, const Campaign& campaign,
                     const std::vector<StatedRequirement>& stated) {
-  std::optional<Review> review;
-  try {
-    review =
-        read_review(store, campaign, options.database.filename().string(), stated, WithCauses::yes);
-  } catch (const ConfigError& error) {
-    throw UsageError(error.what());
-  }
+  Review review =
+      read_review(store, campaign, options.database.filename().string(), stated, WithCauses::yes);
   const auto write = [&] {
-    if (!options.html.empty()) write_document(options.html, options.if_there, review_html(*review));
+    if (!options.html.empty()) write_document(options.html, options.if_there, review_html(review));
     if (!options.markdown.empty()) {
-      write_document(options.markdown, options.if_there, review_markdown(*review));
+      write_document(options.markdown, options.if_there, review_markdown(review));
     }
-    const std::span<const RequirementAnswer> rows(review->matrix);
+    const std::span<const RequirementAnswer> rows(review.matrix);
     return exit_code_of(std::ranges::all_of(
         rows.first(stated.size()),
         [](const RequirementAnswer& row) { return row.check.verdict == RequirementVerdict::met; }));
   };
   if (options.html.empty()) return write();
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    review->spectra = worst_run_spectra(store, *review, is_stopped);
+    review.spectra = worst_run_spectra(store, review, is_stopped);
     return write();
   });
 }

@@ -41,9 +41,9 @@ class Comparison {
     const auto compare = [this](std::string_view path, auto first, auto second) {
       if (first != second) differ(path, fmt::format("{}", first), fmt::format("{}", second));
     };
-    compare("realisations", first_.realisations, second_.realisations);
-    compare("design", name_of(first_.design.kind), name_of(second_.design.kind));
-    compare("points", first_.design.points, second_.design.points);
+    compare("campaign.realisations", first_.realisations, second_.realisations);
+    compare("campaign.design", name_of(first_.design.kind), name_of(second_.design.kind));
+    compare("campaign.points", first_.design.points, second_.design.points);
   }
 
   // More runs extend a campaign; the values of data files are compared, not their names.

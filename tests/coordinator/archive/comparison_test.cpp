@@ -267,8 +267,9 @@ TEST(Comparison, OfTooFewRunsIsOfTheDefinitionsAlone) {
   for (RunResult& result : second.results) result.status = RunStatus::not_finite;
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_EQ(comparison.why_not_compared, "0 and 0 runs with an estimate (must be at least 1)");
-  EXPECT_THAT(text_of(comparison),
-              HasSubstr("     0  cannot be: 0 and 0 runs with an estimate (must be at least 1)\n"));
+  EXPECT_THAT(
+      text_of(comparison),
+      HasSubstr("cannot be compared: 0 and 0 runs with an estimate (must be at least 1)\n"));
 }
 
 TEST(Comparison, NamesOtherModelsAndBuilds) {

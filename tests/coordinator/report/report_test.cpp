@@ -110,6 +110,18 @@ TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
                        "    40    10   7.3"));
 }
 
+TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
+  CampaignStatistics statistics = paper_statistics(40);
+  leave_out_intervals(statistics);
+  EXPECT_TRUE(interval_table(statistics, 0).rows.empty());
+  const std::string text =
+      terminal_text(error_table(statistics, 0, Interpretation::mixed, "4 runs share one draw"));
+  EXPECT_THAT(text, HasSubstr("no intervals over runs: 4 runs share one draw\n"
+                              "all objectives together: 40 of 40 runs\n"));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("from")));
+  EXPECT_THAT(lines_of(text), Each(FitsATerminal()));
+}
+
 TEST(Summary, TellsHowTheRunsEnded) {
   CampaignStatistics statistics = paper_statistics(90);
   statistics.num_not_converged = 3;

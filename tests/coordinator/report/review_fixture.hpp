@@ -9,6 +9,20 @@ namespace proofmass::test {
 inline const std::string hostile_text =
     "<script>alert(1)</script> \"quoted\" 'single' & | `code` \x1b[31m";
 
+/// A run whose errors are this many of its standard errors, which are a tenth of the objectives.
+inline RunResult result_off_by(std::uint64_t run, double pull) {
+  RunResult result = result_of(run);
+  const std::vector<double> objectives = campaign_of(1).objectives();
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    result.truth[i] = 0.0;
+    result.estimate[i] = 0.1 * pull * objectives[i];
+    result.standard_error.push_back(0.1 * objectives[i]);
+  }
+  result.fit = {30.0 + static_cast<double>(run), 32.0};
+  result.correlations.assign(45, 0.0);
+  return result;
+}
+
 /// A campaign database with results whose errors are known: run r is off by (r + 1) % of the
 /// objective in each parameter.
 class ReviewTest : public StoreTest {

@@ -20,25 +20,12 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A run whose errors are this many of its standard errors, which are a tenth of the objectives.
-RunResult result_off_by(std::uint64_t run, double pull) {
-  RunResult result = test::result_of(run);
-  const std::vector<double> objectives = test::campaign_of(1).objectives();
-  for (std::size_t i = 0; i < objectives.size(); ++i) {
-    result.truth[i] = 0.0;
-    result.estimate[i] = 0.1 * pull * objectives[i];
-    result.standard_error.push_back(0.1 * objectives[i]);
-  }
-  result.fit = {30.0 + static_cast<double>(run), 32.0};
-  result.correlations.assign(45, 0.0);
-  return result;
-}
-
 const std::vector<double> pulls{-3.0, -1.0, 0.5, 1.5, 2.0};
 
 StandardErrorStatistics of_five_runs() {
   RunningStandardErrors running;
-  for (std::size_t run = 0; run < pulls.size(); ++run) running.add(result_off_by(run, pulls[run]));
+  for (std::size_t run = 0; run < pulls.size(); ++run)
+    running.add(test::result_off_by(run, pulls[run]));
   running.add(test::result_of(5));                            // Without standard errors.
   running.add(test::result_of(6, RunStatus::not_converged));  // Counts as a miss elsewhere.
   return running.statistics();
@@ -54,8 +41,8 @@ TEST(StandardErrors, AreHeldAgainstTheErrors) {
     EXPECT_EQ(of.num_runs, 5U);
     EXPECT_NEAR(of.mean / objectives[of.quantity], 0.1, 1e-15);
     EXPECT_NEAR(of.squared_ratio, 3.3, 1e-12);
-    EXPECT_NEAR(of.squared_ratio_error, std::sqrt(103.125 / 5.0 - 3.3 * 3.3) / std::sqrt(5.0),
-                1e-12);
+    EXPECT_NEAR(of.squared_ratio_error.value(),
+                std::sqrt(103.125 / 5.0 - 3.3 * 3.3) / std::sqrt(5.0), 1e-12);
     EXPECT_EQ(of.num_within, 3U);
     EXPECT_NEAR(of.pulls.edges.front(), -3.0, 0.126);  // Bins are 1/8 wide.
     std::uint64_t num_runs = 0;
@@ -78,6 +65,14 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
   EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law")));
 }
 
+TEST(StandardErrors, HaveNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
+  StandardErrorStatistics statistics = of_five_runs();
+  leave_out_intervals(statistics);
+  const std::string text = terminal_text(standard_error_table(statistics), {});
+  EXPECT_THAT(text, ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 .* +60.0\n"));
+  EXPECT_THAT(text, AllOf(Not(HasSubstr("±")), Not(HasSubstr("interval"))));
+}
+
 TEST(StandardErrors, AreNowhereWithoutAny) {
   RunningStandardErrors running;
   running.add(test::result_of(0));
@@ -93,7 +88,7 @@ TEST_F(StandardErrorsTest, AreInEveryReport) {
   std::vector<Delivery> deliveries;
   for (std::size_t run = 0; run < pulls.size(); ++run) {
     deliveries.push_back(test::delivery_of(run));
-    deliveries.back().result = result_off_by(run, pulls[run]);
+    deliveries.back().result = test::result_off_by(run, pulls[run]);
   }
   store.commit(deliveries);
   const std::string caption = "Standard errors σ of the estimates of 5 runs";

@@ -91,7 +91,7 @@ TEST(MicroscopeCampaign, WantsAValueOfEachTableForEachRun) {
   EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) {
               use_table(c, {1.0, 2.0});
             }),
-            "dispersion.offcentring_m.y.column = \"dy\" (has 2 rows, 3 runs need one each)");
+            "dispersion.offcentring_m.y.column = \"dy\" (has values for 2 runs, 3 are needed)");
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(refusal_after([=](MicroscopeCampaign& c) {
               use_table(c, {1.0, infinity, 3.0});

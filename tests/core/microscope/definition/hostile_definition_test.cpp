@@ -154,7 +154,7 @@ TEST(HostileDefinition, HasOtherTables) {
             "definition:235: dispersion = 0 columns (laws of kind table are 1)");
   EXPECT_NE(refusal([](Definition& d) {
               d.table_columns[0].pop_back();
-            }).find("has 1 rows, 2 runs need one each"),
+            }).find("has values for 1 runs, 2 are needed"),
             std::string::npos);
   EXPECT_NE(
       refusal([](Definition& d) { d.table_columns[0][1] = nan; }).find("row 2 must be finite"),
