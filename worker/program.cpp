@@ -9,7 +9,9 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "core/campaign/device.hpp"
@@ -48,7 +50,20 @@ void die_with(pid_t parent) {
 struct Cards {
   std::vector<std::shared_ptr<Device>> devices;
   std::size_t capacity = 0;  ///< Runs at a time, of all together.
+  std::map<std::string, int> num_of_kind;
 };
+
+/// `2 NVIDIA H100 80GB HBM3 (CUDA 13.0)`, as the driver says; empty without cards.
+std::string text_of(const Cards& cards) {
+  std::string text;
+  for (const auto& [kind, count] : cards.num_of_kind) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, kind);
+  }
+  std::ranges::replace_if(
+      text, [](char letter) { return letter < ' ' || letter > '~'; }, '?');
+  text.resize(std::min(text.size(), wire::cards_text_size_max));
+  return text;
+}
 
 /// Opens the cards that the options name and has each prove that it computes as processors do.
 Cards open_cards(const Options& options, std::uint64_t reference_digest, const wire::Log& log) {
@@ -69,6 +84,7 @@ Cards open_cards(const Options& options, std::uint64_t reference_digest, const w
                     {"slots", std::uint64_t{proof->capacity}}}});
     cards.devices.push_back(std::move(device));
     cards.capacity += proof->capacity;
+    ++cards.num_of_kind[fmt::format("{} (CUDA {})", card.name, card.driver)];
   }
   return cards;
 }
@@ -183,9 +199,12 @@ int work(const Options& options, const Program& program, ServeConfig config,
   config.hello = hello_for(options, start);
   const Cards cards = open_cards(options, config.hello.reference_digest(), config.log);
   const unsigned num_threads = num_threads_of(options, cards.devices.size());
-  const std::size_t num_slots = num_threads * model().batch_size() + cards.capacity;
-  config.hello.set_num_slots(
-      static_cast<std::uint32_t>(std::min<std::size_t>(num_slots, wire::slots_max)));
+  const std::size_t num_processor_slots = num_threads * model().batch_size();
+  const std::size_t num_card_slots =
+      std::min(cards.capacity, wire::slots_max - num_processor_slots);
+  config.hello.set_num_slots(static_cast<std::uint32_t>(num_processor_slots + num_card_slots));
+  config.hello.set_num_card_slots(static_cast<std::uint32_t>(num_card_slots));
+  config.hello.set_cards(text_of(cards));
   // A card's thread, one that checks its runs, and those of its driver.
   constexpr std::size_t num_threads_a_card = 6;
   wire::require_threads(static_cast<int>(num_threads + num_threads_a_card * cards.devices.size()) +

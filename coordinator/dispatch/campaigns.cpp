@@ -186,6 +186,7 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
   for (auto& [host_id, host] : state.hosts) host.step_time_s.erase(id);
   for (auto& [worker_id, worker] : state.workers) {
     worker.run_time_s.erase(id);
+    worker.card_work.erase(id);
     worker.unleased.erase(id);
     std::erase_if(worker.computing,
                   [&](const Progress& progress) { return progress.campaign == id; });

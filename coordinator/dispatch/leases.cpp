@@ -16,7 +16,12 @@ namespace proofmass::coordinator::detail {
 namespace {
 
 /// For the worker of a lease of which the remaining runs have changed.
-void note_slots(State& state, Worker& worker, std::uint64_t num_before, std::uint64_t num_now) {
+void note_slots(State& state, Worker& worker, bool is_for_cards, std::uint64_t num_before,
+                std::uint64_t num_now) {
+  if (is_for_cards) {
+    worker.num_lent_to_cards += num_now - num_before;
+    return;
+  }
   if (worker.is_eligible) state.num_idle_slots -= num_idle_slots(worker);
   worker.num_slots_lent_for += num_now - num_before;
   if (worker.is_eligible) state.num_idle_slots += num_idle_slots(worker);
@@ -122,10 +127,10 @@ void set_eligible(State& state, Worker& worker, bool is_eligible) {
   if (is_eligible == worker.is_eligible) return;
   worker.is_eligible = is_eligible;
   if (is_eligible) {
-    state.num_eligible_slots += worker.num_slots;
+    state.num_eligible_slots += num_processor_slots(worker);
     state.num_idle_slots += num_idle_slots(worker);
   } else {
-    state.num_eligible_slots -= worker.num_slots;
+    state.num_eligible_slots -= num_processor_slots(worker);
     state.num_idle_slots -= num_idle_slots(worker);
   }
 }
@@ -158,7 +163,7 @@ LeaseId open_lease(State& state, Lease lease) {
   }
   Worker& worker = state.workers.at(lease.worker);
   worker.num_lent += lease.num_runs;
-  note_slots(state, worker, 0, lease.num_slots);
+  note_slots(state, worker, lease.is_for_cards, 0, lease.num_slots);
   if (lease.is_alone) worker.num_alone += lease.remaining.size();
   worker.leases.insert(id);
   state.leases.emplace(id, std::move(lease));
@@ -187,7 +192,7 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   }
   Worker& worker = state.workers.at(lease.worker);
   worker.num_lent -= runs.count;
-  note_slots(state, worker, num_slots_before, num_slots_taken(lease));
+  note_slots(state, worker, lease.is_for_cards, num_slots_before, num_slots_taken(lease));
   if (lease.is_alone) worker.num_alone -= runs.count;
   if (!lease.remaining.empty()) return;
   worker.leases.erase(id);

@@ -23,7 +23,7 @@ std::uint64_t num_waiting(const CampaignState& campaign) {
   return count;
 }
 
-/// Slots that may be lent runs, now or when they have come.
+/// Slots of processors that may be lent runs, now or when they have come.
 std::uint64_t num_slots_in_all(const State& state) {
   return state.num_eligible_slots + state.num_slots_expected;
 }
@@ -66,7 +66,7 @@ std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignSta
   const auto rounds = static_cast<std::uint64_t>(
       std::clamp(by_time, 2.0, static_cast<double>(wire::runs_per_lease_max)));
   const std::uint64_t slots = 2 * state.num_eligible_slots;
-  const std::uint64_t by_share = (num_waiting(campaign) + slots - 1) / slots;
+  const std::uint64_t by_share = ratio_rounded_up(num_waiting(campaign), slots);
   return std::max<std::uint64_t>(1,
                                  std::min({rounds, by_share, rounds_with_room(state, campaign)}));
 }
@@ -85,10 +85,17 @@ std::uint64_t share_of_intake(const State& state, CampaignId id, const CampaignS
   return static_cast<std::uint64_t>(std::clamp(fraction * of_all, 1.0, limit));
 }
 
-/// True if the worker needs nothing yet: it would not run low before the next of its results.
-bool has_enough(const Worker& worker, std::uint64_t wanted) {
-  const std::uint64_t two_rounds = 2 * static_cast<std::uint64_t>(worker.num_slots);
-  return worker.num_lent >= std::min(wanted, two_rounds) && 2 * worker.num_lent > wanted;
+/// Runs on the leases of a worker's processors.
+std::uint64_t num_lent_to_processors(const Worker& worker) {
+  return worker.num_lent - worker.num_lent_to_cards;
+}
+
+/// True if the worker's processors need nothing yet: they would not run low before their next
+/// result.
+bool have_enough(const Worker& worker, std::uint64_t wanted) {
+  const std::uint64_t two_rounds = 2 * std::uint64_t{num_processor_slots(worker)};
+  const std::uint64_t num_lent = num_lent_to_processors(worker);
+  return num_lent >= std::min(wanted, two_rounds) && 2 * num_lent > wanted;
 }
 
 void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& lease) {
@@ -142,23 +149,76 @@ std::optional<Share> share_of_last(State& state, CampaignId id, const CampaignSt
   return Share{.num_runs = std::max(part, ratio_rounded_up(num_idle, 8)), .num_slots = num_idle};
 }
 
-/// What a worker is to be lent of a campaign; nothing if it has enough.
-Share share_of(State& state, CampaignId id, const CampaignState& campaign, const Worker& worker,
-               TimePoint now) {
+/// Runs of a campaign that a worker may be lent beside those that it holds.
+std::uint64_t room_of(const State& state, CampaignId id, const CampaignState& campaign,
+                      const Worker& worker) {
   const std::uint64_t limit =
       std::min<std::uint64_t>(worker.num_runs_max, share_of_intake(state, id, campaign, worker));
+  return limit - std::min(limit, worker.num_lent);
+}
+
+/// What a worker's processors are to be lent of a campaign; nothing if they have enough.
+Share share_of_processors(State& state, CampaignId id, const CampaignState& campaign,
+                          const Worker& worker, TimePoint now) {
+  const std::uint64_t room = room_of(state, id, campaign, worker);
   if (auto share = share_of_last(state, id, campaign, worker, now)) {
-    share->num_runs = std::min(share->num_runs, limit - std::min(limit, worker.num_lent));
+    share->num_runs = std::min(share->num_runs, room);
     return *share;
   }
-  const std::uint64_t rounds = rounds_wanted(state, id, campaign, worker);
-  const std::uint64_t wanted = std::min(worker.num_slots * rounds, limit);
-  if (has_enough(worker, wanted)) return {};
-  const std::uint64_t num_missing = wanted - worker.num_lent;
+  const std::uint64_t wanted =
+      std::min(num_processor_slots(worker) * rounds_wanted(state, id, campaign, worker),
+               room + num_lent_to_processors(worker));
+  if (have_enough(worker, wanted)) return {};
+  const std::uint64_t num_missing = wanted - num_lent_to_processors(worker);
   return {.num_runs = num_missing, .num_slots = num_missing};
 }
 
-/// One worker that is being lent runs of one campaign.
+/// Runs a second that the cards of a worker compute; 0 if not known yet.
+double card_rate(const Worker& worker, CampaignId id) {
+  const auto found = worker.card_work.find(id);
+  return found == worker.card_work.end() ? 0.0 : found->second.rate;
+}
+
+/// The part of a worker's cards in what all workers together compute: by their speeds, once all
+/// are known, and until then by slots.
+double part_of_cards(const State& state, CampaignId id, const CampaignState& campaign,
+                     const Worker& worker) {
+  const auto num_of_processors = static_cast<double>(num_slots_in_all(state));
+  bool are_known = campaign.run_time_s > 0.0;
+  double rate = are_known ? num_of_processors / campaign.run_time_s : 0.0;
+  double num_slots = num_of_processors;
+  for (const auto& [other_id, other] : state.workers) {
+    if (!other.is_eligible || other.num_card_slots == 0) continue;
+    are_known = are_known && card_rate(other, id) > 0.0;
+    rate += card_rate(other, id);
+    num_slots += other.num_card_slots;
+  }
+  return are_known ? card_rate(worker, id) / rate : worker.num_card_slots / num_slots;
+}
+
+/// What a worker's cards are to be lent of a campaign. They hold their part of all that is not
+/// finished, so that everybody finishes together: a round until their speed is known, and then two
+/// at most. A few runs take a card as long as many, so that what idle processors have room for is
+/// left to them.
+Share share_of_cards(const State& state, CampaignId id, const CampaignState& campaign,
+                     const Worker& worker) {
+  const auto work = worker.card_work.find(id);
+  if (work != worker.card_work.end() && !work->second.can_compute) return {};
+  if (worker.num_card_slots == 0) return {};
+  if (num_waiting(campaign) <= state.num_idle_slots + state.num_slots_expected) return {};
+  const std::uint64_t num_open = campaign.definition->num_runs - num_settled(campaign);
+  const std::uint64_t num_slots = worker.num_card_slots;
+  const auto part = static_cast<std::uint64_t>(part_of_cards(state, id, campaign, worker) *
+                                               static_cast<double>(num_open));
+  const std::uint64_t wanted =
+      std::min(part, card_rate(worker, id) > 0.0 ? 2 * num_slots : num_slots);
+  if (wanted <= worker.num_lent_to_cards) return {};
+  const std::uint64_t num_missing =
+      std::min(wanted - worker.num_lent_to_cards, room_of(state, id, campaign, worker));
+  return {.num_runs = num_missing, .num_slots = num_missing};
+}
+
+/// One worker that is being lent runs of one campaign, for its processors or its cards.
 struct Borrower {
   State& state;
   WorkerId id;
@@ -167,6 +227,7 @@ struct Borrower {
   CampaignState& campaign;
   std::uint64_t wanted;
   Share share;
+  bool is_for_cards;
   TimePoint now;
   Outbox& outbox;
 
@@ -180,13 +241,22 @@ struct Borrower {
             .worker = id,
             .attempt = attempt,
             .known_as = attempt,
+            .is_for_cards = is_for_cards,
             .num_slots = share.slots_for(runs.size()),
             .remaining = std::move(runs),
             .lent_at = now,
             .audited = {}};
   }
+  /// A card that was idle begins to be measured anew.
+  void note_card_work() const {
+    const auto [work, is_new] = worker.card_work.try_emplace(campaign_id);
+    if (!is_new && worker.num_lent_to_cards > 0) return;
+    work->second.since = now;
+    work->second.num_results = 0;
+  }
   void open(Lease lease) const {
-    state.lately_lent.add(now, lease.num_slots);
+    if (!is_for_cards) state.lately_lent.add(now, lease.num_slots);
+    if (is_for_cards) note_card_work();
     send_lease(state, open_lease(state, std::move(lease)), outbox);
   }
 };
@@ -259,13 +329,20 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
   CampaignState& campaign = state.campaigns.at(campaign_id);
   if (!is_lent(campaign) || is_backed_up(state, campaign)) return false;
   Worker& worker = state.workers.at(id);
-  const Share share = share_of(state, campaign_id, campaign, worker, now);
-  if (share.num_runs == 0) return true;
-  const std::uint64_t wanted = worker.num_lent + share.num_runs;
-  const Borrower borrower{state, id, worker, campaign_id, campaign, wanted, share, now, outbox};
-  lend_pending(borrower);
-  lend_audits(borrower);
-  return lend_suspect(borrower) || borrower.missing() == 0;
+  const auto borrower_of = [&](const Share& share, bool is_for_cards) {
+    const std::uint64_t wanted = worker.num_lent + share.num_runs;
+    return Borrower{state,  id,    worker,       campaign_id, campaign,
+                    wanted, share, is_for_cards, now,         outbox};
+  };
+  const Borrower processors =
+      borrower_of(share_of_processors(state, campaign_id, campaign, worker, now), false);
+  lend_pending(processors);
+  lend_audits(processors);
+  const bool have_processors_enough = processors.missing() == 0;
+  const Borrower cards = borrower_of(share_of_cards(state, campaign_id, campaign, worker), true);
+  lend_pending(cards);
+  if (processors.share.num_runs > 0 && lend_suspect(processors)) return true;
+  return have_processors_enough && worker.num_lent_to_cards >= worker.num_card_slots;
 }
 
 /// A batch of a lease has the same part in its runs as in its slots.
@@ -353,6 +430,7 @@ void send_lease(const State& state, LeaseId id, Outbox& outbox) {
     message.set_attempt(lease.attempt.value);
     message.set_is_alone(lease.is_alone);
     message.set_batch_runs_max(batch_runs_max(lease));
+    message.set_is_for_cards(lease.is_for_cards);
     add_table_values(campaign, runs, message);
     outbox.send(lease.worker, std::move(envelope));
   }

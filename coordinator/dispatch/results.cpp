@@ -168,10 +168,29 @@ bool is_of_short_batch(const State& state, const CampaignState& campaign, RunInd
   return lease.num_runs < lease.num_slots;
 }
 
+bool is_lent_to_cards(const State& state, const Worker& worker, const LeaseIndex& lent,
+                      const wire::ComputedRun& computed) {
+  const std::optional<LeaseId> lease = lent.find(computed.result.run);
+  return lease && worker.leases.contains(*lease) && state.leases.at(*lease).is_for_cards;
+}
+
+/// Learns how fast the worker's cards are from a run that was lent to them.
+void count_card_work(CardWork& work, TimePoint now) {
+  const Duration busy = now - work.since;
+  ++work.num_results;
+  if (busy > Duration::zero()) work.rate = static_cast<double>(work.num_results) / seconds(busy);
+}
+
 /// Learns how long a run takes in its slot. Short batches say too little of it, unless nothing is
 /// known.
 void count_run_time(const State& state, Worker& worker, CampaignId id, CampaignState& campaign,
                     const wire::ComputedRun& computed, TimePoint now) {
+  if (computed.is_by_card) {
+    if (is_lent_to_cards(state, worker, campaign.lent, computed)) {
+      count_card_work(worker.card_work.at(id), now);
+    }
+    return;
+  }
   const bool is_known = campaign.run_time_s > 0.0;
   if (is_known && is_of_short_batch(state, campaign, computed.result.run)) return;
   const std::optional<LeaseId> lease = campaign.lent.find(computed.result.run);
@@ -182,6 +201,25 @@ void count_run_time(const State& state, Worker& worker, CampaignId id, CampaignS
   double& own_s = worker.run_time_s[id];
   own_s = running_mean(own_s, elapsed_s);
   campaign.run_time_s = running_mean(campaign.run_time_s, elapsed_s);
+}
+
+/// True if the worker's processors have computed what was lent to its cards.
+bool have_cards_left_runs(const State& state, const Worker& worker, const LeaseIndex& lent,
+                          std::span<const wire::ComputedRun> results) {
+  return worker.num_lent_to_cards > 0 && std::ranges::any_of(results, [&](const auto& computed) {
+           return !computed.is_by_card && is_lent_to_cards(state, worker, lent, computed);
+         });
+}
+
+/// The worker's cards cannot compute the campaign: asks for what they hold.
+void leave_out_cards(State& state, Worker& worker, CampaignId id, Outbox& outbox) {
+  worker.card_work.at(id).can_compute = false;
+  for (const LeaseId lease_id : worker.leases) {
+    Lease& lease = state.leases.at(lease_id);
+    if (lease.campaign != id || !lease.is_for_cards) continue;
+    lease.is_retracted = true;
+    detail::send_retract(lease.worker, id, lease.remaining, outbox);
+  }
 }
 
 /// The worker and its host can compute: what they show with every result.
@@ -229,10 +267,12 @@ void on_results(State& state, WorkerId id, CampaignId campaign_id, Attempt attem
     return on_gone(state, id, LossReason::protocol, now, outbox);
   }
   count_results(state, *worker, campaign_id, results, now);
+  const bool have_left_runs = have_cards_left_runs(state, *worker, campaign.lent, results);
   Intake intake{state, id, campaign_id, campaign, attempt, outbox, {}, {}};
   for (wire::ComputedRun& computed : results) {
     if (!is_foreign(campaign, computed)) intake.take(std::move(computed));
   }
+  if (have_left_runs) leave_out_cards(state, *worker, campaign_id, outbox);
   if (!intake.durable.empty()) {
     send_acks(state, campaign_id, {{id, std::move(intake.durable)}}, outbox);
   }

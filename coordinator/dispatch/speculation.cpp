@@ -25,8 +25,9 @@ std::vector<WorkerId> idle_workers(const State& state, TimePoint now) {
   return idle;
 }
 
+/// Of its processors, which copies are for.
 std::uint64_t room(const Worker& worker) {
-  return std::min({worker.num_slots, worker.num_runs_max, wire::runs_per_lease_max});
+  return std::min({num_processor_slots(worker), worker.num_runs_max, wire::runs_per_lease_max});
 }
 
 /// What the worker does not compute yet, as far as is known.
@@ -91,10 +92,13 @@ std::uint64_t retract(State& state, std::uint64_t count_max, TimePoint now, Outb
 bool is_overdue(const State& state, const Lease& lease, TimePoint now) {
   const Worker& worker = state.workers.at(lease.worker);
   if (now - worker.heard_at >= state.config.suspect_after) return true;
-  const double run_time_s = state.campaigns.at(lease.campaign).run_time_s;
-  if (run_time_s <= 0.0) return now - lease.lent_at > state.config.lease_duration_max;
-  const double usual_s = std::max(run_time_s, state.config.lease_work_s);
-  return seconds(now - lease.lent_at) > 2.0 * usual_s;
+  double usual_s = state.campaigns.at(lease.campaign).run_time_s;
+  if (lease.is_for_cards) {
+    const double rate = worker.card_work.at(lease.campaign).rate;
+    usual_s = rate > 0.0 ? static_cast<double>(worker.num_lent_to_cards) / rate : 0.0;
+  }
+  if (usual_s <= 0.0) return now - lease.lent_at > state.config.lease_duration_max;
+  return seconds(now - lease.lent_at) > 2.0 * std::max(usual_s, state.config.lease_work_s);
 }
 
 /// Copies for one idle worker.

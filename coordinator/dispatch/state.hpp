@@ -62,8 +62,8 @@ struct DispatchConfig {
   /// Of a lease before a run time is known: then its runs are copied to idle workers.
   Duration lease_duration_max = std::chrono::minutes(2);
   double lease_work_s = 1.5;  ///< Work that a slot is lent at a time, once run times are known.
-  /// Slots of all workers that are known to come: the first ones to register then leave the others
-  /// their part of a small campaign.
+  /// Processors' slots of all workers that are known to come: the first ones to register then leave
+  /// the others their part of a small campaign.
   std::uint64_t num_slots_expected = 0;
   /// Runs of a campaign that are lent or on their way to the store: near that many, workers get no
   /// more than two rounds; with half of it on the way to the store, nothing. A disk that is slower
@@ -103,6 +103,14 @@ struct Progress {
   TimePoint advanced_at;
 };
 
+/// What a worker's cards have done for a campaign since they were last idle.
+struct CardWork {
+  TimePoint since;
+  std::uint64_t num_results = 0;
+  double rate = 0.0;        ///< Runs a second; 0 if not known yet.
+  bool can_compute = true;  ///< Until processors compute what was lent to cards.
+};
+
 /// A registered worker.
 struct Worker {
   SessionId session;
@@ -111,13 +119,17 @@ struct Worker {
   std::string host_name;  ///< As the worker gave it.
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
+  std::uint32_t num_card_slots = 0;  ///< Among these.
+  std::string cards;                 ///< What they are, as the worker says.
   TimePoint registered_at;
   TimePoint heard_at;                    ///< Last message of any kind.
   std::uint64_t heartbeat_sequence = 0;  ///< Of the newest heartbeat.
   TimePoint heartbeat_at;                ///< When the newest heartbeat arrived.
-  std::uint32_t num_runs_max = 0;  ///< Its credit: most unfinished runs that it wants to hold.
-  std::uint64_t num_lent = 0;      ///< Runs on its leases, as far as the coordinator knows.
-  std::uint64_t num_slots_lent_for = 0;  ///< Of its leases; more than slots if runs wait there.
+  std::uint32_t num_runs_max = 0;       ///< Its credit: most unfinished runs that it wants to hold.
+  std::uint64_t num_lent = 0;           ///< Runs on its leases, as far as the coordinator knows.
+  std::uint64_t num_lent_to_cards = 0;  ///< Among these.
+  /// Of its processors' leases; more than slots if runs wait there.
+  std::uint64_t num_slots_lent_for = 0;
   /// Whether it may be lent runs, as the last tick or the last attempt to lend it some found it.
   bool is_eligible = false;
   std::uint64_t num_steps_done = 0;
@@ -136,7 +148,14 @@ struct Worker {
   int num_retracts = 0;    ///< ... and how often since it last gave some back or delivered one.
   /// Running mean of what a run takes in its slot, by campaign; nothing if not known yet.
   std::map<CampaignId, double> run_time_s;
+  /// What its cards do for a campaign; nothing before it was lent to them.
+  std::map<CampaignId, CardWork> card_work;
 };
+
+/// Slots of a worker's processors.
+[[nodiscard]] constexpr std::uint32_t num_processor_slots(const Worker& worker) {
+  return worker.num_slots - worker.num_card_slots;
+}
 
 /// Why runs are lent. Only the runs of `first` leases count as open; the others are extra.
 enum class LeaseKind : std::uint8_t {
@@ -153,6 +172,7 @@ struct Lease {
   Attempt known_as;  ///< Attempt by which the worker names it; older if it held the runs before.
   LeaseKind kind = LeaseKind::first;
   bool is_alone = false;      ///< Of one run, which is suspected.
+  bool is_for_cards = false;  ///< Otherwise for processors.
   bool is_retracted = false;  ///< The worker is asked, at each heartbeat, to give back what it can.
   bool is_adopted = false;    ///< Held before it was lent: when it began is not known.
   std::uint64_t num_runs = 0;  ///< In `remaining` when it was opened.
@@ -166,9 +186,10 @@ struct Lease {
 /// Slots that the remaining runs of a lease take.
 [[nodiscard]] std::uint64_t num_slots_taken(const Lease& lease);
 
-/// Slots of a worker for which no runs are lent to it.
+/// Slots of a worker's processors for which no runs are lent to it.
 [[nodiscard]] constexpr std::uint64_t num_idle_slots(const Worker& worker) {
-  return worker.num_slots - std::min<std::uint64_t>(worker.num_slots, worker.num_slots_lent_for);
+  const std::uint64_t num_slots = num_processor_slots(worker);
+  return num_slots - std::min(num_slots, worker.num_slots_lent_for);
 }
 
 /// Whether a campaign's runs are lent.
@@ -295,9 +316,9 @@ struct State {
   std::map<LeaseId, Lease> leases;
   std::uint64_t next_lease = 1;
   std::uint64_t num_slots = 0;           ///< Of all workers.
-  std::uint64_t num_eligible_slots = 0;  ///< Of eligible workers.
-  std::uint64_t num_idle_slots = 0;      ///< Slots of eligible workers that are idle.
-  std::uint64_t num_slots_expected = 0;  ///< Of workers that are still to come.
+  std::uint64_t num_eligible_slots = 0;  ///< Of the processors of eligible workers.
+  std::uint64_t num_idle_slots = 0;      ///< Slots of eligible workers' processors that are idle.
+  std::uint64_t num_slots_expected = 0;  ///< Of processors of workers that are still to come.
   LentSlots lately_lent;      ///< What was longer ago than half of a run takes may be missing.
   std::set<WorkerId> hungry;  ///< Workers that were lent less than they would take.
   WorkerId fed_last;          ///< The hungry worker that was last lent runs.

@@ -83,23 +83,30 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   worker.host_name = hello.host();
   worker.process_id = hello.process_id();
   worker.num_slots = hello.num_slots();
+  worker.num_card_slots = hello.num_card_slots();
+  worker.cards = hello.cards();
   worker.registered_at = now;
   worker.heard_at = now;
   worker.heartbeat_at = now;
   worker.retracted_at = now - state.config.heartbeat_interval;
   state.num_slots += worker.num_slots;
-  state.num_slots_expected -= std::min<std::uint64_t>(state.num_slots_expected, worker.num_slots);
+  state.num_slots_expected -=
+      std::min<std::uint64_t>(state.num_slots_expected, num_processor_slots(worker));
   detail::set_eligible(state, worker, true);
   Host& known = state.hosts[host];
   if (known.name.empty()) known.name = hello.host();
   ++known.num_workers;
   limit_hosts(state, host.key);
-  outbox.log({.kind = "worker_registered",
-              .fields = {{"worker", id.value},
-                         {"name", worker.name},
-                         {"host", worker.host_name},
-                         {"pid", worker.process_id},
-                         {"slots", worker.num_slots}}});
+  wire::Fields fields{{"worker", id.value},
+                      {"name", worker.name},
+                      {"host", worker.host_name},
+                      {"pid", worker.process_id},
+                      {"slots", worker.num_slots}};
+  if (worker.num_card_slots > 0) {
+    fields.emplace_back("card_slots", worker.num_card_slots);
+    fields.emplace_back("cards", worker.cards);
+  }
+  outbox.log({.kind = "worker_registered", .fields = std::move(fields)});
 }
 
 /// True if a Hello may be answered: there is an allowance of so many a second.

@@ -50,7 +50,8 @@ ComputedRun computed_run(const proto::ComputedRun& message) {
   result.loss = {.cause = message.loss_cause(), .session = message.loss_session()};
   return {.result = std::move(result),
           .compute_s = message.compute_s(),
-          .elapsed_s = message.elapsed_s()};
+          .elapsed_s = message.elapsed_s(),
+          .is_by_card = message.is_by_card()};
 }
 
 void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
@@ -76,6 +77,7 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   message.set_loss_session(result.loss.session);
   message.set_compute_s(computed.compute_s);
   message.set_elapsed_s(computed.elapsed_s);
+  message.set_is_by_card(computed.is_by_card);
 }
 
 void ResultBatches::add(CampaignId campaign, Attempt attempt, const ComputedRun& computed) {

@@ -23,6 +23,7 @@ inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch 
 inline constexpr std::size_t ranges_per_message_max = 4096;
 inline constexpr std::uint32_t slots_max = 65'536;             ///< Of a worker with cards.
 inline constexpr std::uint32_t runs_held_max = 2 * slots_max;  ///< By a worker, not finished.
+inline constexpr std::size_t cards_text_size_max = 256;        ///< Bytes.
 inline constexpr std::size_t reject_text_size_max = 4096;      ///< Bytes.
 inline constexpr std::size_t definition_part_size_max = std::size_t{256} << 10;  ///< Bytes.
 /// Size limits of an encoded definition and of an encoded message, bytes. A definition travels in
@@ -89,8 +90,9 @@ enum class LossReason : std::uint8_t {
 /// A result and what it took.
 struct ComputedRun {
   RunResult result;
-  double compute_s = 0.0;  ///< Time of a thread: its share of the batch it was in; 0 to 1e9.
-  double elapsed_s = 0.0;  ///< From its beginning to its end: the time of that batch; 0 to 1e9.
+  double compute_s = 0.0;   ///< Time of a thread: its share of the batch it was in; 0 to 1e9.
+  double elapsed_s = 0.0;   ///< From its beginning to its end: the time of that batch; 0 to 1e9.
+  bool is_by_card = false;  ///< Not by a processor.
 };
 
 /// A result, and the lease under which it was computed. A RunResult is what a run yields, a

@@ -32,8 +32,12 @@ std::vector<RunRange> ranges_of(const std::vector<RunKey>& runs) {
 }  // namespace
 
 PlayedExecution::PlayedExecution(const Poison& poison, const Draws& draws, std::size_t num_threads,
-                                 std::size_t num_lanes)
-    : poison_(poison), draws_(draws), num_threads_(num_threads), num_lanes_(num_lanes) {}
+                                 std::size_t num_lanes, bool has_cards)
+    : poison_(poison),
+      draws_(draws),
+      num_threads_(num_threads),
+      num_lanes_(num_lanes),
+      has_cards_(has_cards) {}
 
 void PlayedExecution::define(wire::CampaignId campaign, std::shared_ptr<const Campaign>) {
   defined_.insert(campaign);
@@ -41,7 +45,7 @@ void PlayedExecution::define(wire::CampaignId campaign, std::shared_ptr<const Ca
 
 void PlayedExecution::submit(const proto::RunLease& lease, std::span<const RunRange> runs) {
   for (const RunIndex run : indices_of(runs)) {
-    waiting_.push_back({{{lease.campaign()}, run}, lease.is_alone()});
+    waiting_.push_back({{{lease.campaign()}, run}, lease.is_alone(), lease.is_for_cards()});
   }
 }
 
@@ -91,12 +95,14 @@ std::optional<PlayedExecution::Batch> PlayedExecution::next_batch() {
   for (auto next = waiting_.begin(); next != waiting_.end() && batch.runs.size() < num_lanes_;) {
     const bool is_first = batch.runs.empty();
     const bool fits = is_first ? defined_.contains(next->run.first)
-                               : !next->is_alone && next->run.first == batch.runs[0].first;
+                               : !next->is_alone && next->run.first == batch.runs[0].first &&
+                                     (has_cards_ && next->is_for_cards) == batch.is_by_card;
     if (!fits) {
       ++next;
       continue;
     }
     const bool is_alone = next->is_alone;
+    batch.is_by_card = has_cards_ && next->is_for_cards;
     batch.runs.push_back(next->run);
     next = waiting_.erase(next);
     if (is_alone) break;
@@ -126,7 +132,8 @@ PlayedExecution::Outcome PlayedExecution::advance() {
     for (const auto& [campaign, run] : batch->runs) {
       const RunDraw& draw = draws_.at({campaign, run});
       wire::ComputedRun computed{.result = zero_result({.run = run, .num_draws = draw.num_draws}),
-                                 .elapsed_s = 0.7};
+                                 .elapsed_s = 0.7,
+                                 .is_by_card = batch->is_by_card};
       computed.result.truth = draw.truth;
       finished_.push_back({.campaign = campaign, .computed = computed});
     }

@@ -32,8 +32,9 @@ struct Poison {
 class PlayedExecution final : public worker::Execution {
  public:
   /// @param poison, draws  Outlive this object.
+  /// @param has_cards      Runs for cards are computed by some, apart from the others.
   PlayedExecution(const Poison& poison, const Draws& draws, std::size_t num_threads,
-                  std::size_t num_lanes);
+                  std::size_t num_lanes, bool has_cards);
 
   bool is_defined(wire::CampaignId campaign) const override { return defined_.contains(campaign); }
   /// Nothing depends on what the definition says, and to read it takes longer than all else here.
@@ -64,9 +65,11 @@ class PlayedExecution final : public worker::Execution {
   struct WaitingRun {
     RunKey run;
     bool is_alone = false;
+    bool is_for_cards = false;
   };
   struct Batch {
     std::uint64_t number = 0;
+    bool is_by_card = false;
     std::vector<RunKey> runs;
     std::uint32_t num_steps_done = 0;
   };
@@ -77,6 +80,7 @@ class PlayedExecution final : public worker::Execution {
   const Draws& draws_;
   std::size_t num_threads_;
   std::size_t num_lanes_;
+  bool has_cards_;
   std::set<wire::CampaignId> defined_;
   std::deque<WaitingRun> waiting_;
   std::vector<Batch> batches_;

@@ -144,6 +144,10 @@ proto::Hello Liar::hello() {
   const std::string host = hosts_.empty() ? "h" : any_of(hosts_, random_);
   proto::Hello hello =
       make_hello("liar", host, static_cast<std::uint32_t>(1 + random_.below(8)), model_version);
+  if (random_.happens(0.2)) {
+    hello.set_num_slots(hello.num_slots() + 60);
+    hello.set_num_card_slots(60);
+  }
   const wire::LossReason reason =
       random_.happens(0.5) ? wire::LossReason::crashed : wire::LossReason::out_of_memory;
   if (former_.value != 0) *hello.mutable_former() = make_former(former_, reason);
@@ -180,7 +184,8 @@ wire::ComputedRun Liar::made_up(const RunKey& key) {
   result.truth.front() = random_.uniform(1e-4);
   return {.result = std::move(result),
           .compute_s = times_s.at(random_.below(times_s.size())),
-          .elapsed_s = times_s.at(random_.below(times_s.size()))};
+          .elapsed_s = times_s.at(random_.below(times_s.size())),
+          .is_by_card = random_.happens(0.5)};
 }
 
 Envelope Liar::results() {

@@ -28,6 +28,8 @@ World::World(std::uint64_t seed)
     machines_.push_back({.host = fmt::format("h{}", next_host_++),
                          .num_threads = 1 + random_.below(2),
                          .num_lanes = 1 + random_.below(4),
+                         .num_card_slots = random_.happens(0.3) ? 20U : 0U,
+                         .can_cards_compute = random_.happens(0.7),
                          .is_bad = weather_.has_bad_machine && i == 0,
                          .spool = {}});
     agenda_.add(random_.duration(3.0), [this, i] { start_process(i, std::nullopt); });
@@ -255,7 +257,8 @@ void World::start_process(std::size_t machine, std::optional<proto::FormerSessio
   const wire::SessionId session{random_.number()};
   const Machine& on = machines_.at(machine);
   const auto num_slots = static_cast<std::uint32_t>(on.num_threads * on.num_lanes);
-  proto::Hello hello = make_hello("w", on.host, num_slots, model_version);
+  proto::Hello hello = make_hello("w", on.host, num_slots + on.num_card_slots, model_version);
+  hello.set_num_card_slots(on.num_card_slots);
   if (former) *hello.mutable_former() = *former;
   worker::ConversationConfig config;
   config.hello_delay_max = 8s;
@@ -265,8 +268,8 @@ void World::start_process(std::size_t machine, std::optional<proto::FormerSessio
   config.drain_time = 20s;
   Process& process = processes_[session];
   process.machine = machine;
-  process.execution =
-      std::make_unique<PlayedExecution>(poison_, draws_, on.num_threads, on.num_lanes);
+  process.execution = std::make_unique<PlayedExecution>(
+      poison_, draws_, on.num_threads, on.num_lanes, on.num_card_slots > 0 && on.can_cards_compute);
   const auto send = [this, machine](const proto::Envelope& message) {
     transmit({message.session()}, [this, message, host = machines_.at(machine).host] {
       coordinator_.receive(message, {.key = honest_key, .address = host});

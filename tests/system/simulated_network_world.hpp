@@ -83,6 +83,8 @@ class World {
     std::string host;
     std::size_t num_threads = 1;
     std::size_t num_lanes = 1;
+    std::uint32_t num_card_slots = 0;
+    bool can_cards_compute = true;  ///< Else processors compute what is for cards.
     bool is_bad = false;
     std::map<RunKey, wire::LeasedResult> spool;
   };

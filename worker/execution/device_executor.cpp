@@ -17,8 +17,7 @@
 namespace proofmass::worker {
 namespace {
 
-/// A few runs take a device as long as many, and the processors beside it are faster with them.
-constexpr std::size_t runs_worth_a_device = 256;
+constexpr std::size_t first_group_size = 128;
 
 bool are_same(const std::vector<double>& a, const std::vector<double>& b) {
   const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
@@ -108,14 +107,13 @@ void Executor::serve_device(Device& device) {
 }
 
 std::shared_ptr<Executor::Batch> Executor::next_batch_for_device() {
-  const auto is_for_devices = [this](wire::CampaignId campaign) {
-    return is_ready(campaign) && campaigns_.at(campaign).prepared->simulate_on != nullptr;
+  const auto is_ready_now = [this](wire::CampaignId campaign) {
+    return is_ready(campaign) && is_on_devices(campaign);
   };
   std::unique_lock lock(mutex_);
   while (!is_ending_ && !failure_) {
-    TakenRuns assignment =
-        queue_.take_for_device(runs_worth_a_device, runs_worth_a_device / 2, is_for_devices);
-    if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
+    TakenRuns assignment = queue_.take_for_device(first_group_size, is_ready_now);
+    if (!assignment.requests.empty()) return begin_batch(std::move(assignment), true);
     changed_.wait(lock);
   }
   return nullptr;
@@ -126,11 +124,11 @@ std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
   const wire::CampaignId campaign = batch.assignment.campaign;
   const std::unique_lock lock(mutex_);
   if (is_ending_ || failure_) return nullptr;
-  const auto is_ready_now = [this](wire::CampaignId other) { return is_ready(other); };
-  if (queue_.first_campaign(is_ready_now) != campaign) return nullptr;
-  TakenRuns assignment = queue_.take_for_device(
-      1, size_max, [&](wire::CampaignId other) { return other == campaign; });
-  return assignment.requests.empty() ? nullptr : begin_batch(std::move(assignment));
+  const auto is_ready_now = [this](wire::CampaignId other) {
+    return is_ready(other) && is_on_devices(other);
+  };
+  TakenRuns assignment = queue_.take_for_device(size_max, is_ready_now, campaign);
+  return assignment.requests.empty() ? nullptr : begin_batch(std::move(assignment), true);
 }
 
 void Executor::compute_on(Device& device, std::shared_ptr<Batch> first) {

@@ -210,10 +210,11 @@ void Executor::serve(const std::function<bool()>& compute_next) {
 
 std::shared_ptr<Executor::Batch> Executor::next_batch() {
   const auto is_ready_now = [this](wire::CampaignId campaign) { return is_ready(campaign); };
+  const auto are_on_devices = [this](wire::CampaignId campaign) { return is_on_devices(campaign); };
   std::unique_lock lock(mutex_);
   while (true) {
     if (is_ending_ || failure_) return nullptr;
-    TakenRuns assignment = queue_.take(config_.batch_size_max, is_ready_now);
+    TakenRuns assignment = queue_.take(config_.batch_size_max, is_ready_now, are_on_devices);
     if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
@@ -223,7 +224,7 @@ std::shared_ptr<Executor::Batch> Executor::next_batch() {
   }
 }
 
-std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment) {
+std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, bool is_on_device) {
   KnownCampaign& known = campaigns_.at(assignment.campaign);
   known.used = ++num_uses_;
   const auto batch = std::make_shared<Batch>();
@@ -231,12 +232,17 @@ std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment) {
   batch->assignment = std::move(assignment);
   batch->prepared = known.prepared;
   batch->started_at = now();
+  batch->is_on_device = is_on_device;
   return batches_[batch->number] = batch;
 }
 
 bool Executor::is_ready(wire::CampaignId campaign) const {
   const auto found = campaigns_.find(campaign);
   return found != campaigns_.end() && found->second.prepared != nullptr;
+}
+
+bool Executor::is_on_devices(wire::CampaignId campaign) const {
+  return !config_.devices.empty() && campaigns_.at(campaign).prepared->simulate_on != nullptr;
 }
 
 wire::CampaignId Executor::campaign_to_prepare() const {
@@ -305,10 +311,11 @@ void Executor::finish(const Batch& batch, std::vector<RunResult> results,
       known.batch_time = elapsed;
     }
     for (RunResult& result : results) {
-      finished_.push_back(
-          {.campaign = campaign,
-           .computed = {
-               .result = std::move(result), .compute_s = compute_s, .elapsed_s = elapsed_s}});
+      finished_.push_back({.campaign = campaign,
+                           .computed = {.result = std::move(result),
+                                        .compute_s = compute_s,
+                                        .elapsed_s = elapsed_s,
+                                        .is_by_card = batch.is_on_device}});
     }
   }
   on_change_();

@@ -104,6 +104,7 @@ class Executor final : public Execution {
     TakenRuns assignment;
     std::shared_ptr<const PreparedCampaign> prepared;
     TimePoint started_at;
+    bool is_on_device = false;
     std::atomic<int> num_steps_done = 0;
     std::atomic<bool> is_dropped = false;
   };
@@ -113,13 +114,15 @@ class Executor final : public Execution {
   void serve_device(Device& device);
   /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
   [[nodiscard]] std::shared_ptr<Batch> next_batch();
-  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment);
-  /// Waits for runs that are worth a device; null at the end.
+  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment, bool is_on_device = false);
+  /// Waits for runs that are for cards; null at the end.
   [[nodiscard]] std::shared_ptr<Batch> next_batch_for_device();
-  /// More runs of the same campaign, if they wait; null if those of another one come first.
+  /// More such runs of the same campaign, if they wait; null if those of another one come first.
   [[nodiscard]] std::shared_ptr<Batch> next_batch_like(const Batch& batch, std::size_t size_max);
   void compute_on(Device& device, std::shared_ptr<Batch> first);
   [[nodiscard]] bool is_ready(wire::CampaignId campaign) const;
+  /// Whether devices compute the campaign's runs. @pre is_ready().
+  [[nodiscard]] bool is_on_devices(wire::CampaignId campaign) const;
   [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
   void compute(Batch& batch);

@@ -15,17 +15,22 @@ void RunQueue::add(const proto::RunLease& lease, std::span<const RunRange> runs)
     const auto values = lease.table_values().begin() + position * width;
     runs_.push_back({.campaign = {lease.campaign()},
                      .is_alone = lease.is_alone(),
+                     .is_for_cards = lease.is_for_cards(),
                      .batch_runs_max = lease.batch_runs_max(),
                      .request = {.run = run, .table_values = {values, values + width}}});
   }
 }
 
-TakenRuns RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
+TakenRuns RunQueue::take(std::size_t count_max, const IsReady& is_ready,
+                         const IsReady& are_on_cards) {
+  const auto is_fit = [&](const Waiting& run) {
+    return is_ready(run.campaign) && !(run.is_for_cards && are_on_cards(run.campaign));
+  };
   TakenRuns assignment;
-  assignment.campaign = first_campaign(is_ready);
+  assignment.campaign = campaign_of_first(is_fit);
   for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
     const bool can_join = assignment.requests.empty() || !run->is_alone;
-    if (run->campaign != assignment.campaign || !can_join) {
+    if (run->campaign != assignment.campaign || !can_join || !is_fit(*run)) {
       ++run;
       continue;
     }
@@ -40,16 +45,14 @@ TakenRuns RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
   return assignment;
 }
 
-TakenRuns RunQueue::take_for_device(std::size_t count_min, std::size_t count_max,
-                                    const IsReady& is_ready) {
+TakenRuns RunQueue::take_for_device(std::size_t count_max, const IsReady& is_ready,
+                                    std::optional<wire::CampaignId> wanted) {
   TakenRuns assignment;
-  assignment.campaign = first_campaign(is_ready);
-  const auto is_fit = [&](const Waiting& run) {
-    return run.campaign == assignment.campaign && !run.is_alone;
-  };
-  if (static_cast<std::size_t>(std::ranges::count_if(runs_, is_fit)) < count_min) return assignment;
+  assignment.campaign = campaign_of_first(
+      [&](const Waiting& run) { return run.is_for_cards && is_ready(run.campaign); });
+  if (wanted && assignment.campaign != *wanted) return assignment;
   for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
-    if (!is_fit(*run)) {
+    if (run->campaign != assignment.campaign || !run->is_for_cards) {
       ++run;
       continue;
     }
@@ -84,8 +87,12 @@ bool RunQueue::has(wire::CampaignId campaign) const {
 }
 
 wire::CampaignId RunQueue::first_campaign(const IsReady& is_wanted) const {
-  const auto found =
-      std::ranges::find_if(runs_, [&](const Waiting& run) { return is_wanted(run.campaign); });
+  return campaign_of_first([&](const Waiting& run) { return is_wanted(run.campaign); });
+}
+
+wire::CampaignId RunQueue::campaign_of_first(
+    const std::function<bool(const Waiting&)>& is_fit) const {
+  const auto found = std::ranges::find_if(runs_, is_fit);
   return found == runs_.end() ? wire::CampaignId{} : found->campaign;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -33,13 +34,14 @@ class RunQueue {
   /// Removes the first run whose campaign is ready, and the next ones of that campaign, whatever
   /// lease they are of; fewer than `count_max` if there are no more, none if no campaign is ready.
   /// A run that is to be alone is. If the lease of the first run wants smaller batches, this is
-  /// one.
-  [[nodiscard]] TakenRuns take(std::size_t count_max, const IsReady& is_ready);
+  /// one. Runs for cards are left to these if `are_on_cards` holds for their campaign.
+  [[nodiscard]] TakenRuns take(std::size_t count_max, const IsReady& is_ready,
+                               const IsReady& are_on_cards);
 
-  /// As take(), for a device that computes thousands of runs at a time: of as many batches as it
-  /// takes, but none that is to be alone. None if fewer than `count_min` of them are here.
-  [[nodiscard]] TakenRuns take_for_device(std::size_t count_min, std::size_t count_max,
-                                          const IsReady& is_ready);
+  /// Removes the first run for cards whose campaign is ready, and the next ones of that campaign.
+  /// @param wanted  None if the first run is of another campaign than this.
+  [[nodiscard]] TakenRuns take_for_device(std::size_t count_max, const IsReady& is_ready,
+                                          std::optional<wire::CampaignId> wanted = std::nullopt);
 
   /// Removes those of the runs that are here and returns them in ascending order.
   std::vector<RunIndex> drop(wire::CampaignId campaign, std::span<const RunRange> ranges);
@@ -54,9 +56,14 @@ class RunQueue {
   struct Waiting {
     wire::CampaignId campaign;
     bool is_alone = false;
+    bool is_for_cards = false;
     std::uint32_t batch_runs_max = 0;
     RunRequest request;
   };
+
+  /// The campaign of the first run that fits; 0 if there is none.
+  [[nodiscard]] wire::CampaignId campaign_of_first(
+      const std::function<bool(const Waiting&)>& is_fit) const;
 
   std::list<Waiting> runs_;
 };

@@ -33,10 +33,41 @@ struct PlayedBatch {
   double ends = 0.0;
 };
 
+/// How fast a card is: an H100 as it was measured.
+struct CardSpeed {
+  std::size_t num_slots = 16'896;
+  double runs_per_s = 2'050.0;
+  double latency_s = 3.2;  ///< Of its longest session.
+};
+
+/// A card: groups of runs flow through it, the first first.
+struct PlayedCard {
+  CardSpeed speed;
+  std::deque<HeldRun> queue{};
+  std::deque<PlayedBatch> groups{};
+  std::size_t num_in_flight = 0;
+  double busy_until = 0.0;
+
+  void take_groups(double now) {
+    constexpr std::size_t group_size = 128;
+    while (!queue.empty() && num_in_flight + group_size <= speed.num_slots) {
+      const std::size_t count = std::min(queue.size(), group_size);
+      const auto end = queue.begin() + static_cast<std::ptrdiff_t>(count);
+      busy_until = std::max(busy_until, now) + static_cast<double>(count) / speed.runs_per_s;
+      groups.push_back({.runs = {queue.begin(), end},
+                        .begins = now,
+                        .ends = std::max(now + speed.latency_s, busy_until)});
+      queue.erase(queue.begin(), end);
+      num_in_flight += count;
+    }
+  }
+};
+
 /// A worker: each of its threads takes what is there, up to a batch.
 struct PlayedWorker {
   std::deque<HeldRun> queue;
   std::vector<PlayedBatch> threads;
+  std::optional<PlayedCard> card = std::nullopt;
 
   [[nodiscard]] std::size_t next_size() const {
     const std::size_t wanted = queue.front().batch_runs_max;
@@ -44,6 +75,7 @@ struct PlayedWorker {
   }
 
   void take_batches(double now, const BatchTime& batch_time) {
+    if (card) card->take_groups(now);
     for (PlayedBatch& batch : threads) {
       if (!batch.runs.empty() || queue.empty()) continue;
       const std::size_t count = next_size();
@@ -69,13 +101,15 @@ struct Plan {
   std::size_t num_workers = 1;
   std::size_t num_threads = 1;  ///< Of each worker.
   Workers workers = Workers::unknown;
+  std::size_t num_cards = 0;  ///< Of the first workers, one each.
+  CardSpeed card{};
 };
 
 std::ostream& operator<<(std::ostream& out, const Plan& plan) {
   constexpr std::array names{"unknown", "expected", "registered"};
   return out << plan.num_runs << " runs, " << plan.num_workers << ' '
              << names[static_cast<std::size_t>(plan.workers)] << " workers of " << plan.num_threads
-             << " threads";
+             << " threads, " << plan.num_cards << " cards of " << plan.card.runs_per_s << " runs/s";
 }
 
 /// A campaign whose store commits at once and whose messages arrive at once.
@@ -87,13 +121,17 @@ class PlayedFleet final : public Outbox {
     if (plan.workers == Workers::expected) config.num_slots_expected = plan.num_workers * num_slots;
     state_ = initial_state(config, {}, {});
     if (plan.workers != Workers::registered) begin_campaign(plan.num_runs, std::move(finished));
-    const auto hello =
-        test::make_hello("w", "h", static_cast<std::uint32_t>(num_slots), model_version);
     for (std::uint64_t i = 1; i <= plan.num_workers; ++i) {
-      workers_[WorkerId{i}].threads.resize(plan.num_threads);
+      PlayedWorker& worker = workers_[WorkerId{i}];
+      worker.threads.resize(plan.num_threads);
+      if (i <= plan.num_cards) worker.card = PlayedCard{.speed = plan.card};
+      const auto num_card_slots = static_cast<std::uint32_t>(worker.card ? plan.card.num_slots : 0);
+      const auto num_slots_in_all = static_cast<std::uint32_t>(num_slots) + num_card_slots;
+      auto hello = test::make_hello("w", "h", num_slots_in_all, model_version);
+      hello.set_num_card_slots(num_card_slots);
       on_hello(state_, WorkerId{i}, SessionId{i}, {}, hello, {}, *this);
-      on_heartbeat(state_, WorkerId{i}, test::make_heartbeat(wire::runs_per_lease_max), 1, {},
-                   *this);
+      const std::uint32_t credit = std::max(2 * num_slots_in_all, wire::runs_per_lease_max);
+      on_heartbeat(state_, WorkerId{i}, test::make_heartbeat(credit), 1, {}, *this);
     }
     if (plan.workers == Workers::registered) begin_campaign(plan.num_runs, std::move(finished));
   }
@@ -105,12 +143,11 @@ class PlayedFleet final : public Outbox {
       for (auto& [id, worker] : workers_) worker.take_batches(now, batch_time);
       now = next_end();
       for (auto& [id, worker] : workers_) {
-        for (std::size_t i = 0; i < worker.threads.size(); ++i) {
-          const PlayedBatch& batch = worker.threads[i];
-          if (!batch.runs.empty() && batch.begins < now && batch.ends <= now) {
-            deliver(id, i, batch_time);
-          }
+        for (PlayedBatch& batch : worker.threads) {
+          if (batch.runs.empty() || batch.begins >= now || batch.ends > now) continue;
+          deliver(id, std::exchange(batch, {}), batch_time);
         }
+        if (worker.card) deliver_groups(id, *worker.card, now, batch_time);
       }
       check_invariants(state_);
     }
@@ -126,8 +163,10 @@ class PlayedFleet final : public Outbox {
   void send(WorkerId id, proto::Envelope message) override {
     const proto::RunLease& lease = message.run_lease();  // Without runs if it is none.
     for (const RunIndex run : indices_of(std::array{wire::runs_of(lease)})) {
-      workers_.at(id).queue.push_back(
-          {.attempt = {lease.attempt()}, .run = run, .batch_runs_max = lease.batch_runs_max()});
+      PlayedWorker& worker = workers_.at(id);
+      (lease.is_for_cards() ? worker.card->queue : worker.queue)
+          .push_back(
+              {.attempt = {lease.attempt()}, .run = run, .batch_runs_max = lease.batch_runs_max()});
     }
   }
   void send_definition(WorkerId, CampaignId, std::uint64_t,
@@ -160,14 +199,25 @@ class PlayedFleet final : public Outbox {
       for (const PlayedBatch& batch : worker.threads) {
         if (!batch.runs.empty()) next = std::min(next, batch.ends);
       }
+      if (!worker.card) continue;
+      if (!worker.card->groups.empty()) next = std::min(next, worker.card->groups.front().ends);
     }
     return next;
   }
 
+  void deliver_groups(WorkerId id, PlayedCard& card, double now, const BatchTime& batch_time) {
+    while (!card.groups.empty() && card.groups.front().ends <= now) {
+      const PlayedBatch group = std::move(card.groups.front());
+      card.groups.pop_front();
+      card.num_in_flight -= group.runs.size();
+      deliver(id, group, batch_time, true);
+    }
+  }
+
   /// One message an attempt, as workers send them. The thread is free before its results arrive: it
   /// finds what was lent before.
-  void deliver(WorkerId id, std::size_t thread, const BatchTime& batch_time) {
-    const PlayedBatch batch = std::exchange(workers_.at(id).threads[thread], {});
+  void deliver(WorkerId id, const PlayedBatch& batch, const BatchTime& batch_time,
+               bool is_by_card = false) {
     if (batch.runs.size() < batch_lanes) partial_batches_begin_.push_back(batch.begins);
     std::map<wire::Attempt, std::vector<wire::ComputedRun>> messages;
     for (const HeldRun& held : batch.runs) {
@@ -175,6 +225,7 @@ class PlayedFleet final : public Outbox {
       computed.result.run = held.run;
       computed.result.num_draws = 1;
       computed.elapsed_s = batch.ends - batch.begins;
+      computed.is_by_card = is_by_card;
       messages[held.attempt].push_back(computed);
     }
     workers_.at(id).take_batches(batch.ends, batch_time);
@@ -309,6 +360,45 @@ TEST(BatchTimes, AreThoseOfFullBatchesUntilTheLastRound) {
     PlayedFleet fleet(plan);
     const double time = fleet.play(avx512_time);
     EXPECT_EQ(fleet.num_partial_batches_before(time - 1.01), 0) << plan;
+  }
+}
+
+/// Seconds of a batch, as long as the speed of a card has them.
+double batch_s(std::size_t num_runs) { return 2.4 * avx512_time(num_runs); }
+
+/// Workers of 16 threads, with a card in the first ones: an H100, or one that is a third as fast.
+std::vector<Plan> fleets_with_cards(std::uint64_t num_runs) {
+  const CardSpeed slower{.num_slots = 13'824, .runs_per_s = 700.0, .latency_s = 9.0};
+  constexpr auto registered = Workers::registered;
+  return {{num_runs, 1, 15, registered, 1},
+          {num_runs, 2, 16, registered, 1},
+          {num_runs, 2, 16, registered, 2},
+          {num_runs, 11, 16, registered, 1},
+          {num_runs, 11, 16, registered, 1, slower}};
+}
+
+// The processors would take as long for what fills them as a card for its longest session.
+TEST(BatchTimes, AreThoseWithoutCardsIfProcessorsHaveRoomForAllRuns) {
+  for (const std::uint64_t num_runs : {1U, 16U, 50U, 100U, 200U, 240U}) {
+    for (const Plan& plan : fleets_with_cards(num_runs)) {
+      Plan without_cards = plan;
+      without_cards.num_cards = 0;
+      EXPECT_EQ(PlayedFleet(plan).play(batch_s), PlayedFleet(without_cards).play(batch_s)) << plan;
+    }
+  }
+}
+
+// A tenth more than the work at the speed of all together, and once the longest session.
+TEST(BatchTimes, OfCardsAndProcessorsEndTogether) {
+  for (const std::uint64_t num_runs : {300U, 1'000U, 3'000U, 10'000U, 20'000U, 50'000U}) {
+    for (const Plan& plan : fleets_with_cards(num_runs)) {
+      const auto num_threads = static_cast<double>(plan.num_workers * plan.num_threads);
+      const double rate = num_threads * batch_lanes / batch_s(batch_lanes) +
+                          static_cast<double>(plan.num_cards) * plan.card.runs_per_s;
+      EXPECT_LE(PlayedFleet(plan).play(batch_s),
+                1.1 * static_cast<double>(num_runs) / rate + plan.card.latency_s)
+          << plan;
+    }
   }
 }
 

@@ -119,19 +119,21 @@ void check_workers(const State& state) {
   for (const auto& [id, worker] : state.workers) {
     std::uint64_t num_lent = 0;
     std::uint64_t num_alone = 0;
+    std::uint64_t num_lent_to_cards = 0;
     std::uint64_t num_slots_lent_for = 0;
     for (const LeaseId lease_id : worker.leases) {
       const Lease& lease = state.leases.at(lease_id);
       PROOFMASS_EXPECT(lease.worker == id);
       num_lent += lease.remaining.size();
       if (lease.is_alone) num_alone += lease.remaining.size();
-      num_slots_lent_for += num_slots_taken(lease);
+      (lease.is_for_cards ? num_lent_to_cards : num_slots_lent_for) += num_slots_taken(lease);
     }
+    PROOFMASS_EXPECT(worker.num_lent_to_cards == num_lent_to_cards);
     PROOFMASS_EXPECT(worker.num_slots_lent_for == num_slots_lent_for);
     PROOFMASS_EXPECT(worker.num_lent == num_lent && worker.num_alone == num_alone);
     num_slots += worker.num_slots;
     if (worker.is_eligible) {
-      num_eligible += worker.num_slots;
+      num_eligible += num_processor_slots(worker);
       num_idle += num_idle_slots(worker);
     }
     ++num_workers[worker.host];

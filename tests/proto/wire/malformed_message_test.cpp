@@ -120,6 +120,8 @@ TEST(MalformedHello, HasSlots) {
             "num_slots = 0 (must be in [1, 65536])");
   EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(65537); }),
             "num_slots = 65537 (must be in [1, 65536])");
+  const auto of_cards_alone = [](auto& hello) { hello.set_num_card_slots(hello.num_slots()); };
+  EXPECT_THAT(refusal(good_hello, of_cards_alone), HasSubstr("num_card_slots = "));
 }
 
 TEST(MalformedReject, HasAKnownReasonAndABoundedText) {

@@ -38,8 +38,7 @@ std::vector<RunResult> results_of(std::span<const RunRequest> requests, double t
 struct Script {
   double truth = 1.0;            ///< Of the results; a processor finds 1.
   std::size_t fails_after = 99;  ///< Groups.
-  /// Processors wait for the first group, as else they may have taken all runs before.
-  bool is_first = true;
+  bool can_simulate = true;
   std::atomic<std::size_t> num_runs = 0;
   std::atomic<std::size_t> num_in_flight_max = 0;
 };
@@ -83,15 +82,13 @@ class DeviceBench {
       : executor(
             [&script](const Campaign&) -> PreparedCampaign {
               return {
-                  .simulate =
-                      [&script](std::span<const RunRequest> requests,
-                                const std::function<void(int)>&) {
-                        if (script.is_first) script.num_runs.wait(0);
-                        return results_of(requests);
-                      },
+                  .simulate = [](std::span<const RunRequest> requests,
+                                 const std::function<void(int)>&) { return results_of(requests); },
                   .num_steps = 2,
-                  .simulate_on =
-                      [&script](Device&) { return std::make_unique<ScriptedSimulation>(script); }};
+                  .simulate_on = script.can_simulate ? SimulateOn([&script](Device&) {
+                    return std::make_unique<ScriptedSimulation>(script);
+                  })
+                                                     : nullptr};
             },
             [this] { changed_.release(); },
             {.num_threads = 1,
@@ -99,9 +96,9 @@ class DeviceBench {
              .devices = {std::make_shared<CudaDevice>(card())},
              .checked_fraction = checked_fraction}) {}
 
-  void submit(std::uint64_t num_runs, bool is_alone = false) {
+  void submit(std::uint64_t num_runs, bool is_for_cards = true) {
     proto::RunLease lease = test::make_lease(campaign, {{0}, num_runs}, {3});
-    lease.set_is_alone(is_alone);
+    lease.set_is_for_cards(is_for_cards);
     executor.submit(lease, std::array{wire::runs_of(lease)});
     // The first run prepares the campaign; by then all of them wait.
     executor.define(campaign, std::make_shared<const MicroscopeCampaign>());
@@ -142,24 +139,24 @@ TEST(DeviceExecutor, ComputesEachRunOnceSomewhere) {
   bench.submit(num_runs);
   const std::multiset<std::uint64_t> runs = bench.wait_for(num_runs);
   EXPECT_EQ(std::set<std::uint64_t>(runs.begin(), runs.end()).size(), num_runs);
-  EXPECT_GT(script.num_runs, 256U);
+  EXPECT_EQ(script.num_runs, num_runs);
   EXPECT_LE(script.num_in_flight_max, 400U);
   EXPECT_TRUE(bench.executor.computing().empty());
   EXPECT_EQ(bench.executor.num_steps_done() % 2, 0U);
 }
 
-TEST(DeviceExecutor, LeavesFewRunsToProcessors) {
-  Script script{.is_first = false};
+TEST(DeviceExecutor, LeavesRunsThatAreNotForCardsToProcessors) {
+  Script script;
   DeviceBench bench(script);
-  bench.submit(255);
-  EXPECT_EQ(bench.wait_for(255).size(), 255U);
+  bench.submit(300, false);
+  EXPECT_EQ(bench.wait_for(300).size(), 300U);
   EXPECT_EQ(script.num_runs, 0U);
 }
 
-TEST(DeviceExecutor, LeavesRunsThatAreToBeAloneToProcessors) {
-  Script script{.is_first = false};
+TEST(DeviceExecutor, LeavesACampaignThatDevicesCannotComputeToProcessors) {
+  Script script{.can_simulate = false};
   DeviceBench bench(script);
-  bench.submit(300, true);
+  bench.submit(300);
   EXPECT_EQ(bench.wait_for(300).size(), 300U);
   EXPECT_EQ(script.num_runs, 0U);
 }

@@ -191,9 +191,9 @@ TEST(Design, IsReadAndWritten) {
 
   const std::vector<DefinitionDifference> differences = compare_definitions(nominal, other);
   ASSERT_THAT(differences, SizeIs(2));
-  EXPECT_EQ(differences[0].field, "design");
+  EXPECT_EQ(differences[0].field, "campaign.design");
   EXPECT_EQ(differences[0].second, "latin_hypercube");
-  EXPECT_EQ(differences[1].field, "points");
+  EXPECT_EQ(differences[1].field, "campaign.points");
   EXPECT_EQ(test::message_of<DefinitionError>(
                 [] { (void)read_design("[campaign]\nname = \"a\"\npoints = 32\n"); }),
             "file:3: campaign.points = 32 (only with campaign.design, which is \"random\")");
