@@ -100,6 +100,17 @@ std::string status_text(const proto::StatusReply& status, const TerminalStyle& s
          terminal_text(campaigns_table(status), style);
 }
 
+namespace {
+
+/// `7: 1 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2050 runs/s`.
+std::string cards_line(const proto::WorkerStatus& worker) {
+  std::string line = fmt::format("{}: {}", worker.worker_id(), worker.cards());
+  if (worker.card_rate_hz() > 0.0) line += fmt::format(", {:.3g} runs/s", worker.card_rate_hz());
+  return line;
+}
+
+}  // namespace
+
 Table workers_table(const proto::WorkersReply& workers) {
   if (workers.workers().empty()) return {.remarks = {{"no workers"}}};
   Table table{.columns = {{"id", false, 8},
@@ -115,6 +126,7 @@ Table workers_table(const proto::WorkersReply& workers) {
                           count_cell(worker.process_id()), count_cell(worker.num_slots()),
                           count_cell(worker.num_lent()), count_cell(worker.num_results()),
                           ago(worker.silent_s())});
+    if (!worker.cards().empty()) table.remarks.push_back({cards_line(worker)});
     if (!worker.is_quarantined()) continue;
     table.remarks.push_back(
         {fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}",

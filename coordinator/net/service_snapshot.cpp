@@ -18,6 +18,13 @@ WorkerActivity activity_of(const State& state, const Worker& worker, TimePoint n
   return worker.num_lent > 0 ? WorkerActivity::computing : WorkerActivity::idle;
 }
 
+/// Of the campaign that its cards were last lent runs of while they were idle.
+double card_rate_of(const Worker& worker) {
+  const auto latest = std::ranges::max_element(worker.card_work, {},
+                                               [](const auto& of) { return of.second.since; });
+  return latest == worker.card_work.end() ? 0.0 : latest->second.rate;
+}
+
 }  // namespace
 
 RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker, TimePoint now) {
@@ -32,6 +39,8 @@ RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker
   status.set_num_results(worker.num_results);
   status.set_silent_s(seconds(now - worker.heard_at));
   status.set_is_quarantined(activity == WorkerActivity::quarantined);
+  status.set_cards(worker.cards);
+  status.set_card_rate_hz(card_rate_of(worker));
   return {.status = std::move(status),
           .activity = activity,
           .registered_s = seconds(now - worker.registered_at)};

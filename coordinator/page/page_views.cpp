@@ -133,7 +133,7 @@ std::vector<Column> worker_columns_of(const WorkerChoice& choice) {
 Row worker_row(const RegisteredWorker& worker) {
   const proto::WorkerStatus& status = worker.status;
   return {status.name(),
-          status.host(),
+          status.cards().empty() ? status.host() : status.host() + " with " + status.cards(),
           name_of(worker.activity),
           grouped(status.num_slots()),
           grouped(status.num_lent()),

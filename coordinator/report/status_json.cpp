@@ -47,15 +47,20 @@ StatusJson campaign_object(const proto::CampaignStatus& campaign) {
 }
 
 StatusJson worker_object(const proto::WorkerStatus& worker) {
-  return {{"worker_id", worker.worker_id()},
-          {"name", worker.name()},
-          {"host", worker.host()},
-          {"process_id", worker.process_id()},
-          {"num_slots", worker.num_slots()},
-          {"num_lent", worker.num_lent()},
-          {"num_results", worker.num_results()},
-          {"silent_s", worker.silent_s()},
-          {"is_quarantined", worker.is_quarantined()}};
+  StatusJson json{{"worker_id", worker.worker_id()},
+                  {"name", worker.name()},
+                  {"host", worker.host()},
+                  {"process_id", worker.process_id()},
+                  {"num_slots", worker.num_slots()},
+                  {"num_lent", worker.num_lent()},
+                  {"num_results", worker.num_results()},
+                  {"silent_s", worker.silent_s()},
+                  {"is_quarantined", worker.is_quarantined()},
+                  {"cards", nullptr},
+                  {"card_rate_hz", nullptr}};
+  if (!worker.cards().empty()) json["cards"] = worker.cards();
+  if (worker.card_rate_hz() > 0.0) json["card_rate_hz"] = worker.card_rate_hz();
+  return json;
 }
 
 StatusJson status_object(const proto::StatusReply& status) {

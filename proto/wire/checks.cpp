@@ -13,6 +13,7 @@
 
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "proto/wire/messages.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::wire::detail {
@@ -90,6 +91,11 @@ std::string checked_name(const std::string& name, std::string_view field) {
   // The name itself is not repeated: it may hold anything.
   require(is_name(name), field, fmt::format("{} bytes", name.size()), is_name_rule);
   return name;
+}
+
+void require_cards(const std::string& cards) {
+  require_in(cards.size(), 0, cards_text_size_max, "size of cards");
+  require(printable(cards) == cards, "cards", printable(cards), "must be printable ASCII");
 }
 
 double checked_magnitude(double value, std::string_view field) {

@@ -38,6 +38,10 @@ void require_count(int count, std::uint64_t minimum, std::uint64_t maximum, std:
 /// The name. @throws ConfigError unless is_name() holds.
 [[nodiscard]] std::string checked_name(const std::string& name, std::string_view field);
 
+/// @throws ConfigError unless the names of cards are printable ASCII of cards_text_size_max bytes
+/// at most.
+void require_cards(const std::string& cards);
+
 /// The value. @throws ConfigError unless it is finite and ≥ 0.
 [[nodiscard]] double checked_magnitude(double value, std::string_view field);
 

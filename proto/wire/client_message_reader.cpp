@@ -154,6 +154,8 @@ void check(const proto::WorkersReply& message) {
     (void)checked_name(worker.name(), "name");
     (void)checked_name(worker.host(), "host");
     (void)checked_magnitude(worker.silent_s(), "silent_s");
+    detail::require_cards(worker.cards());
+    (void)checked_magnitude(worker.card_rate_hz(), "card_rate_hz");
   }
 }
 

@@ -71,9 +71,7 @@ void check_reason(proto::LossReason value, std::initializer_list<LossReason> all
 void check(const proto::Hello& hello) {
   require_in(hello.num_slots(), 1, slots_max, "num_slots");
   require_in(hello.num_card_slots(), 0, hello.num_slots() - 1, "num_card_slots");
-  require_in(hello.cards().size(), 0, cards_text_size_max, "size of cards");
-  require(detail::printable(hello.cards()) == hello.cards(), "cards", hello.cards(),
-          "must be printable ASCII");
+  detail::require_cards(hello.cards());
   check_name(hello.worker_name(), "worker_name");
   check_name(hello.host(), "host");
   check_name(hello.model_version(), "model_version");

@@ -214,6 +214,15 @@ TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
 )");
 }
 
+TEST(WorkersTable, SaysWhichCardsThereAreAndHowFastTheyAre) {
+  proto::WorkerStatus with_cards = worker(7, "gpu");
+  with_cards.set_cards("2 NVIDIA H100 80GB HBM3 (CUDA 13.0)");
+  const auto remark = [&] { return workers_table(reply_of({with_cards})).remarks.at(0).text; };
+  EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0)");
+  with_cards.set_card_rate_hz(2053.7);
+  EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2050 runs/s");
+}
+
 TEST(WorkersTable, HasAtMost79Columns) {
   constexpr auto most = std::numeric_limits<std::uint64_t>::max();
   proto::WorkerStatus wide = worker(most, std::string(128, 'x'));
@@ -363,7 +372,10 @@ TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
                          {"num_lent", 64},
                          {"num_results", 1234},
                          {"silent_s", 2.9},
-                         {"is_quarantined", true}}}}};
+                         {"is_quarantined", true},
+                         {"cards", "1 card (CUDA 13.0)"},
+                         {"card_rate_hz", nullptr}}}}};
+  one.set_cards("1 card (CUDA 13.0)");
   EXPECT_EQ(Json::parse(workers_json(reply_of({one}))), expected);
   EXPECT_TRUE(Json::parse(workers_json({}))["workers"].is_array());
 }
