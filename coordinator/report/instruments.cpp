@@ -124,23 +124,27 @@ void RunningInstruments::add_shares(std::size_t i) {
   }));
   const std::optional<std::size_t> position = standard_error_of(i);
   if (!position) return;
+  const auto has_sigma = [](const RunResult& run) {
+    return run.is_completed() && !run.standard_error.empty();
+  };
   const auto is_covered = [&](const RunResult& run, double error) {
     return std::abs(error) < normal_95 * run.standard_error[*position];
   };
-  std::vector<RunResult> runs;
   CompensatedSum errors;
+  double count = 0.0;
   for (const RunResult& run : runs_) {
-    if (!run.is_completed() || run.standard_error.empty()) continue;
+    if (!has_sigma(run)) continue;
     have_standard_errors_ = true;
-    runs.push_back(run);
     errors.add(run.error(i));
+    count += 1.0;
   }
-  quantity.covered.add(
-      count_of(runs, [&](const RunResult& run) { return is_covered(run, run.error(i)); }));
-  const auto count = static_cast<double>(runs.size());
-  quantity.covered_within.add(count_of(runs, [&](const RunResult& run) {
-    return count > 1.0 && is_covered(run, (run.error(i) - errors.value() / count) *
-                                              std::sqrt(count / (count - 1.0)));
+  quantity.covered.add(count_of(runs_, [&](const RunResult& run) {
+    return has_sigma(run) && is_covered(run, run.error(i));
+  }));
+  quantity.covered_within.add(count_of(runs_, [&](const RunResult& run) {
+    return count > 1.0 && has_sigma(run) &&
+           is_covered(run,
+                      (run.error(i) - errors.value() / count) * std::sqrt(count / (count - 1.0)));
   }));
 }
 
