@@ -107,7 +107,7 @@ TEST(RunQueue, LeavesToCardsWhatIsForThem) {
 
 TEST(RunQueue, GivesACardOneCampaignAfterTheOther) {
   RunQueue queue;
-  for (const std::uint64_t campaign : {1, 2}) {
+  for (const std::uint64_t campaign : {1U, 2U}) {
     proto::RunLease for_cards = lease(campaign, 0, 3);
     for_cards.set_is_for_cards(true);
     add(queue, for_cards);
