@@ -105,7 +105,8 @@ namespace {
 /// `7: 1 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2050 runs/s`.
 std::string cards_line(const proto::WorkerStatus& worker) {
   std::string line = fmt::format("{}: {}", worker.worker_id(), worker.cards());
-  if (worker.card_rate_hz() > 0.0) line += fmt::format(", {:.3g} runs/s", worker.card_rate_hz());
+  if (worker.card_rate_hz() > 0.0)
+    line += fmt::format(", {} runs/s", measured_figure(worker.card_rate_hz()));
   return line;
 }
 

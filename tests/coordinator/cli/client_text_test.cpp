@@ -220,7 +220,7 @@ TEST(WorkersTable, SaysWhichCardsThereAreAndHowFastTheyAre) {
   const auto remark = [&] { return workers_table(reply_of({with_cards})).remarks.at(0).text; };
   EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0)");
   with_cards.set_card_rate_hz(2053.7);
-  EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2050 runs/s");
+  EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2054 runs/s");
 }
 
 TEST(WorkersTable, HasAtMost79Columns) {
