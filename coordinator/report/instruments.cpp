@@ -223,12 +223,6 @@ Cell percent_cell(double share) {
   return cell;
 }
 
-void add_ends(const std::optional<Interval>& interval, double scale, Row& row) {
-  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
-    row.push_back(interval ? figure_cell((*interval).*end, scale) : no_figure());
-  }
-}
-
 void add_percent_ends(const std::optional<Interval>& interval, Row& row) {
   for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
     row.push_back(interval ? percent_cell((*interval).*end) : no_figure());

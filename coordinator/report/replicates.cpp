@@ -11,6 +11,11 @@
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t num_incomplete_named = 5;
+
+}  // namespace
 
 RunningReplicates::RunningReplicates(std::vector<double> objectives, const SamplingDesign& design)
     : objectives_(std::move(objectives)), quantities_(objectives_.size()) {
@@ -73,12 +78,6 @@ ReplicatedMean RunningReplicates::Mean::share(std::uint64_t num_runs) const {
   return of;
 }
 
-namespace {
-
-constexpr std::size_t num_incomplete_named = 5;
-
-}  // namespace
-
 void RunningReplicates::finish_replicate() {
   const std::uint64_t num_runs = std::exchange(num_runs_, 0);
   const std::uint64_t num_estimated = std::exchange(num_estimated_, 0);
@@ -120,12 +119,6 @@ ReplicateStatistics RunningReplicates::statistics() const {
 
 namespace {
 
-void add_interval(const std::optional<Interval>& interval, double scale, Row& row) {
-  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
-    row.push_back(interval ? figure_cell((*interval).*end, scale) : no_figure());
-  }
-}
-
 /// Of the root of a mean square, whose interval may begin below 0.
 std::optional<Interval> root_of(std::optional<Interval> interval) {
   if (!interval) return interval;
@@ -155,8 +148,7 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
   if (statistics.num_drawn_again > 0) {
     notes.push_back(
         fmt::format("{} runs are not at their points: a draw that is not accepted is replaced by "
-                    "an independent "
-                    "one",
+                    "an independent one",
                     statistics.num_drawn_again));
   }
   if (statistics.num_replicates < num_replicates_of_interval) {
@@ -173,9 +165,9 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
                   "worst, percentiles and verdicts need independent runs",
                   num_hits_of_interval));
   notes.emplace_back(
-      "no design saves more runs than the inverse of the share of the variance that is noise, "
-      "which "
-      "campaign.realisations tells");
+      "a design needs no fewer runs than independent draws times the share of noise in the "
+      "variance; "
+      "campaign.realisations measures that share");
   return notes;
 }
 
@@ -204,10 +196,10 @@ Table replicate_table(const ReplicateStatistics& statistics) {
     const ReplicatedQuantity& of = statistics.quantities[i];
     const double scale = quantity.display_scale;
     Row row{quantity.symbol};
-    add_interval(not_negative(of.magnitude.interval), scale, row);
-    add_interval(of.bias.interval, scale, row);
-    add_interval(root_of(of.mean_square.interval), scale, row);
-    add_interval(of.beyond.interval, 0.01, row);
+    add_ends(not_negative(of.magnitude.interval), scale, row);
+    add_ends(of.bias.interval, scale, row);
+    add_ends(root_of(of.mean_square.interval), scale, row);
+    add_ends(of.beyond.interval, 0.01, row);
     table.rows.push_back(std::move(row));
   }
   return table;

@@ -239,6 +239,12 @@ Cell no_figure() {
   return cell;
 }
 
+void add_ends(const std::optional<Interval>& interval, double scale, Row& row) {
+  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
+    row.push_back(interval ? figure_cell((*interval).*end, scale) : no_figure());
+  }
+}
+
 Cell unit_cell(const Quantity& quantity) {
   Cell cell(quantity.display_unit);
   cell.document = unit_text(quantity.display_unit);

@@ -17,6 +17,8 @@ namespace proofmass::coordinator {
 /// A number in the display unit, and in SI units for programs.
 [[nodiscard]] Cell figure_cell(double value, double scale = 1.0);
 [[nodiscard]] Cell no_figure();
+/// Adds the cells of the ends of an interval; of none, two without a figure.
+void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
 /// The unit in which a table shows a quantity.
 [[nodiscard]] Cell unit_cell(const Quantity& quantity);
 

@@ -17,6 +17,7 @@
 namespace proofmass::worker {
 namespace {
 
+/// Until the simulation that they begin says how large a group may be; any device takes so many.
 constexpr std::size_t first_group_size = 128;
 
 bool are_same(const std::vector<double>& a, const std::vector<double>& b) {

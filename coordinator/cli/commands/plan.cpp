@@ -91,7 +91,7 @@ void add_losses(const Planned& plan, Table& table) {
       "run");
 }
 
-/// Names what the sessions do not determine.
+/// Names the parameters whose objectives are small against what the sessions tell of them.
 void add_undetermined(const Planned& plan, Table& table) {
   std::vector<std::string_view> symbols;
   for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
@@ -100,9 +100,7 @@ void add_undetermined(const Planned& plan, Table& table) {
   }
   if (symbols.empty()) return;
   table.notes.push_back(
-      fmt::format("the sessions do not determine {} to the objective, because σ "
-                  "is larger",
-                  fmt::join(symbols, ", ")));
+      fmt::format("σ is larger than the objective of {}", fmt::join(symbols, ", ")));
 }
 
 Table bound_table(const Planned& plan) {
@@ -128,8 +126,8 @@ Table bound_table(const Planned& plan) {
   }
   table.notes.push_back(fmt::format(
       "σ: standard error of estimates by the method {}, mean of {} instruments; errors are taken "
-      "to be normal, and the chance of all objectives is the product of theirs, below which no "
-      "correlation of the errors brings it",
+      "to be normal, and the chance that all objectives hold is the product of the single ones; "
+      "correlated errors can only raise it",
       plan.method, plan.num_instruments));
   add_undetermined(plan, table);
   add_losses(plan, table);

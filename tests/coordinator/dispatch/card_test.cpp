@@ -77,5 +77,32 @@ TEST_F(CardTest, MeasuresACardWhileItIsBusy) {
   EXPECT_DOUBLE_EQ(state.workers.at(first).card_work.at(one).rate, 55.0);
 }
 
+// By its speed the card has what it holds for ten seconds; a run of a processor takes one.
+TEST_F(CardTest, CopiesWhatACardHasForTwiceAsLongAsItShould) {
+  add_worker_with_cards(first, 1000);
+  add_campaign(one, 500);
+  const auto for_processors = outbox.take_sent<proto::RunLease>(first);
+  ASSERT_TRUE(outbox.take_sent<proto::RunLease>(first).is_for_cards());
+  for (std::uint64_t run = 0; run < for_processors.num_runs(); ++run) complete(first, one, {run});
+  campaign(one).run_time_s = 1.0;
+  const coordinator::Worker& worker = state.workers.at(first);
+  ASSERT_EQ(worker.num_lent, worker.num_lent_to_cards) << "only the cards have runs";
+  state.workers.at(first).card_work.at(one).rate = static_cast<double>(worker.num_lent) / 10.0;
+  heartbeat(first, {held(one, {{for_processors.num_runs()}, worker.num_lent})},
+            {make_computed_batch(one, {{RunIndex{for_processors.num_runs()}, worker.num_lent}})});
+  add_worker(second, 16, "other");
+  outbox.forget();
+  const auto has_copies_after = [&](int wait_s) {
+    now += std::chrono::seconds(wait_s);
+    for (const WorkerId id : {first, second}) state.workers.at(id).heard_at = now;
+    on_tick(state, now, outbox);
+    const bool has_copies = outbox.num_sent() > 0;
+    outbox.forget();
+    return has_copies;
+  };
+  EXPECT_FALSE(has_copies_after(19));
+  EXPECT_TRUE(has_copies_after(2));
+}
+
 }  // namespace
 }  // namespace proofmass::test

@@ -46,6 +46,17 @@ TEST_F(ServiceSnapshotTest, TellsWhatEachWorkerDoes) {
   EXPECT_EQ(snapshot.workers[1].status.name(), "w2");
   EXPECT_EQ(snapshot.workers[1].status.num_lent(), 5U);
   EXPECT_EQ(snapshot.workers[1].registered_s, 100.0);
+  EXPECT_EQ(snapshot.workers[1].status.card_rate_hz(), 0.0);
+}
+
+TEST_F(ServiceSnapshotTest, HasTheSpeedOfCardsInTheirLatestCampaign) {
+  Worker& worker = add_worker(1);
+  worker.cards = "1 card";
+  worker.card_work[CampaignId{7}] = {.since = now - 10s, .rate = 2000.0};
+  worker.card_work[CampaignId{8}] = {.since = now - 90s, .rate = 500.0};
+  const RegisteredWorker record = record_of(state, WorkerId{1}, worker, now);
+  EXPECT_EQ(record.status.cards(), "1 card");
+  EXPECT_EQ(record.status.card_rate_hz(), 2000.0);
 }
 
 TEST_F(ServiceSnapshotTest, CountsWorkersWithoutCopyingThem) {

@@ -98,6 +98,7 @@ TEST(Pages, ShowHostileTextAsText) {
   snapshot.status.mutable_unserved_files(0)->set_reason(hostile_name);
   snapshot.status.set_num_unserved_files(1);
   snapshot.workers = {worker_snapshot(hostile_name, 1)};
+  snapshot.workers[0].status.set_cards(hostile_name);
   expect_harmless(text_of(overview_page(snapshot, {}, {})));
   expect_harmless(text_of(workers_page(
       snapshot, *parse_target("/workers?filter=" + percent_encoded(hostile_name)), {})));

@@ -428,6 +428,10 @@ TEST(MalformedWorkerStatus, HasANumberNamesAndATime) {
             "host = 2 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_silent_s(nan); }),
             "silent_s = nan (must be >= 0)");
+  EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_cards("a\n"); }),
+            "cards = a? (must be printable ASCII)");
+  EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_card_rate_hz(-1.0); }),
+            "card_rate_hz = -1 (must be >= 0)");
 }
 
 }  // namespace

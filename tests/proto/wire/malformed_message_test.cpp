@@ -122,6 +122,10 @@ TEST(MalformedHello, HasSlots) {
             "num_slots = 65537 (must be in [1, 65536])");
   const auto of_cards_alone = [](auto& hello) { hello.set_num_card_slots(hello.num_slots()); };
   EXPECT_THAT(refusal(good_hello, of_cards_alone), HasSubstr("num_card_slots = "));
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_cards("H100\x1b"); }),
+            "cards = H100? (must be printable ASCII)");
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_cards(std::string(257, 'x')); }),
+            "size of cards = 257 (must be in [0, 256])");
 }
 
 TEST(MalformedReject, HasAKnownReasonAndABoundedText) {
