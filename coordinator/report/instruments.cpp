@@ -39,15 +39,10 @@ std::uint64_t count_of(std::span<const RunResult> runs, const IsHit& is_hit) {
 
 }  // namespace
 
-RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint64_t realisations,
-                                       std::vector<RunRange> given_up)
-    : objectives_(std::move(objectives)),
-      realisations_(realisations),
-      given_up_(std::move(given_up)),
-      within_(realisations) {
+RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint64_t realisations)
+    : objectives_(std::move(objectives)), realisations_(realisations), within_(realisations) {
   PROOFMASS_EXPECT(realisations_ > 1);
   counts_.realisations = realisations_;
-  std::ranges::reverse(given_up_);
   const GroupedHits hits(realisations_);
   quantities_.assign(objectives_.size(), {.errors = GroupedValues(realisations_),
                                           .beyond = hits,
@@ -55,25 +50,7 @@ RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint
                                           .covered_within = hits});
 }
 
-void RunningInstruments::add(const RunResult& result) {
-  add_given_up_before(result.run.value);
-  add_run(result);
-}
-
-void RunningInstruments::add_given_up_before(std::uint64_t run) {
-  while (!given_up_.empty() && given_up_.back().first.value < run) {
-    const RunRange range = given_up_.back();
-    given_up_.pop_back();
-    for (std::uint64_t i = range.first.value; i < range.end(); ++i) {
-      RunResult lost;
-      lost.run = RunIndex{i};
-      lost.status = RunStatus::lost;
-      add_run(lost);
-    }
-  }
-}
-
-void RunningInstruments::add_run(const RunResult& run) {
+void RunningInstruments::add(const RunResult& run) {
   const auto instrument_of = [&](const RunResult& of) { return of.run.value / realisations_; };
   if (!runs_.empty() && instrument_of(runs_.front()) != instrument_of(run)) {
     ++counts_.num_incomplete;
@@ -192,7 +169,6 @@ InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
 }
 
 InstrumentStatistics RunningInstruments::statistics() {
-  add_given_up_before(num_runs_max);
   if (!runs_.empty()) ++counts_.num_incomplete;
   runs_.clear();
   InstrumentStatistics statistics = counts_;

@@ -8,7 +8,6 @@
 
 #include "coordinator/table/table.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/runs.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/variance_components.hpp"
@@ -57,14 +56,13 @@ struct InstrumentStatistics {
   std::uint64_t temporal_instrument = 0;  ///< The first of them.
 };
 
-/// Computes them from results in run order. Memory is fixed.
+/// Computes them from results in run order. Memory is fixed. A run that was given up is to be added
+/// as a lost one.
 class RunningInstruments {
  public:
   /// @param objectives    Of each quantity, SI.
   /// @param realisations  At least 2.
-  /// @param given_up      Runs that have no result and never will, ascending.
-  RunningInstruments(std::vector<double> objectives, std::uint64_t realisations,
-                     std::vector<RunRange> given_up);
+  RunningInstruments(std::vector<double> objectives, std::uint64_t realisations);
 
   void add(const RunResult& result);
   /// @pre Every result was added; to be called once.
@@ -77,8 +75,6 @@ class RunningInstruments {
     GroupedHits beyond, covered, covered_within;
     double squared_standard_errors = 0.0;  ///< Sum over the runs in `errors`.
   };
-  void add_given_up_before(std::uint64_t run);
-  void add_run(const RunResult& run);
   void finish_instrument();
   void add_objectives();
   void add_shares(std::size_t i);
@@ -88,8 +84,7 @@ class RunningInstruments {
 
   std::vector<double> objectives_;
   std::uint64_t realisations_;
-  std::vector<RunRange> given_up_;  ///< Not added yet, the next one last.
-  std::vector<RunResult> runs_;     ///< Of the instrument that is not complete yet.
+  std::vector<RunResult> runs_;  ///< Of the instrument that is not complete yet.
   InstrumentStatistics counts_;
   GroupedHits within_;
   std::uint64_t num_within_always_ = 0;

@@ -79,6 +79,61 @@ void end_totals(std::vector<double> totals, std::optional<RunTotals>& of_runs) {
   of_runs->percentile_95 = percentile(totals, 0.95);
 }
 
+/// Statistics whose unit is an instrument or a replicate, of several runs each. They need all of
+/// these runs: those that were given up, which have no result, count as lost.
+class RunGroups {
+ public:
+  RunGroups(const Store& store, const Campaign& campaign) {
+    const std::uint64_t realisations = campaign.num_realisations();
+    const SamplingDesign design = campaign.sampling_design();
+    if (realisations > 1) instruments_.emplace(campaign.objectives(), realisations);
+    if (design.points > 1) replicates_.emplace(campaign.objectives(), design);
+    if (!instruments_ && !replicates_) return;
+    given_up_ = store.given_up_runs();
+    std::ranges::reverse(given_up_);
+  }
+
+  void add(const RunResult& result) {
+    add_given_up_before(result.run.value);
+    add_run(result);
+  }
+
+  /// @pre Every result was added, in run order.
+  void finish(ReadResults& results) {
+    add_given_up_before(num_runs_max);
+    if (instruments_) results.instruments = instruments_->statistics();
+    if (!replicates_) return;
+    results.replicates = replicates_->statistics();
+    for (StandardErrorStatistic& of : results.standard_errors.quantities) {
+      if (of.quantity >= results.replicates->quantities.size()) continue;
+      if (const auto& covered = results.replicates->quantities[of.quantity].covered) {
+        of.within = covered->interval;
+      }
+    }
+  }
+
+ private:
+  void add_given_up_before(std::uint64_t run) {
+    for (; !given_up_.empty() && given_up_.back().first.value < run; given_up_.pop_back()) {
+      RunResult lost;
+      lost.status = RunStatus::lost;
+      for (lost.run = given_up_.back().first; lost.run.value < given_up_.back().end();
+           ++lost.run.value) {
+        add_run(lost);
+      }
+    }
+  }
+
+  void add_run(const RunResult& result) {
+    if (instruments_) instruments_->add(result);
+    if (replicates_) replicates_->add(result);
+  }
+
+  std::optional<RunningInstruments> instruments_;
+  std::optional<RunningReplicates> replicates_;
+  std::vector<RunRange> given_up_;  ///< Not added yet, the next one last.
+};
+
 }  // namespace
 
 void MissingEstimates::add(const RunResult& result) {
@@ -158,26 +213,18 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors;
-  std::optional<RunningInstruments> instruments;
-  std::optional<RunningReplicates> replicates;
-  if (const SamplingDesign design = campaign.sampling_design(); design.points > 1) {
-    replicates.emplace(objectives, design);
-  }
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   const Warner warner = campaign.warner();
   store.read_one_state([&] {
-    if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
-      instruments.emplace(objectives, realisations, store.given_up_runs());
-    }
+    RunGroups groups(store, campaign);
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());
       statistics.add(result);
       standard_errors.add(result);
-      if (instruments) instruments->add(result);
-      if (replicates) replicates->add(result);
+      groups.add(result);
       kept.add(result);
       if (budget && result.is_completed()) {
         add_total(result.run, budget->of_run(result).total, totals, results.totals);
@@ -190,16 +237,16 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
     results.digests = digest.finish();
     results.statistics = statistics.statistics();
     results.standard_errors = standard_errors.statistics();
-    if (instruments) results.instruments = instruments->statistics();
-    if (replicates) results.replicates = replicates->statistics();
     for (std::size_t i = 0; i < objectives.size() && results.statistics.num_estimated > 0; ++i) {
       std::vector<double> errors = kept.take(store, i);
       complete(results.statistics.accuracy[i], errors);
       if (further.magnitudes) further.magnitudes(i, errors);
     }
-    if (why_not_independent(campaign).empty()) return;
-    leave_out_intervals(results.statistics);
-    leave_out_intervals(results.standard_errors);
+    if (!why_not_independent(campaign).empty()) {
+      leave_out_intervals(results.statistics);
+      leave_out_intervals(results.standard_errors);
+    }
+    groups.finish(results);
   });
   return results;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/standard_errors.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 
@@ -29,17 +30,27 @@ void RunningReplicates::add(const RunResult& result) {
   replicate_ = replicate;
   ++num_runs_;
   if (result.num_draws > 1) ++num_drawn_again_;
-  if (!result.is_completed()) return;
+  if (result.is_completed()) return add_errors(result);
+  for (Quantity& quantity : quantities_) quantity.beyond.sum += 1.0;
+}
+
+void RunningReplicates::add_errors(const RunResult& result) {
   ++num_estimated_;
+  have_standard_errors_ = have_standard_errors_ || !result.standard_error.empty();
   bool is_within = true;
+  auto sigma = result.standard_error.begin();  // Only some quantities have one.
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    Quantity& quantity = quantities_[i];
     const double error = result.error(i);
     const bool is_beyond = std::abs(error) > objectives_[i];
-    quantities_[i].magnitude.sum += std::abs(error);
-    quantities_[i].bias.sum += error;
-    quantities_[i].mean_square.sum += error * error;
-    quantities_[i].beyond.sum += is_beyond ? 1.0 : 0.0;
+    quantity.magnitude.sum += std::abs(error);
+    quantity.bias.sum += error;
+    quantity.mean_square.sum += error * error;
+    quantity.beyond.sum += is_beyond ? 1.0 : 0.0;
     is_within = is_within && !is_beyond;
+    if (sigma == result.standard_error.end()) continue;
+    if (!model().results().quantities[i].has_standard_error) continue;
+    quantity.covered.sum += std::abs(error) < normal_95 * *sigma++ ? 1.0 : 0.0;
   }
   within_.sum += is_within ? 1.0 : 0.0;
 }
@@ -93,8 +104,10 @@ void RunningReplicates::finish_replicate() {
   }
   within_.sum = 0.0;
   for (Quantity& quantity : quantities_) {
+    if (num_runs == counts_.design.points) quantity.beyond.finish(num_runs);
+    quantity.beyond.sum = 0.0;
     for (Mean* const mean :
-         {&quantity.magnitude, &quantity.bias, &quantity.mean_square, &quantity.beyond}) {
+         {&quantity.magnitude, &quantity.bias, &quantity.mean_square, &quantity.covered}) {
       if (num_runs == counts_.design.points && num_estimated > 0) mean->finish(num_estimated);
       mean->sum = 0.0;
     }
@@ -105,14 +118,20 @@ ReplicateStatistics RunningReplicates::statistics() const {
   RunningReplicates all = *this;
   all.finish_replicate();
   ReplicateStatistics statistics = all.counts_;
-  statistics.within_objectives =
-      all.within_.share(statistics.num_replicates * statistics.design.points);
+  const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
+  statistics.within_objectives = all.within_.share(num_runs);
   if (statistics.num_estimated == 0) return statistics;
-  for (const Quantity& quantity : all.quantities_) {
-    statistics.quantities.push_back({.magnitude = quantity.magnitude.mean(),
-                                     .bias = quantity.bias.mean(),
-                                     .mean_square = quantity.mean_square.mean(),
-                                     .beyond = quantity.beyond.share(statistics.num_estimated)});
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    const Quantity& quantity = all.quantities_[i];
+    ReplicatedQuantity of{.magnitude = quantity.magnitude.mean(),
+                          .bias = quantity.bias.mean(),
+                          .mean_square = quantity.mean_square.mean(),
+                          .beyond = quantity.beyond.share(num_runs),
+                          .covered = {}};
+    if (have_standard_errors_ && model().results().quantities[i].has_standard_error) {
+      of.covered = quantity.covered.share(statistics.num_estimated);
+    }
+    statistics.quantities.push_back(std::move(of));
   }
   return statistics;
 }
@@ -139,11 +158,21 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
       "are independent, make the intervals",
       statistics.num_replicates, statistics.design.points, name_of(statistics.design.kind))};
   if (statistics.num_incomplete > 0) {
-    notes.push_back(fmt::format(
-        "left out, as a run has no result: replicate {}{}", fmt::join(statistics.incomplete, ", "),
-        statistics.num_incomplete > statistics.incomplete.size()
-            ? fmt::format(" and others, {} in all", statistics.num_incomplete)
-            : std::string()));
+    notes.push_back(
+        fmt::format("left out, as a run is not finished yet: replicate {}{}",
+                    fmt::join(statistics.incomplete, ", "),
+                    statistics.num_incomplete > statistics.incomplete.size()
+                        ? fmt::format(" and others, {} in all", statistics.num_incomplete)
+                        : std::string()));
+  }
+  notes.emplace_back("beyond: runs whose error exceeds the objective, or without an estimate");
+  if (const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
+      statistics.num_estimated < num_runs) {
+    const std::uint64_t num_without = num_runs - statistics.num_estimated;
+    notes.push_back(fmt::format("{} {} without an estimate {} left out of the means of {}",
+                                num_without, num_without == 1 ? "run" : "runs",
+                                num_without == 1 ? "is" : "are",
+                                num_without == 1 ? "its replicate" : "their replicates"));
   }
   if (statistics.num_drawn_again > 0) {
     notes.push_back(
@@ -233,7 +262,8 @@ nlohmann::ordered_json json_of(const ReplicateStatistics& statistics) {
                                   {"magnitude", json_of(of.magnitude)},
                                   {"bias", json_of(of.bias)},
                                   {"mean_square", json_of(of.mean_square)},
-                                  {"beyond", json_of(of.beyond)}});
+                                  {"beyond", json_of(of.beyond)},
+                                  {"covered", of.covered ? json_of(*of.covered) : Json()}});
   }
   return json;
 }

@@ -28,18 +28,22 @@ struct ReplicatedQuantity {
   ReplicatedMean magnitude;    ///< |error|.
   ReplicatedMean bias;         ///< error.
   ReplicatedMean mean_square;  ///< error².
-  ReplicatedMean beyond;       ///< Share of runs whose |error| is above the objective.
+  /// Share of runs whose |error| is above the objective, or that have no estimate.
+  ReplicatedMean beyond;
+  /// Share of completed runs whose |error| is within normal_95 standard errors; if there are any.
+  std::optional<ReplicatedMean> covered;
 };
 
 /// What the replicates of a sampling design tell, with the replicate as the unit of intervals.
 struct ReplicateStatistics {
   SamplingDesign design;
-  std::uint64_t num_replicates = 0;  ///< All of whose runs are finished; the basis of all else.
-  std::vector<std::uint64_t> incomplete;  ///< With results of some of their runs; the first few.
+  /// All of whose runs are finished or given up; the basis of all else.
+  std::uint64_t num_replicates = 0;
+  std::vector<std::uint64_t> incomplete;  ///< Of which a run is not finished yet; the first few.
   std::uint64_t num_incomplete = 0;
   std::uint64_t num_estimated = 0;    ///< Completed runs of complete replicates.
   std::uint64_t num_drawn_again = 0;  ///< Runs of complete replicates that left their points.
-  ReplicatedMean within_objectives;   ///< Share of runs; one without an estimate is none.
+  ReplicatedMean within_objectives;   ///< Share of runs; one without an estimate misses them.
   std::vector<ReplicatedQuantity> quantities;  ///< Of completed runs; empty without any.
 };
 
@@ -52,7 +56,8 @@ inline constexpr std::uint64_t num_hits_of_interval = 20;
 /// Least standard deviation of the number of such runs in a replicate that makes an interval.
 inline constexpr double count_deviation_min = 0.5;
 
-/// Computes them from results in run order. Memory is fixed.
+/// Computes them from results in run order. Memory is fixed. A run that was given up is to be added
+/// as a lost one.
 class RunningReplicates {
  public:
   /// @param objectives  Of each quantity, SI.
@@ -77,14 +82,16 @@ class RunningReplicates {
     [[nodiscard]] ReplicatedMean share(std::uint64_t num_runs) const;
   };
   struct Quantity {
-    Mean magnitude, bias, mean_square, beyond;
+    Mean magnitude, bias, mean_square, beyond, covered;
   };
+  void add_errors(const RunResult& result);
   void finish_replicate();
 
   std::vector<double> objectives_;
   ReplicateStatistics counts_;
   std::uint64_t replicate_ = 0;  ///< That is not finished yet; the others are of its runs.
   std::uint64_t num_runs_ = 0, num_estimated_ = 0, num_drawn_again_ = 0;
+  bool have_standard_errors_ = false;
   Mean within_;
   std::vector<Quantity> quantities_;
 };

@@ -119,8 +119,11 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
 
 Table standard_error_table(const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
-  // Draws that are not independent have neither intervals nor a standard error of the ratio.
-  const bool have_intervals = statistics.quantities.front().within.has_value();
+  // Draws that are not independent have no standard error of the ratio; those of a design may have
+  // intervals from its replicates.
+  const bool have_ratio_errors = statistics.quantities.front().squared_ratio_error.has_value();
+  const bool have_intervals = std::ranges::any_of(
+      statistics.quantities, [](const auto& of) { return of.within.has_value(); });
   constexpr const char* ratio = "error²/σ²";
   constexpr const char* within = "within 1.96 σ, %";
   Table table{.id = "standard-error-table",
@@ -132,24 +135,22 @@ Table standard_error_table(const StandardErrorStatistics& statistics) {
                           {"mean", false, 9},
                           {"mean", false, 10, ratio, true}},
               .notes = {"honest ones have a ratio of 1, and 95 % of the errors within"}};
-  if (have_intervals) table.columns.push_back({"±", false, 9, ratio});
+  if (have_ratio_errors) table.columns.push_back({"±", false, 9, ratio});
   table.columns.push_back({"runs", false, have_intervals ? 9U : 18U, within, true});
   if (have_intervals) {
     table.columns.insert(table.columns.end(),
                          {{"from", false, 9, within}, {"to", false, 9, within}});
-    table.notes.back() += "; from, to: 95 % interval";
+    if (have_ratio_errors) table.notes.back() += "; from, to: 95 % interval";
+    if (!have_ratio_errors) table.notes.emplace_back("from, to: 95 % interval from replicates");
   }
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
     const Quantity& quantity = quantity_of(statistic);
     Row row{quantity.symbol, unit_cell(quantity),
             figure_cell(statistic.mean, quantity.display_scale),
             figure_cell(statistic.squared_ratio)};
-    if (have_intervals) row.push_back(figure_cell(*statistic.squared_ratio_error));
+    if (have_ratio_errors) row.push_back(figure_cell(*statistic.squared_ratio_error));
     row.push_back(figure_cell(share_within(statistic), 0.01));
-    if (have_intervals) {
-      row.push_back(figure_cell(statistic.within->lower, 0.01));
-      row.push_back(figure_cell(statistic.within->upper, 0.01));
-    }
+    if (have_intervals) add_ends(statistic.within, 0.01, row);
     table.rows.push_back(std::move(row));
   }
   if (!statistics.fit.empty()) table.notes.push_back(fit_sentence(statistics.fit));

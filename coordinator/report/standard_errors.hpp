@@ -22,9 +22,10 @@ struct StandardErrorStatistic {
   double mean = 0.0;           ///< Of the standard errors, SI.
   double squared_ratio = 0.0;  ///< Mean of error² over the mean of the standard errors' squares.
   std::optional<double> squared_ratio_error;  ///< Its standard error.
-  std::uint64_t num_within = 0;    ///< Runs whose |error| is within normal_95 standard errors.
-  std::optional<Interval> within;  ///< Of their share among all draws, 95 %.
-  Histogram pulls;                 ///< Of error / standard error.
+  std::uint64_t num_within = 0;  ///< Runs whose |error| is within normal_95 standard errors.
+  /// Of their share among all draws, 95 %; of a sampling design from its replicates.
+  std::optional<Interval> within;
+  Histogram pulls;  ///< Of error / standard error.
 };
 
 /// Half the width of the interval, in standard deviations, that holds 95 % of a normal law.
@@ -58,7 +59,7 @@ class RunningStandardErrors {
   std::vector<double> fit_;
 };
 
-/// No rows without standard errors; no columns of intervals without those.
+/// No rows without standard errors; no columns of intervals if no quantity has one.
 [[nodiscard]] Table standard_error_table(const StandardErrorStatistics& statistics);
 
 /// Error over standard error of each quantity beside the normal law that it should follow; nothing

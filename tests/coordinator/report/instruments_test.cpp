@@ -21,14 +21,14 @@ const std::vector<double>& objectives() {
   return all;
 }
 
-/// Instruments of two runs: one with both, one with a lost one, one with one that was given up, and
-/// one that is not finished.
+/// Instruments of two runs: one with both, two with a lost one, and one that is not finished.
 InstrumentStatistics with_missing_runs() {
-  RunningInstruments running(objectives(), 2, {{RunIndex{4}, 1}});
+  RunningInstruments running(objectives(), 2);
   running.add(test::result_off_by(0, -1.0));
   running.add(test::result_off_by(1, 1.0));
   running.add(test::result_off_by(2, 0.5));
   running.add(test::result_of(3, RunStatus::lost));
+  running.add(test::result_of(4, RunStatus::lost));
   running.add(test::result_off_by(5, 0.5));
   running.add(test::result_off_by(6, 0.5));
   return running.statistics();
@@ -70,7 +70,7 @@ TEST(Instruments, LeaveAnInstrumentWithARunWithoutAnEstimateOutOfVariances) {
 }
 
 TEST(Instruments, SayThatNoneIsComplete) {
-  RunningInstruments running(objectives(), 3, {});
+  RunningInstruments running(objectives(), 3);
   running.add(test::result_off_by(0, 1.0));
   const InstrumentStatistics statistics = running.statistics();
   EXPECT_THAT(terminal_text(variance_table(statistics), {}),
@@ -81,7 +81,7 @@ TEST(Instruments, SayThatNoneIsComplete) {
 
 TEST(Instruments, SayHowOftenTheWorstOnesMeetAllObjectives) {
   const auto text_of = [](const std::vector<double>& pulls) {
-    RunningInstruments running(objectives(), 2, {});
+    RunningInstruments running(objectives(), 2);
     for (std::size_t run = 0; run < pulls.size(); ++run) {
       running.add(test::result_off_by(run, pulls[run]));
     }
@@ -97,7 +97,7 @@ TEST(Instruments, SayHowOftenTheWorstOnesMeetAllObjectives) {
 }
 
 TEST(Instruments, HaveTablesThatFitATerminal) {
-  RunningInstruments running(objectives(), 2, {});
+  RunningInstruments running(objectives(), 2);
   for (std::uint64_t run = 0; run < 40; ++run) {
     const auto instrument = static_cast<double>(run / 2 % 7);
     running.add(

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
@@ -74,7 +75,7 @@ TEST(Replicates, LeaveOutTheOneThatIsNotFinishedYet) {
   EXPECT_FALSE(statistics.quantities.front().bias.interval);
   EXPECT_THAT(terminal_text(replicate_table(statistics)),
               AllOf(HasSubstr("7 complete replicates of 4 runs (campaign.design = \"sobol\")"),
-                    HasSubstr("left out, as a run has no result: replicate 4, 8"),
+                    HasSubstr("left out, as a run is not finished yet: replicate 4, 8"),
                     HasSubstr("an interval needs 8 replicates")));
   EXPECT_THAT(replicate_table(replicates_of(3)).rows, IsEmpty());
   EXPECT_THAT(replicate_table(replicates_of(0)).rows, IsEmpty());
@@ -95,7 +96,7 @@ TEST(Replicates, StateNoIntervalOfSharesThatHardlyDiffer) {
   }
 }
 
-TEST(Replicates, CountRunsWithoutAnEstimateAsMissesAlone) {
+TEST(Replicates, CountRunsWithoutAnEstimateAsBeyondEveryObjective) {
   RunningReplicates running(test::campaign_of(1).objectives(), of_four);
   for (std::uint64_t run = 0; run < 4; ++run) {
     RunResult result = run_off_by(run, 0.25 * static_cast<double>(run));
@@ -110,8 +111,96 @@ TEST(Replicates, CountRunsWithoutAnEstimateAsMissesAlone) {
   EXPECT_EQ(statistics.num_estimated, 7U);
   EXPECT_EQ(statistics.num_drawn_again, 1U);
   EXPECT_NEAR(statistics.within_objectives.mean, 7.0 / 8.0, 1e-12);
+  EXPECT_NEAR(statistics.quantities.front().beyond.mean, 1.0 / 8.0, 1e-12);
+  EXPECT_FALSE(statistics.quantities.front().covered);
+  EXPECT_THAT(terminal_text(replicate_table(statistics)),
+              HasSubstr("1 run without an estimate is left out of the means of its replicate\n"));
   const double objective = test::campaign_of(1).objectives().front();
   EXPECT_NEAR(statistics.quantities.front().bias.mean / objective, 0.5 * (1.0 / 3.0), 1e-12);
+}
+
+/// In replicate r the standard errors cover 4 − r mod 3 of the errors.
+RunResult covered_in_part(std::uint64_t run) {
+  return test::result_off_by(run, run % 4 < run / 4 % 3 ? -3.0 : 1.0);
+}
+
+// 40 replicates: 14 shares of 1, 13 of ¾ and 13 of ½. Student's law with 39 degrees: 2.02269.
+TEST(Replicates, MakeTheIntervalOfWhatStandardErrorsCover) {
+  RunningReplicates running(test::campaign_of(1).objectives(), of_four);
+  for (std::uint64_t run = 0; run < 160; ++run) {
+    running.add(covered_in_part(run));
+  }
+  const ReplicateStatistics statistics = running.statistics();
+  const double mean = (14.0 + 13.0 * 0.75 + 13.0 * 0.5) / 40.0;
+  const double squares = 14.0 * (1.0 - mean) * (1.0 - mean) + 13.0 * (0.75 - mean) * (0.75 - mean) +
+                         13.0 * (0.5 - mean) * (0.5 - mean);
+  const double half_width = 2.022690920036708 * std::sqrt(squares / 39.0 / 40.0);
+  for (const ReplicatedQuantity& of : statistics.quantities) {
+    ASSERT_TRUE(of.covered && of.covered->interval);
+    EXPECT_NEAR(of.covered->mean, mean, 1e-12);
+    EXPECT_NEAR(of.covered->interval->lower, mean - half_width, 1e-9);
+    EXPECT_NEAR(of.covered->interval->upper, mean + half_width, 1e-9);
+  }
+}
+
+using ReadGroups = test::StoreTest;
+
+/// Reads results of the campaign in which runs 1, 6 and 7 of 8 were given up, and the others are
+/// off by a tenth of their objectives.
+ReadResults with_given_up(const std::filesystem::path& file, const MicroscopeCampaign& campaign) {
+  Store store = Store::create(file, campaign, canonical_definition(campaign));
+  std::vector<Entry> entries{test::worker_1()};
+  for (const std::uint64_t run : {0U, 2U, 3U, 4U, 5U}) {
+    Delivery delivery = test::delivery_of(run);
+    delivery.result = test::result_off_by(run, 1.0);
+    entries.emplace_back(delivery);
+  }
+  for (const std::uint64_t run : {1U, 6U, 7U}) entries.emplace_back(GivenUpRun{.run = {run}});
+  store.write(entries);
+  return read_results(store, campaign);
+}
+
+TEST_F(ReadGroups, CountARunOfAReplicateThatWasGivenUpAsLost) {
+  MicroscopeCampaign campaign = test::campaign_of(8);
+  campaign.design = of_four;
+  const ReplicateStatistics statistics = *with_given_up(file(), campaign).replicates;
+  EXPECT_EQ(statistics.num_replicates, 2U);
+  EXPECT_EQ(statistics.num_incomplete, 0U);
+  EXPECT_EQ(statistics.num_estimated, 5U);
+  EXPECT_NEAR(statistics.within_objectives.mean, 5.0 / 8.0, 1e-12);
+  EXPECT_NEAR(statistics.quantities.front().beyond.mean, 3.0 / 8.0, 1e-12);
+}
+
+TEST_F(ReadGroups, GiveTheTableOfStandardErrorsItsInterval) {
+  MicroscopeCampaign campaign = test::campaign_of(160);
+  campaign.design = of_four;
+  Store store = Store::create(file(), campaign, canonical_definition(campaign));
+  std::vector<Entry> entries{test::worker_1()};
+  for (std::uint64_t run = 0; run < 160; ++run) {
+    Delivery delivery = test::delivery_of(run);
+    delivery.result = covered_in_part(run);
+    entries.emplace_back(delivery);
+  }
+  store.write(entries);
+  const ReadResults results = read_results(store, campaign);
+  const StandardErrorStatistic& of = results.standard_errors.quantities.front();
+  const auto& covered = results.replicates->quantities.front().covered;
+  EXPECT_FALSE(of.squared_ratio_error);
+  ASSERT_TRUE(of.within);
+  EXPECT_EQ(of.within->lower, covered->interval->lower);
+  EXPECT_EQ(of.within->upper, covered->interval->upper);
+  EXPECT_THAT(terminal_text(standard_error_table(results.standard_errors)),
+              AllOf(HasSubstr("from, to: 95 % interval from replicates\n"), Not(HasSubstr("±"))));
+}
+
+TEST_F(ReadGroups, CountARunOfAnInstrumentThatWasGivenUpAsLost) {
+  MicroscopeCampaign campaign = test::campaign_of(8);
+  campaign.realisations = 2;
+  const InstrumentStatistics statistics = *with_given_up(file(), campaign).instruments;
+  EXPECT_EQ(statistics.num_instruments, 4U);
+  EXPECT_EQ(statistics.num_incomplete, 0U);
+  EXPECT_EQ(statistics.num_not_estimated, 2U);
+  EXPECT_DOUBLE_EQ(statistics.mixed.share, 5.0 / 8.0);
 }
 
 }  // namespace
