@@ -27,14 +27,19 @@ double difference(double a, double b) { return a == b ? 0.0 : a - b; }
 class Exchanges {
  public:
   Exchanges(const AllocationRule& rule, const std::function<double(std::span<const int>)>& value,
-            std::vector<int>& steps)
-      : rule_(rule), value_(value), steps_(steps), best_(value(steps)), slopes_(steps.size()) {}
+            const std::function<bool()>& is_stopped, std::vector<int>& steps)
+      : rule_(rule),
+        value_(value),
+        is_stopped_(is_stopped),
+        steps_(steps),
+        best_(value(steps)),
+        slopes_(steps.size()) {}
 
   /// Exchanges so many steps between two parts for as long as that is a gain; false if it is none
-  /// for any two.
+  /// for any two, or if the search is stopped.
   bool make(int count) {
     if (try_exchange(count)) return true;
-    if (are_slopes_new_) return false;
+    if (are_slopes_new_ || is_stopped_()) return false;
     for (std::size_t i = 0; i < steps_.size(); ++i) slopes_[i] = slopes_of(i);
     are_slopes_new_ = true;
     return try_exchange(count);
@@ -83,7 +88,7 @@ class Exchanges {
 
   /// Exchanges steps if that is a gain.
   bool gain(std::size_t from, std::size_t to, int count) {
-    if (!is_possible(from, to, count)) return false;
+    if (!is_possible(from, to, count) || is_stopped_()) return false;
     move(from, to, count);
     const double value = value_(steps_);
     if (value > best_) {
@@ -101,6 +106,7 @@ class Exchanges {
 
   const AllocationRule& rule_;
   const std::function<double(std::span<const int>)>& value_;
+  const std::function<bool()>& is_stopped_;
   std::vector<int>& steps_;
   double best_;
   std::vector<Slopes> slopes_;
@@ -110,7 +116,8 @@ class Exchanges {
 }  // namespace
 
 std::vector<int> allocate(std::size_t num_parts, const AllocationRule& rule,
-                          const std::function<double(std::span<const int>)>& value) {
+                          const std::function<double(std::span<const int>)>& value,
+                          const std::function<bool()>& is_stopped) {
   const auto count = static_cast<std::int64_t>(num_parts);
   if (count < 1 || rule.minimum < 1 || rule.num_steps < count * rule.minimum) {
     throw InvalidArgument(fmt::format("{} steps are fewer than {} for each of {} sessions",
@@ -125,7 +132,7 @@ std::vector<int> allocate(std::size_t num_parts, const AllocationRule& rule,
   for (int i = 0; i < rule.num_steps - each * static_cast<int>(count); ++i) {
     ++steps[static_cast<std::size_t>(i)];
   }
-  Exchanges exchanges(rule, value, steps);
+  Exchanges exchanges(rule, value, is_stopped, steps);
   for (int exchanged = std::max(1, rule.num_steps / 4); exchanged > 0; exchanged /= 2) {
     while (exchanges.make(exchanged)) {
     }

@@ -174,5 +174,27 @@ TEST(Allocation, RefusesMoreStepsThanTheMaximumHolds) {
   }
 }
 
+// Every exchange is a gain, so that an earlier end costs value and never the rule.
+TEST(Allocation, IsTheBestSoFarWhenItIsStopped) {
+  const AllocationRule rule{.num_steps = 100, .minimum = 2};
+  const Value value = [](Steps n) {
+    const std::array<double, 4> variances{1.0, 4.0, 9.0, 256.0};
+    double sum = 0.0;
+    for (std::size_t i = 0; i < n.size(); ++i) sum -= variances[i] / n[i];
+    return sum;
+  };
+  double before = value(std::vector<int>(4, 25));
+  EXPECT_EQ(allocate(4, rule, value, [] { return true; }), std::vector<int>(4, 25));
+  for (int num_asked = 1; num_asked < 200; ++num_asked) {
+    int left = num_asked;
+    const std::vector<int> found = allocate(4, rule, value, [&left] { return left-- <= 0; });
+    EXPECT_EQ(std::accumulate(found.begin(), found.end(), 0), rule.num_steps);
+    EXPECT_GE(std::ranges::min(found), rule.minimum);
+    EXPECT_GE(value(found), before);
+    before = value(found);
+  }
+  EXPECT_EQ(before, value(allocate(4, rule, value)));
+}
+
 }  // namespace
 }  // namespace proofmass
