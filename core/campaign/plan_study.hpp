@@ -62,6 +62,9 @@ class PlanStudy {
   /// Runs whose loops were simulated, with their noise.
   [[nodiscard]] virtual std::size_t num_probed() const = 0;
 
+  /// What makes the standard error of a quantity smaller, as a noun: `longer sessions`.
+  [[nodiscard]] virtual std::string remedy(std::size_t quantity) const = 0;
+
   /// The bound if the sessions had these lengths.
   /// @param num_steps  Of each session, ≥ 1.
   [[nodiscard]] virtual PlanBound bound(std::span<const int> num_steps) const = 0;

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -17,11 +17,13 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/shared_options.hpp"
+#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/campaign/allocation.hpp"
 #include "core/campaign/plan_study.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -46,11 +48,14 @@ struct Planned {
   std::size_t num_instruments;
   std::size_t num_probed;
   std::string method;
+  std::vector<std::string> remedies;  ///< Of each quantity, see PlanStudy::remedy().
 };
 
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
   const int in_all = std::accumulate(num_steps.begin(), num_steps.end(), 0);
   PlanBound bound = study.bound(num_steps);
+  std::vector<std::string> remedies;
+  for (std::size_t i = 0; i < bound.misses.size(); ++i) remedies.push_back(study.remedy(i));
   return {.sessions = study.session_names(),
           .num_steps = std::move(num_steps),
           .num_steps_in_all = in_all,
@@ -58,7 +63,8 @@ Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<in
           .objectives = campaign.objectives(),
           .num_instruments = study.num_instruments(),
           .num_probed = study.num_probed(),
-          .method = study.method()};
+          .method = study.method(),
+          .remedies = std::move(remedies)};
 }
 
 /// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing.
@@ -93,14 +99,11 @@ void add_losses(const Planned& plan, Table& table) {
 
 /// Names the parameters whose objectives are small against what the sessions tell of them.
 void add_undetermined(const Planned& plan, Table& table) {
-  std::vector<std::string_view> symbols;
   for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
     if (plan.bound.standard_errors[i] <= plan.objectives[i]) continue;
-    symbols.push_back(model().results().quantities[i].symbol);
+    table.notes.push_back(fmt::format("σ of {} is larger than the objective; {} would reduce it",
+                                      model().results().quantities[i].symbol, plan.remedies[i]));
   }
-  if (symbols.empty()) return;
-  table.notes.push_back(
-      fmt::format("σ is larger than the objective of {}", fmt::join(symbols, ", ")));
 }
 
 Table bound_table(const Planned& plan) {
@@ -195,8 +198,8 @@ std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& 
   throw UsageError(fmt::format("{}: campaigns of this model have no bound", options.file.string()));
 }
 
-/// The lengths of the sessions with which the goal is reached best.
-std::vector<int> allocated(const PlanOptions& options, const PlanStudy& study) {
+/// What is to be allocated. @throws UsageError if it cannot be, or no allocation is better.
+AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) {
   const std::vector<int> of_file = study.num_steps();
   const int in_all = options.num_steps.value_or(std::accumulate(of_file.begin(), of_file.end(), 0));
   const AllocationRule rule{
@@ -211,8 +214,7 @@ std::vector<int> allocated(const PlanOptions& options, const PlanStudy& study) {
   if (number < least) refuse("more", least, fmt::format("--minimum {}", rule.minimum));
   if (number > most) refuse("fewer", most, fmt::format("at most {}", rule.maximum));
   const PlanBound bound = study.bound(of_file);
-  const bool is_for_budget = options.goal == "budget";
-  if (is_for_budget && !bound.mean_budget) {
+  if (options.goal == "budget" && !bound.mean_budget) {
     throw UsageError("--for = budget (the campaign has no budget of errors)");
   }
   if (bound.num_lost() == study.num_probed()) {
@@ -220,9 +222,7 @@ std::vector<int> allocated(const PlanOptions& options, const PlanStudy& study) {
                                  options.file.string(), losses_text(bound, study.num_probed()),
                                  bound.losses.front().detail));
   }
-  const PlanGoal goal = is_for_budget ? PlanGoal::budget : PlanGoal::objectives;
-  return allocate(of_file.size(), rule,
-                  [&](std::span<const int> num_steps) { return study.merit(goal, num_steps); });
+  return rule;
 }
 
 /// Lost runs have an exit code of their own, because the figures are those of the others.
@@ -230,18 +230,34 @@ int exit_code_of(const Planned& plan) {
   return plan.bound.losses.empty() ? exit_done : exit_not_met;
 }
 
-int plan_campaign(const PlanOptions& options) {
-  const std::unique_ptr<const Campaign> campaign = read_campaign(options.file, options.overrides);
-  if (!options.new_file.empty()) check_new_file("--optimise", options.new_file);
-  const std::unique_ptr<const PlanStudy> study = study_of(options, *campaign);
-  if (options.new_file.empty()) {
-    const Planned plan = planned(*campaign, *study, study->num_steps());
-    print_plan(options, plan);
-    return exit_code_of(plan);
+/// An allocation, and whether a signal ended the search for a better one.
+struct Allocated {
+  std::vector<int> num_steps;
+  bool is_interrupted = false;
+};
+
+Allocated allocated(const PlanOptions& options, const PlanStudy& study) {
+  const AllocationRule rule = checked_rule(options, study);
+  const std::size_t num_sessions = study.num_steps().size();
+  const PlanGoal goal = options.goal == "budget" ? PlanGoal::budget : PlanGoal::objectives;
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  if (takes_escapes(stderr)) {
+    wire::say(
+        fmt::format("allocating {} {} to {} sessions; Ctrl-C ends with the best found so far\n",
+                    rule.num_steps, model().step_name(), num_sessions));
   }
-  const Planned plan = planned(*campaign, *study, allocated(options, *study));
+  const auto is_stopped = [&stop] { return stop != StopRequest::none; };
+  const auto merit = [&](std::span<const int> num_steps) { return study.merit(goal, num_steps); };
+  std::vector<int> num_steps = allocate(num_sessions, rule, merit, is_stopped);
+  return {.num_steps = std::move(num_steps), .is_interrupted = is_stopped()};
+}
+
+/// Writes the best allocation, or the best so far if a signal ends the search.
+int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStudy& study) {
+  Allocated best = allocated(options, study);
+  const Planned plan = planned(campaign, study, std::move(best.num_steps));
   try {
-    wire::write_whole_file("--optimise", options.new_file, study->campaign_file(plan.num_steps),
+    wire::write_whole_file("--optimise", options.new_file, study.campaign_file(plan.num_steps),
                            wire::public_mode, wire::IfThere::keep);
   } catch (const ConfigError& error) {
     throw UsageError(
@@ -253,6 +269,18 @@ int plan_campaign(const PlanOptions& options) {
   if (options.format == OutputFormat::text) {
     print_lines(fmt::format("wrote {}\n", options.new_file.string()));
   }
+  if (!best.is_interrupted) return exit_code_of(plan);
+  wire::say("proofmass: interrupted; this is the best allocation found so far\n");
+  return exit_interrupted;
+}
+
+int plan_campaign(const PlanOptions& options) {
+  const std::unique_ptr<const Campaign> campaign = read_campaign(options.file, options.overrides);
+  if (!options.new_file.empty()) check_new_file("--optimise", options.new_file);
+  const std::unique_ptr<const PlanStudy> study = study_of(options, *campaign);
+  if (!options.new_file.empty()) return optimise(options, *campaign, *study);
+  const Planned plan = planned(*campaign, *study, study->num_steps());
+  print_plan(options, plan);
   return exit_code_of(plan);
 }
 
@@ -261,12 +289,13 @@ int plan_campaign(const PlanOptions& options) {
 void add_plan(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<PlanOptions>(
       app, chosen, "plan", "Predict the errors of a campaign, or plan it", plan_campaign);
-  command.footer(exit_codes_text({exit_not_met}));
+  command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_campaign_file(command, options.file);
   add_override_options(command, options.overrides);
-  CLI::Option* const optimise = command.add_option(
-      "--optimise", options.new_file,
-      "Allocate the time to the sessions as is best, and\nwrite the new campaign file");
+  CLI::Option* const optimise =
+      command.add_option("--optimise", options.new_file,
+                         "Allocate the time to the sessions as is best, and\nwrite the new "
+                         "campaign file; Ctrl-C ends the search\nwith the best found so far");
   optimise->type_name(campaign_file_type);
   const std::string steps(model().step_name());
   command

@@ -1,6 +1,7 @@
 #include "core/microscope/planning/plan_study.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include "core/math/instruction_set.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
+#include "core/microscope/planning/undetermined.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/run_health.hpp"
 #include "core/statistics/distribution.hpp"
@@ -233,6 +235,12 @@ class JointStudy final : public PlanStudy {
   [[nodiscard]] std::size_t num_instruments() const override { return instruments_.size(); }
   [[nodiscard]] std::size_t num_probed() const override { return probes_.size(); }
 
+  [[nodiscard]] std::string remedy(std::size_t quantity) const override {
+    const std::string_view what = what_determines(static_cast<Parameter>(quantity));
+    if (what.empty()) return "longer sessions";
+    return fmt::format("a session that {}, longer or with a larger amplitude", what);
+  }
+
   [[nodiscard]] PlanBound bound(std::span<const int> num_orbits) const override {
     const std::vector<ParameterArray> errors = standard_errors(num_orbits);
     PlanBound bound{.standard_errors = means(errors),
@@ -363,11 +371,26 @@ class JointStudy final : public PlanStudy {
       runs.push_back(run);
     }
     if (instruments_.empty()) throw Error("no bound: no instrument is accepted");
-    if (!std::ranges::all_of(means(standard_errors(measured_orbits_)), is_in_range)) {
-      throw Error(
-          "no bound: the sessions do not determine all parameters, or the loops are not stable");
+    const std::vector<ParameterArray> errors = standard_errors(measured_orbits_);
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (!std::ranges::all_of(errors[i], is_in_range)) refuse_undetermined(instruments_[i]);
     }
     return runs;
+  }
+
+  /// @throws ConfigError naming the parameters that the sessions do not determine, or Error.
+  [[noreturn]] void refuse_undetermined(const JointInformation& instrument) const {
+    const std::vector<double> factors(measured_orbits_.size(), 1.0);
+    const Eigen::MatrixXd information = instrument.information(factors);
+    if (!information.allFinite()) throw Error("no bound: the loops are not stable");
+    std::vector<std::string> texts;
+    for (const std::size_t unknown : undetermined_by(information)) {
+      if (unknown >= num_parameters) break;  // Nuisances have priors.
+      texts.push_back(fmt::format("{} by {}", microscope_results().quantities[unknown].symbol,
+                                  remedy(unknown)));
+    }
+    throw ConfigError("session", fmt::format("{} sessions", measured_orbits_.size()),
+                      fmt::format("must determine {}", fmt::join(texts, ", and ")));
   }
 
   MicroscopeCampaign campaign_;

@@ -11,8 +11,9 @@ namespace proofmass {
 /// has; the parts are its sessions. README.md explains how.
 ///
 /// @pre campaign.validate() passed.
-/// @throws ConfigError if `joint` cannot use the sessions, Error if no run's instrument leaves
-///         finite lines.
+/// @throws ConfigError if `joint` cannot use the sessions, or naming the parameters that they do
+/// not
+///         determine; Error if no instrument is accepted, or its lines are not finite.
 [[nodiscard]] std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign);
 
 }  // namespace proofmass

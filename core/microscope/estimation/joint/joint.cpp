@@ -352,14 +352,18 @@ JointInformation::JointInformation(const RunPhasors& records, const EstimationIn
   for (std::size_t i = 0; i < num_parameters; ++i) units_[i] = fit.unit(i);
 }
 
-ParameterArray JointInformation::standard_errors(std::span<const double> factors) const {
+Eigen::MatrixXd JointInformation::information(std::span<const double> factors) const {
   PROOFMASS_EXPECT(factors.size() == sessions_.size());
-  NormalMatrix matrix = beside_;
+  Eigen::MatrixXd matrix = beside_;
   for (std::size_t i = 0; i < factors.size(); ++i) matrix += factors[i] * sessions_[i];
+  return matrix;
+}
+
+ParameterArray JointInformation::standard_errors(std::span<const double> factors) const {
   // With the nuisances in front, the last rows of the factor are that of what the lines tell of the
   // parameters while the nuisances are free.
   constexpr auto num_wanted = static_cast<Eigen::Index>(num_parameters);
-  const NormalMatrix reversed = matrix.reverse();
+  const NormalMatrix reversed = information(factors).reverse();
   const Eigen::LLT<NormalMatrix> decomposition(reversed);
   ParameterArray errors;
   errors.fill(std::numeric_limits<double>::infinity());
@@ -452,36 +456,70 @@ RecordNeeds joint_needs(const Session& session) {
   return needs;
 }
 
-void check_joint(const std::vector<Session>& sessions) {
-  std::vector<std::string> lacks;
-  const auto require = [&](std::string_view what, const auto& is_it) {
-    for (const Session& session : sessions) {
-      if (std::ranges::any_of(session.excitations, is_it)) return;
-    }
-    lacks.push_back(fmt::format("one that {}", what));
+namespace {
+
+template <Axis axis>
+bool pushes(const Excitation& excitation) {
+  return excitation.kind == ExcitationKind::drag_free && excitation.axis == axis;
+}
+
+template <Axis axis>
+bool moves_apart_along(const Excitation& excitation) {
+  return moves_apart(excitation) && excitation.axis == axis;
+}
+
+bool turns_about_z(const Excitation& excitation) {
+  return excitation.kind == ExcitationKind::attitude && excitation.axis == Axis::z;
+}
+
+bool moves_one_along_x(const Excitation& excitation) {
+  return excitation.kind == ExcitationKind::test_mass && tells_of_squares(excitation);
+}
+
+/// An excitation that some session must have, and the parameters for which it must.
+struct Need {
+  std::string_view what;
+  bool (*is_it)(const Excitation&);
+  std::array<Parameter, 2> parameters;  ///< Equal if it is one.
+};
+
+constexpr std::array needs{
+    Need{"pushes along x", pushes<Axis::x>, {Parameter::a_d11_prime, Parameter::a_d11_prime}},
+    Need{"pushes along y", pushes<Axis::y>, {Parameter::a_d12, Parameter::a_d12}},
+    Need{"pushes along z", pushes<Axis::z>, {Parameter::a_d13, Parameter::a_d13}},
+    Need{"turns about z", turns_about_z, {Parameter::a_c11_delta_y, Parameter::a_c11_delta_y}},
+    Need{"moves masses in opposition along y",
+         moves_apart_along<Axis::y>,
+         {Parameter::a_c12, Parameter::a_c12}},
+    Need{"moves masses in opposition along z",
+         moves_apart_along<Axis::z>,
+         {Parameter::a_c13, Parameter::a_c13}},
+    Need{"moves one mass along x", moves_one_along_x, {Parameter::k2d, Parameter::k2c}}};
+
+}  // namespace
+
+std::string_view what_determines(Parameter parameter) {
+  const auto is_for = [&](const Need& need) {
+    return std::ranges::find(need.parameters, parameter) != need.parameters.end();
   };
+  const auto* const need = std::ranges::find_if(needs, is_for);
+  return need == needs.end() ? std::string_view() : need->what;
+}
+
+void check_joint(const std::vector<Session>& sessions) {
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     if (sessions[i].spin_rate_rad_s == 0.0) continue;
     throw ConfigError(fmt::format("session[{}].spin_rate_rad_s", i),
                       fmt::format("{}", sessions[i].spin_rate_rad_s),
                       "estimation.method = \"joint\" needs 0");
   }
-  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
-    require(fmt::format("pushes along {}", names_of(axis)[index(axis)]),
-            [axis](const Excitation& e) {
-              return e.kind == ExcitationKind::drag_free && e.axis == axis;
-            });
+  std::vector<std::string> lacks;
+  for (const Need& need : needs) {
+    const bool is_met = std::ranges::any_of(sessions, [&](const Session& session) {
+      return std::ranges::any_of(session.excitations, need.is_it);
+    });
+    if (!is_met) lacks.push_back(fmt::format("one that {}", need.what));
   }
-  require("turns about z", [](const Excitation& e) {
-    return e.kind == ExcitationKind::attitude && e.axis == Axis::z;
-  });
-  for (const Axis axis : {Axis::y, Axis::z}) {
-    require(fmt::format("moves masses in opposition along {}", names_of(axis)[index(axis)]),
-            [axis](const Excitation& e) { return moves_apart(e) && e.axis == axis; });
-  }
-  require("moves one mass along x", [](const Excitation& e) {
-    return e.kind == ExcitationKind::test_mass && tells_of_squares(e);
-  });
   if (lacks.empty()) return;
   throw ConfigError("session",
                     fmt::format("{} session{}", sessions.size(), sessions.size() == 1 ? "" : "s"),

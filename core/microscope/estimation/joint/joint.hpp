@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "core/microscope/estimation/joint/joint_model.hpp"
@@ -30,6 +31,10 @@ class JointInformation {
   /// is in proportion to the length of the record.
   [[nodiscard]] ParameterArray standard_errors(std::span<const double> factors) const;
 
+  /// The normal matrix of the same: the unknowns in the order of Unknown, each in a unit of its
+  /// own.
+  [[nodiscard]] Eigen::MatrixXd information(std::span<const double> factors) const;
+
  private:
   std::vector<Eigen::MatrixXd> sessions_;  ///< Normal matrices, in `units_`.
   Eigen::MatrixXd beside_;                 ///< Of priors, and of what no session's lines tell.
@@ -39,6 +44,10 @@ class JointInformation {
 /// 2 f_orb, the line of each angular and each drag-free excitation, 2 f of what is shaken along X,
 /// and f ± 2 f_orb of masses that move in opposition along Y or Z.
 [[nodiscard]] RecordNeeds joint_needs(const Session& session);
+
+/// What a session does that determines a parameter: `pushes along y`. Empty for the two that every
+/// session determines if it is long enough.
+[[nodiscard]] std::string_view what_determines(Parameter parameter);
 
 /// @throws ConfigError if a session spins, or if no session has an excitation that a parameter
 ///         needs.
