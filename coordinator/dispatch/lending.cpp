@@ -479,8 +479,7 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
               .fields = {{"runs", campaign.definition->num_runs - num_elsewhere},
                          {"given_up", campaign.given_up.size()},
                          {"duplicates", campaign.num_duplicates},
-                         {"compared", campaign.num_audited},
-                         {"mismatches", campaign.num_mismatches}}},
+                         {"compared", campaign.num_audited}}},
              id);
   for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
 }

@@ -309,14 +309,13 @@ void CampaignService::review_notices(CampaignId id, Served& served) {
     const bool has_failed = wire::has_failed(record_of(id).status);
     tell(served, has_failed ? "most of its runs were given up" : "");
   }
-  const bool has_failed = !campaign.storage_failure.empty();
-  if (has_failed && !served.is_storage_failure_told) tell(served, campaign.storage_failure);
-  served.is_storage_failure_told = has_failed;
-  if (campaign.num_mismatches > served.num_mismatches_told) {
-    tell(served,
-         fmt::format("{} runs were computed again with another result", campaign.num_mismatches));
+  std::string trouble = campaign.storage_failure;
+  if (trouble.empty() && campaign.num_mismatches > 0) {
+    trouble =
+        fmt::format("{} runs were computed again with another result", campaign.num_mismatches);
   }
-  served.num_mismatches_told = campaign.num_mismatches;
+  if (!trouble.empty() && trouble != served.trouble_told) tell(served, trouble);
+  served.trouble_told = std::move(trouble);
 }
 
 void CampaignService::tell(const Served& served, std::string failure) const {

@@ -141,8 +141,7 @@ class CampaignService {
     bool is_at_rest = false;                ///< Nothing is expected: the log is folded in.
     // What ServiceConfig::on_notice was called with.
     bool is_end_told = false;
-    bool is_storage_failure_told = false;
-    std::uint64_t num_mismatches_told = 0;
+    std::string trouble_told = {};             ///< Empty if all is well.
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See take_hold().

@@ -73,7 +73,7 @@ void write_campaigns(const ServiceSnapshot& service, MetricWriter& writer) {
       writer.add(campaign_label(campaign->status), value(*campaign));
     }
   };
-  for (const CampaignCounter& counter : campaign_counters) {
+  for (const CampaignCounter& counter : campaign_counters()) {
     write(counter.metric, counter.help, [&](const CampaignRecord& of) {
       return static_cast<double>((of.status.*counter.count)());
     });

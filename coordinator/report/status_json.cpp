@@ -33,7 +33,7 @@ StatusJson campaign_object(const proto::CampaignStatus& campaign) {
   StatusJson json{{"name", campaign.name()},
                   {"phase", wire::phase_name(campaign)},
                   {"priority", campaign.priority()}};
-  for (const CampaignCounter& counter : campaign_counters) {
+  for (const CampaignCounter& counter : campaign_counters()) {
     json[std::string(counter.name)] = (campaign.*counter.count)();
   }
   json.update({{"rate_hz", campaign.rate_hz()},

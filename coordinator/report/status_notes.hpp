@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,29 +22,9 @@ struct CampaignCounter {
   std::string_view help;    ///< What `/metrics` says of it.
 };
 
-/// All of them: JSON and metrics have what stands here. A new one needs its field in client.proto,
-/// a row here, its count in CampaignState, and CampaignService::record_of().
-inline constexpr std::array campaign_counters{
-    CampaignCounter{"num_runs", &proto::CampaignStatus::num_runs, "proofmass_runs_wanted",
-                    "Runs that the campaign is to have."},
-    CampaignCounter{"num_done", &proto::CampaignStatus::num_done, "proofmass_runs_finished_total",
-                    "Runs whose results are on disk."},
-    CampaignCounter{"num_without_estimate", &proto::CampaignStatus::num_without_estimate,
-                    "proofmass_runs_without_estimate_total",
-                    "Runs that ended without an estimate since the coordinator started."},
-    CampaignCounter{"num_given_up", &proto::CampaignStatus::num_given_up, "proofmass_runs_given_up",
-                    "Runs that crashed too many workers."},
-    CampaignCounter{"num_lent", &proto::CampaignStatus::num_lent, "proofmass_runs_lent",
-                    "Runs that workers hold."},
-    CampaignCounter{"num_duplicates", &proto::CampaignStatus::num_duplicates,
-                    "proofmass_results_duplicate_total", "Results that were there already."},
-    CampaignCounter{"num_audited", &proto::CampaignStatus::num_audited,
-                    "proofmass_results_compared_total",
-                    "Results that were compared with a second computation."},
-    CampaignCounter{"num_mismatches", &proto::CampaignStatus::num_mismatches,
-                    "proofmass_results_different_total",
-                    "Compared results that differ; must be 0."},
-};
+/// All of them: JSON and metrics have what this has. A new one needs its field in client.proto, a
+/// row in status_notes.cpp, its count in CampaignState, and CampaignService::record_of().
+[[nodiscard]] std::span<const CampaignCounter> campaign_counters();
 
 /// `1 run`, `2 runs`.
 [[nodiscard]] std::string counted(std::uint64_t count, std::string_view thing);

@@ -235,7 +235,7 @@ def storm(fleet, num_runs):
             "all_connected_after_s": round(connected_at - killed_at, 2),
             "finished_after_s": round(time.monotonic() - killed_at, 2),
             "lost": lost + fleet.num_events("worker_gone"),
-            "delivered_twice": finished["duplicates"], "mismatches": finished["mismatches"],
+            "delivered_twice": finished["duplicates"], "mismatches": fleet.num_events("result_mismatch"),
             "sockets_reset": fleet.num_events("sockets_reset"), **phase.figures()}
 
 

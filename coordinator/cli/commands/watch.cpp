@@ -14,6 +14,7 @@
 
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -24,9 +25,9 @@ namespace {
 std::string gist_of(const proto::CampaignStatus& campaign) {
   const std::uint64_t tenths =
       campaign.num_done() * 10 / std::max<std::uint64_t>(1, campaign.num_runs());
+  const auto num_troubles = std::ranges::count(notes_about(campaign), Tone::bad, &Remark::tone);
   return fmt::format("{} {} {} {} {}", static_cast<int>(campaign.phase()), tenths,
-                     campaign.num_given_up(), campaign.num_mismatches(),
-                     campaign.storage_failure());
+                     campaign.num_given_up(), num_troubles, campaign.storage_failure());
 }
 
 /// Campaigns that are over come last: they are the ones that a small screen leaves out.
