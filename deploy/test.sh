@@ -6,13 +6,18 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 selection=(--label-exclude '^long$')
+targets=(all)
 if [[ ${1:-} == --all ]]; then
   selection=()
+  targets+=(
+    unoptimised_recorded_bits_test proofmass_benchmarks proofmass_store_benchmark
+    proofmass_fuzz_corpus proofmass_fuzz_files
+  )
   shift
 fi
 
 "$root/deploy/install-deps.sh"
 cd "$root"
 cmake --preset release
-cmake --build --preset release
+cmake --build --preset release --target "${targets[@]}"
 exec ctest --preset release "${selection[@]}" "$@"

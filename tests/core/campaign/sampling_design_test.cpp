@@ -250,7 +250,7 @@ std::vector<double> replicate_means(const SamplingDesign& design, const KnownFun
   return means;
 }
 
-constexpr std::uint64_t repetitions = 2000, replicates_each = 16;
+constexpr std::uint64_t repetitions = 500, replicates_each = 16;
 
 double coverage(const std::vector<double>& means, double truth) {
   std::size_t num_covered = 0;
@@ -262,8 +262,8 @@ double coverage(const std::vector<double>& means, double truth) {
   return static_cast<double>(num_covered) / static_cast<double>(repetitions);
 }
 
-// 2,000 intervals of 16 replicates: the standard error of their coverage is 0.5 %, that of the mean
-// of all replicates 1/179 of one replicate's standard deviation.
+// 500 intervals of 16 replicates: the standard error of their coverage is 1 %, that of the mean of
+// all replicates 1/89 of one replicate's standard deviation.
 TEST(SamplingDesign, HasHonestIntervalsFromReplicates) {
   const std::vector<KnownFunction> functions{{"linear law", 10.5, linear_law},
                                              {"Ishigami's function", 3.5, ishigami},
@@ -278,7 +278,7 @@ TEST(SamplingDesign, HasHonestIntervalsFromReplicates) {
           of_all.standard_deviation / std::sqrt(static_cast<double>(means.size()));
       EXPECT_NEAR(of_all.mean, function.mean, 4.0 * standard_error)
           << function.name << " " << name_of(design.kind);
-      EXPECT_NEAR(coverage(means, function.mean), 0.95, 0.02)
+      EXPECT_NEAR(coverage(means, function.mean), 0.95, 0.04)
           << function.name << " " << name_of(design.kind);
     }
   }

@@ -202,10 +202,10 @@ TEST(ErrorChange, FindsAHeavierTail) {
 }
 
 // Without any change one is found in 5 % of all pairs of campaigns at most, whatever the law and
-// however few runs one has. Standard error of 1,000 repetitions 0.7 %; three of them are allowed.
+// however few runs one has. Standard error of 500 repetitions 1 %; three of them are allowed.
 TEST(ErrorChange, IsRarelyFoundWhereThereIsNone) {
-  for (const Case& one : {Case{100, 100, 1000}, Case{100, 500, 500}, Case{10, 250, 1000},
-                          Case{2, 250, 1000}, Case{50, 50, 1000}}) {
+  for (const Case& one : {Case{100, 100, 500}, Case{100, 500, 500}, Case{10, 250, 500},
+                          Case{2, 250, 500}, Case{50, 50, 500}}) {
     const Found normal = found_in(one, normal_error, normal_error);
     const Found product = found_in(one, product_error, product_error);
     print("none, normal", one, normal);

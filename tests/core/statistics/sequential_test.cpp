@@ -82,10 +82,9 @@ struct Fate {
 double binomial_probability(std::size_t k, std::uint64_t n, double p) {
   const auto runs = static_cast<double>(n);
   const auto hits = static_cast<double>(k);
-  return k == 0 ? binomial_at_most(0.0, runs, p)
-                : std::max(binomial_at_least(hits, runs, p) -
-                               (k < n ? binomial_at_least(hits + 1.0, runs, p) : 0.0),
-                           0.0);
+  const double misses = runs - hits;
+  return std::exp(std::lgamma(runs + 1.0) - std::lgamma(hits + 1.0) - std::lgamma(misses + 1.0) +
+                  hits * std::log(p) + misses * std::log1p(-p));
 }
 
 // Exact: the law of the exceedances among the undecided campaigns, carried from look to look.
