@@ -46,7 +46,7 @@ WITH_MOUNTS = ["unshare", "--mount", "--propagation", "private"]
 # Waits until a command succeeds.
 AWAIT = """await() {
   await_until=$(($(date +%s) + 100))
-  until eval "$1"; do
+  until eval "$1" 2>/dev/null; do
     [ $(date +%s) -lt $await_until ] || { echo "not within 100 s: $1"; return 1; }
     sleep 0.02
   done
