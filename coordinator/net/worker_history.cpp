@@ -25,7 +25,8 @@ void WorkerHistory::note_lent(CampaignId campaign, WorkerId id) {
                                        .name = worker.name,
                                        .host = worker.host_name,
                                        .process_id = worker.process_id,
-                                       .num_slots = worker.num_slots});
+                                       .num_slots = worker.num_slots,
+                                       .cards = worker.cards});
 }
 
 void WorkerHistory::note_closed(CampaignId campaign) {

@@ -131,14 +131,25 @@ Table execution_table(const Review& review) {
   return table;
 }
 
+/// Runs a second; a database keeps whole seconds, so that a short campaign has none.
+std::string rate_text(const HostShare& host) {
+  if (host.serving_s <= 0.0) return "unknown";
+  return figure_text(static_cast<double>(host.num_results) / host.serving_s);
+}
+
 Table host_table(const Review& review) {
-  Table table{.id = "machines",
-              .caption = "Machines",
-              .columns = {{"machine", true}, {"workers"}, {"results"}, {"core time"}}};
+  Table table{
+      .id = "machines",
+      .caption = "Machines",
+      .columns = {
+          {"machine", true}, {"cards", true}, {"workers"}, {"results"}, {"runs/s"}, {"core time"}}};
   for (const HostShare& host : review.execution.hosts) {
-    table.rows.push_back({host.host, std::to_string(host.num_workers),
-                          std::to_string(host.num_results), hours(host.compute_s)});
+    table.rows.push_back({host.host, host.cards.empty() ? "none" : host.cards,
+                          std::to_string(host.num_workers), std::to_string(host.num_results),
+                          rate_text(host), hours(host.compute_s)});
   }
+  table.notes.push_back(
+      "runs/s: results over the time from the first registration of a worker to the last result.");
   if (review.execution.num_hosts > review.execution.hosts.size()) {
     table.notes.push_back(fmt::format("The first {} of {} machines, by results.",
                                       review.execution.hosts.size(), review.execution.num_hosts));

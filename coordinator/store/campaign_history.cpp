@@ -84,14 +84,18 @@ std::vector<WorkerRecord> worker_records(const Database& database, const RecentA
 
 std::vector<HostShare> read_hosts(const Database& database) {
   Statement rows = database.prepare(
-      "SELECT host, count(*), sum(num_results), sum(compute_s) FROM worker GROUP BY host "
-      "ORDER BY sum(num_results) DESC, host LIMIT 20");
+      "SELECT host, count(*), sum(num_results), sum(compute_s),"
+      " ifnull(max(last_result_unix_s) - min(unixepoch(first_seen_utc)), 0),"
+      " ifnull(group_concat(DISTINCT nullif(cards, '')), '') "
+      "FROM worker GROUP BY host ORDER BY sum(num_results) DESC, host LIMIT 20");
   std::vector<HostShare> hosts;
   while (rows.step()) {
     hosts.push_back({.host = rows.text(0),
                      .num_workers = rows.count(1),
                      .num_results = rows.count(2),
-                     .compute_s = rows.real(3)});
+                     .compute_s = rows.real(3),
+                     .serving_s = rows.real(4),
+                     .cards = rows.text(5)});
   }
   return hosts;
 }

@@ -62,6 +62,7 @@ struct WorkerJoined {
   std::string host;
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
+  std::string cards{};  ///< `2 NVIDIA H100 80GB HBM3 (CUDA 13.0)`; empty: none.
 };
 
 /// A worker that is registered no more.
@@ -117,7 +118,10 @@ struct HostShare {
   std::string host;  ///< As it named itself.
   std::uint64_t num_workers = 0;
   std::uint64_t num_results = 0;
-  double compute_s = 0.0;  ///< Time of processor cores.
+  double compute_s = 0.0;  ///< Time of threads: a processor core's or a card's.
+  /// Time from the first registration of one of its workers to its last result, s; 0 without one.
+  double serving_s = 0.0;
+  std::string cards;  ///< As its workers say, each text once; empty: none.
 };
 
 /// Losses of one kind: runs that came back without a result, and were lent again.

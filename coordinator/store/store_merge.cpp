@@ -30,9 +30,9 @@ namespace {
 // A worker that is still there, as far as its part knows, is nobody that the whole waits for.
 constexpr std::string_view insert_worker_sql =
     "INSERT INTO worker (session, worker, host, process_id, num_slots, first_seen_utc, ended_utc,"
-    " end_reason) VALUES (nullif(?1, ''), ?2, ?3, ?4, ?5, ?6,"
+    " end_reason, cards) VALUES (nullif(?1, ''), ?2, ?3, ?4, ?5, ?6,"
     " coalesce(nullif(?7, ''), strftime('%Y-%m-%dT%H:%M:%SZ', 'now')),"
-    " coalesce(nullif(?8, ''), 'silent'))";
+    " coalesce(nullif(?8, ''), 'silent'), ?9)";
 
 constexpr std::string_view count_deliveries_sql =
     "UPDATE worker SET num_results = counted.num_results, compute_s = counted.compute_s,"
@@ -150,7 +150,7 @@ WorkerKeys MergeRows::add_workers(const Database& part) {
   WorkerKeys keys;
   Statement select = part.prepare(
       "SELECT worker_key, ifnull(session, ''), worker, host, process_id, num_slots, first_seen_utc,"
-      " ifnull(ended_utc, ''), ifnull(end_reason, '') FROM worker ORDER BY worker_key");
+      " ifnull(ended_utc, ''), ifnull(end_reason, ''), cards FROM worker ORDER BY worker_key");
   Statement find = whole_.prepare("SELECT worker_key FROM worker WHERE session = ?");
   Statement insert = whole_.prepare(insert_worker_sql);
   while (select.step()) {
@@ -161,7 +161,8 @@ WorkerKeys MergeRows::add_workers(const Database& part) {
       continue;
     }
     insert.run(select.text(1), select.text(2), select.text(3), select.optional_count(4),
-               select.optional_count(5), select.text(6), select.text(7), select.text(8));
+               select.optional_count(5), select.text(6), select.text(7), select.text(8),
+               select.text(9));
     keys.emplace(select.integer(0), whole_.last_row());
   }
   return keys;

@@ -55,13 +55,13 @@ void WorkerRows::write(const WorkerJoined& joined) {
   }
   database_
       .prepare(
-          "INSERT INTO worker (session, worker, host, process_id, num_slots) VALUES (?, ?, ?, ?, "
-          "?) "
+          "INSERT INTO worker (session, worker, host, process_id, num_slots, cards)"
+          " VALUES (?, ?, ?, ?, ?, ?) "
           "ON CONFLICT (session) DO UPDATE SET worker = excluded.worker, host = excluded.host,"
           " process_id = excluded.process_id, num_slots = excluded.num_slots,"
-          " ended_utc = NULL, end_reason = NULL")
+          " cards = excluded.cards, ended_utc = NULL, end_reason = NULL")
       .run(hexadecimal(joined.session.value), joined.name, joined.host, storable(joined.process_id),
-           joined.num_slots);
+           joined.num_slots, joined.cards);
 }
 
 void WorkerRows::write(const WorkerEnded& ended) {

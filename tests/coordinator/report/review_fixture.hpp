@@ -34,7 +34,7 @@ class ReviewTest : public StoreTest {
     const std::vector<double> objectives = campaign.objectives();
     std::vector<coordinator::Entry> entries;
     coordinator::WorkerJoined worker = worker_1();
-    worker.host = hostile_text;
+    worker.host = worker.cards = hostile_text;
     entries.emplace_back(worker);
     for (std::uint64_t run = 0; run < num_runs; ++run) {
       coordinator::Delivery delivery = delivery_of(run);

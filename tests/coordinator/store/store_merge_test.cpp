@@ -45,7 +45,11 @@ Delivery second_delivery_of(std::uint64_t run) {
 }
 
 WorkerJoined worker_2() {
-  return {.session = session_2, .name = "worker-2", .host = "node-2", .process_id = 7};
+  return {.session = session_2,
+          .name = "worker-2",
+          .host = "node-2",
+          .process_id = 7,
+          .cards = "1 A100"};
 }
 
 std::vector<Entry> entries_of(std::vector<Entry> entries, const std::vector<std::uint64_t>& runs,
@@ -73,9 +77,9 @@ TEST_F(StoreMerge, KeepsWhoComputedWhatAndWhen) {
                  "delivery.compute_s || ' ' || (received_unix_s < 2000), ', ') FROM delivery JOIN "
                  "worker USING (worker_key)"),
             "0 worker-1 1 0.5 1, 1 worker-1 1 0.5 1, 2 worker-2 3 0.25 0");
-  EXPECT_EQ(text("SELECT group_concat(worker || ' ' || num_results || ' ' || compute_s, ', ')"
-                 " FROM worker"),
-            "worker-1 2 1.0, worker-2 1 0.25");
+  EXPECT_EQ(text("SELECT group_concat(worker || ' ' || num_results || ' ' || compute_s || ' ' ||"
+                 " cards, ', ') FROM worker"),
+            "worker-1 2 1.0 , worker-2 1 0.25 1 A100");
   EXPECT_EQ(text("SELECT last_result_unix_s FROM worker WHERE worker = 'worker-1'"), "1001");
   // Nobody waits for a worker of a part.
   EXPECT_TRUE(Store::open_read_only(whole()).attached_sessions().empty());

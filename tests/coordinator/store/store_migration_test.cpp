@@ -56,7 +56,7 @@ class StoreMigration : public test::StoreTest {
 };
 
 // If the linker took the library's own files, there would be one version less.
-TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 11); }
+TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 12); }
 
 TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   make_older_file();
@@ -66,7 +66,7 @@ TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   EXPECT_THAT(store.finished_runs(),
               ElementsAre(RunRange{RunIndex{0}, 2}, RunRange{RunIndex{4}, 1}));
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.integer("PRAGMA user_version"), 11);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 12);
   EXPECT_EQ(
       database.text("SELECT group_concat(run_index || ' ' || worker || ' ' || attempt || ' ' || "
                     "d.compute_s || ' ' || received_unix_s, ';') "

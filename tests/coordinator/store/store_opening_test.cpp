@@ -305,10 +305,11 @@ class StoreExecution : public test::StoreTest {
   static constexpr wire::SessionId second_worker{2}, third_worker{3};
 
   StoreExecution() : store(create(100)) {
-    const auto worker = [](wire::SessionId session, const std::string& host) {
-      return WorkerJoined{.session = session, .name = "w", .host = host};
+    const auto worker = [](wire::SessionId session, const std::string& host,
+                           const std::string& cards = "") {
+      return WorkerJoined{.session = session, .name = "w", .host = host, .cards = cards};
     };
-    write({worker(session_1, "node-1"), worker(second_worker, "node-1"),
+    write({worker(session_1, "node-1", "2 A100"), worker(second_worker, "node-1", "2 A100"),
            worker(third_worker, "node-2")});
   }
   void write(const std::vector<Entry>& entries) { (void)store.write(entries); }
@@ -344,6 +345,9 @@ TEST_F(StoreExecution, SaysWhoComputedTheResultsAndWhen) {
   wrong.worker = third_worker;
   write({SecondDelivery{computed(0, third_worker, 1, 0.5)}, SecondDelivery{wrong}});
   test::change(file(), "UPDATE delivery SET received_unix_s = 86400 + 3600 * run_index");
+  test::change(file(),
+               "UPDATE worker SET first_seen_utc = '1970-01-02T00:00:10Z',"
+               " last_result_unix_s = 86420 + worker_key");
   const CampaignExecution execution = store.execution();
   EXPECT_EQ(execution.num_audited, 2U);
   EXPECT_EQ(execution.num_contradicting, 1U);
@@ -359,8 +363,11 @@ TEST_F(StoreExecution, SaysWhoComputedTheResultsAndWhen) {
   EXPECT_EQ(execution.hosts[0].num_workers, 2U);
   EXPECT_EQ(execution.hosts[0].num_results, 3U);
   EXPECT_EQ(execution.hosts[0].compute_s, 3.5);
+  EXPECT_EQ(execution.hosts[0].serving_s, 12.0);
+  EXPECT_EQ(execution.hosts[0].cards, "2 A100");
   EXPECT_EQ(execution.hosts[1].host, "node-2");
   EXPECT_EQ(execution.hosts[1].compute_s, 4.0);
+  EXPECT_EQ(execution.hosts[1].cards, "");
 }
 
 }  // namespace
