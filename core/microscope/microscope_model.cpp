@@ -1,5 +1,6 @@
 #include <array>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "core/error.hpp"
@@ -38,7 +39,12 @@ std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {
-  return {scenario.objectives.begin(), scenario.objectives.end()};
+  std::vector<double> objectives(scenario.objectives.begin(), scenario.objectives.end());
+  if (scenario.has_tests()) {
+    objectives.insert(objectives.end(), scenario.test_objectives.begin(),
+                      scenario.test_objectives.end());
+  }
+  return objectives;
 }
 
 std::int64_t MicroscopeCampaign::num_rounds_max() const {
@@ -58,7 +64,7 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
   const ParameterArray truth =
       true_parameters(*accepted.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
   draw.values.assign(accepted.values.begin(), accepted.values.end());
-  draw.truth.assign(truth.begin(), truth.end());
+  draw.truth = run_truth(scenario, truth, accepted.instrument->eotvos_parameter);
   return draw;
 }
 
@@ -70,8 +76,10 @@ Warner MicroscopeCampaign::warner() const {
   return [bounds = ShiftBounds(scenario)](const RunResult& result) {
     std::vector<Warning> warnings;
     if (result.health.empty()) return warnings;
-    for (const Shift& shift :
-         bounds.of(health_of(result.health), result.truth, result.standard_error)) {
+    // A test alone has standard errors where the calibration has none.
+    std::span<const double> errors = result.standard_error;
+    if (errors.size() < num_parameters) errors = {};
+    for (const Shift& shift : bounds.of(health_of(result.health), result.truth, errors)) {
       if (shift.part < warned_part) continue;
       warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
     }
@@ -93,6 +101,27 @@ ResultSchema with_budget(ResultSchema schema) {
   return schema;
 }
 
+/// Of a campaign whose sessions test, too.
+/// @param has_standard_errors  Whether the calibration has them; the test always does.
+ResultSchema with_test(bool has_standard_errors) {
+  ResultSchema schema = has_standard_errors ? results_of(estimation_methods()) : microscope_results();
+  schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
+                           test_quantities().end());
+  return with_budget(std::move(schema));
+}
+
+}  // namespace
+
+const ResultSchema& MicroscopeCampaign::results() const {
+  static const ResultSchema of_calibration = with_budget(results_of(estimation_methods()));
+  static const std::array<ResultSchema, 2> with_tests{with_test(false), with_test(true)};
+  if (!scenario.has_tests()) return of_calibration;
+  const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
+  return with_tests[has_errors ? 1 : 0];
+}
+
+namespace {
+
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -102,8 +131,8 @@ class MicroscopeModel final : public Model {
   }
 
   [[nodiscard]] const ResultSchema& results() const override {
-    static const ResultSchema results = with_budget(results_of(estimation_methods()));
-    return results;
+    static const MicroscopeCampaign nominal;
+    return nominal.results();
   }
 
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override {
