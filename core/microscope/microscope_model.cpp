@@ -37,6 +37,14 @@ std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
   return compare_definitions(*this, *second);
 }
 
+// With the columns of standard errors whatever the method is: databases of all campaigns have them.
+ResultSchema MicroscopeCampaign::results() const {
+  ResultSchema schema = results_of(estimation_methods());
+  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
+  schema.budget_level = budget_level();
+  return schema;
+}
+
 std::vector<double> MicroscopeCampaign::objectives() const {
   return {scenario.objectives.begin(), scenario.objectives.end()};
 }
@@ -87,12 +95,6 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   return drawn;
 }
 
-ResultSchema with_budget(ResultSchema schema) {
-  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
-  schema.budget_level = budget_level();
-  return schema;
-}
-
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -101,9 +103,14 @@ class MicroscopeModel final : public Model {
     return "Validates the in-flight calibration of drag-free accelerometers.";
   }
 
-  [[nodiscard]] const ResultSchema& results() const override {
-    static const ResultSchema results = with_budget(results_of(estimation_methods()));
-    return results;
+  [[nodiscard]] ResultSchema results_of(std::string_view /*definition*/,
+                                        std::string_view /*version*/) const override {
+    return hardy2013_campaign().results();
+  }
+
+  [[nodiscard]] std::span<const DataTableSchema> tables() const override {
+    static const std::array<DataTableSchema, 1> tables{environment_table_schema()};
+    return tables;
   }
 
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override {
