@@ -8,7 +8,6 @@
 
 #include "coordinator/report/report_tables.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -173,7 +172,7 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
 
 }  // namespace
 
-Table replicate_table(const ReplicateStatistics& statistics) {
+Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   constexpr const char* magnitude = "mean of |error|";
   constexpr const char* bias = "bias";
@@ -192,7 +191,7 @@ Table replicate_table(const ReplicateStatistics& statistics) {
                           {"to", false, 8, beyond}},
               .notes = replicate_notes(statistics)};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    const proofmass::Quantity& quantity = model().results().quantities[i];
+    const proofmass::Quantity& quantity = schema.quantities[i];
     const ReplicatedQuantity& of = statistics.quantities[i];
     const double scale = quantity.display_scale;
     Row row{quantity.symbol};
@@ -217,7 +216,7 @@ Json json_of(const ReplicatedMean& of) {
 
 }  // namespace
 
-nlohmann::ordered_json json_of(const ReplicateStatistics& statistics) {
+nlohmann::ordered_json json_of(const ResultSchema& schema, const ReplicateStatistics& statistics) {
   Json json{{"design", name_of(statistics.design.kind)},
             {"points", statistics.design.points},
             {"num_replicates", statistics.num_replicates},
@@ -229,7 +228,7 @@ nlohmann::ordered_json json_of(const ReplicateStatistics& statistics) {
             {"parameters", Json::array()}};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     const ReplicatedQuantity& of = statistics.quantities[i];
-    json["parameters"].push_back({{"parameter", model().results().quantities[i].name},
+    json["parameters"].push_back({{"parameter", schema.quantities[i].name},
                                   {"magnitude", json_of(of.magnitude)},
                                   {"bias", json_of(of.bias)},
                                   {"mean_square", json_of(of.mean_square)},

@@ -91,9 +91,11 @@ class RunningReplicates {
 
 /// Intervals with the replicate as their unit, and shares of runs. No rows without a completed run
 /// in a complete replicate.
-[[nodiscard]] Table replicate_table(const ReplicateStatistics& statistics);
+[[nodiscard]] Table replicate_table(const ResultSchema& schema,
+                                    const ReplicateStatistics& statistics);
 
 /// The same for programs.
-[[nodiscard]] nlohmann::ordered_json json_of(const ReplicateStatistics& statistics);
+[[nodiscard]] nlohmann::ordered_json json_of(const ResultSchema& schema,
+                                             const ReplicateStatistics& statistics);
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "core/error.hpp"
@@ -36,6 +39,22 @@ std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
   const auto* const second = dynamic_cast<const MicroscopeCampaign*>(&other);
   PROOFMASS_EXPECT(second != nullptr);
   return compare_definitions(*this, *second);
+}
+
+// With the columns of standard errors whatever the method is, as databases of all campaigns had them
+// from the first; where sessions test, of what has them, and the quantities of the test.
+ResultSchema MicroscopeCampaign::results() const {
+  const bool has_tests = scenario.has_tests();
+  const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
+  ResultSchema schema =
+      has_tests && !has_errors ? microscope_results() : results_of(estimation_methods());
+  if (has_tests) {
+    schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
+                             test_quantities().end());
+  }
+  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
+  schema.budget_level = budget_level();
+  return schema;
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {
@@ -95,33 +114,6 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   return drawn;
 }
 
-ResultSchema with_budget(ResultSchema schema) {
-  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
-  schema.budget_level = budget_level();
-  return schema;
-}
-
-/// Of a campaign whose sessions test, too.
-/// @param has_standard_errors  Whether the calibration has them; the test always does.
-ResultSchema with_test(bool has_standard_errors) {
-  ResultSchema schema = has_standard_errors ? results_of(estimation_methods()) : microscope_results();
-  schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
-                           test_quantities().end());
-  return with_budget(std::move(schema));
-}
-
-}  // namespace
-
-const ResultSchema& MicroscopeCampaign::results() const {
-  static const ResultSchema of_calibration = with_budget(results_of(estimation_methods()));
-  static const std::array<ResultSchema, 2> with_tests{with_test(false), with_test(true)};
-  if (!scenario.has_tests()) return of_calibration;
-  const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
-  return with_tests[has_errors ? 1 : 0];
-}
-
-namespace {
-
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -130,9 +122,26 @@ class MicroscopeModel final : public Model {
     return "Validates the in-flight calibration of drag-free accelerometers.";
   }
 
-  [[nodiscard]] const ResultSchema& results() const override {
-    static const MicroscopeCampaign nominal;
-    return nominal.results();
+  /// Of a canonical text: the quantities depend on whether it tests, and then on its method.
+  [[nodiscard]] ResultSchema results_of(std::string_view definition,
+                                        std::string_view /*version*/) const override {
+    MicroscopeCampaign campaign = hardy2013_campaign();
+    if (definition.find("\ntarget = \"ep_test\"\n") == std::string_view::npos) {
+      return campaign.results();
+    }
+    campaign.scenario.sessions.front().target = SessionTarget::ep_test;
+    const auto methods = estimation_methods();
+    for (std::size_t i = 0; i < methods.size(); ++i) {
+      const std::string line = fmt::format("\nmethod = \"{}\"\n", methods[i].name);
+      if (definition.find(line) == std::string_view::npos) continue;
+      campaign.scenario.estimation.method = static_cast<EstimationMethod>(i + 1);
+    }
+    return campaign.results();
+  }
+
+  [[nodiscard]] std::span<const DataTableSchema> tables() const override {
+    static const std::array<DataTableSchema, 1> tables{environment_table_schema()};
+    return tables;
   }
 
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override {

@@ -41,7 +41,7 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] std::vector<DefinitionItem> items() const override;
   [[nodiscard]] std::vector<DefinitionDifference> differences_from(
       const Campaign& other) const override;
-  [[nodiscard]] const ResultSchema& results() const override;
+  [[nodiscard]] ResultSchema results() const override;
   [[nodiscard]] std::vector<double> objectives() const override;
   [[nodiscard]] std::int64_t num_rounds_max() const override;
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override;

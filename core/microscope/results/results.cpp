@@ -1,6 +1,5 @@
 #include "core/microscope/results/results.hpp"
 
-#include "core/microscope/environment/environment.hpp"
 #include "core/microscope/results/health.hpp"
 #include "core/microscope/session/session.hpp"
 
@@ -47,7 +46,6 @@ ResultSchema make_schema() {
           .loss_causes = loss_causes(),
           .loss_sessions = {targets.begin(), targets.end()},
           .num_draws_max = num_draws_max,
-          .tables = {environment_table_schema()},
           .published_source = "Hardy et al. 2013"};
 }
 

@@ -72,12 +72,12 @@ TEST(Replicates, LeaveOutTheOneThatIsNotFinishedYet) {
   EXPECT_EQ(statistics.num_replicates, 7U);
   EXPECT_THAT(statistics.incomplete, ElementsAre(4U, 8U));
   EXPECT_FALSE(statistics.quantities.front().bias.interval);
-  EXPECT_THAT(terminal_text(replicate_table(statistics)),
+  EXPECT_THAT(terminal_text(replicate_table(test::schema(), statistics)),
               AllOf(HasSubstr("7 complete replicates of 4 runs (campaign.design = \"sobol\")"),
                     HasSubstr("left out, as a run has no result: replicate 4, 8"),
                     HasSubstr("an interval needs 8 replicates")));
-  EXPECT_THAT(replicate_table(replicates_of(3)).rows, IsEmpty());
-  EXPECT_THAT(replicate_table(replicates_of(0)).rows, IsEmpty());
+  EXPECT_THAT(replicate_table(test::schema(), replicates_of(3)).rows, IsEmpty());
+  EXPECT_THAT(replicate_table(test::schema(), replicates_of(0)).rows, IsEmpty());
 }
 
 // 40 replicates; the count of runs beyond is always 1, or alternates between 0 and 2.
