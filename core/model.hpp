@@ -52,8 +52,18 @@ class Model {
   /// What its campaigns are for: a sentence, the first of `proofmass --help`.
   [[nodiscard]] virtual std::string_view purpose() const = 0;
 
-  /// What the results of every campaign of this model are.
-  [[nodiscard]] virtual const ResultSchema& results() const = 0;
+  /// What the results of a stored campaign are, whatever else may be wrong with its definition.
+  ///
+  /// @param definition  Text of the definition. One that is none stands for that of example(), as
+  ///                    an empty one does.
+  /// @param version     Of the model that began the campaign: an older one recorded what its
+  ///                    results were then. Under version() it is Campaign::results() of the
+  ///                    definition.
+  [[nodiscard]] virtual ResultSchema results_of(std::string_view definition,
+                                                std::string_view version) const = 0;
+
+  /// The data files that a definition may name and that a database keeps as tables.
+  [[nodiscard]] virtual std::span<const DataTableSchema> tables() const = 0;
 
   /// What is drawn for a run, in the order of RunDraw::values.
   [[nodiscard]] virtual std::span<const DrawnQuantity> drawn() const = 0;
@@ -110,5 +120,11 @@ class Model {
 /// The model that this program runs campaigns of. It is chosen where the program is linked: each
 /// program is linked with exactly one library that defines this function.
 [[nodiscard]] const Model& model();
+
+/// The results of the campaign that Model::example() describes, for help texts and for limits that
+/// are needed before a campaign is known.
+[[nodiscard]] inline ResultSchema example_results() {
+  return model().results_of({}, model().version());
+}
 
 }  // namespace proofmass

@@ -14,7 +14,6 @@
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"
@@ -43,22 +42,44 @@ void walk_both(const ComparedCampaign& first, const ComparedCampaign& second, co
   }
 }
 
-bool have_same_draw(const RunResult& first, const RunResult& second) {
-  return first.has_truth() == second.has_truth() &&
-         (!first.has_truth() || std::ranges::equal(first.truth, second.truth, have_same_bits));
+/// A quantity that both campaigns have: its place among those of each.
+struct CommonQuantity {
+  std::size_t in_first = 0;
+  std::size_t in_second = 0;
+};
+
+std::vector<CommonQuantity> common_quantities(std::span<const Quantity> first,
+                                              std::span<const Quantity> second) {
+  std::vector<CommonQuantity> common;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const auto found = std::ranges::find(second, first[i].name, &Quantity::name);
+    if (found == second.end()) continue;
+    common.push_back(
+        {.in_first = i, .in_second = static_cast<std::size_t>(found - second.begin())});
+  }
+  return common;
 }
 
-std::size_t num_quantities() { return model().results().quantities.size(); }
+bool have_same_draw(std::span<const CommonQuantity> common, const RunResult& first,
+                    const RunResult& second) {
+  if (first.has_truth() != second.has_truth()) return false;
+  return !first.has_truth() || std::ranges::all_of(common, [&](const CommonQuantity& quantity) {
+    return have_same_bits(first.truth[quantity.in_first], second.truth[quantity.in_second]);
+  });
+}
 
-/// Errors of some parameters, from `begin` on, in the runs of one side that have an estimate.
+/// Errors of some parameters in the runs of one side that have an estimate.
 class SideErrors {
  public:
-  SideErrors(std::size_t begin, std::size_t end) : begin_(begin), columns_(end - begin) {}
+  /// @param place  Of each among the quantities of the side.
+  SideErrors(std::span<const CommonQuantity> parameters, std::size_t CommonQuantity::*place)
+      : parameters_(parameters), place_(place), columns_(parameters.size()) {}
 
   /// @param has_pair  Whether the other side has an estimate of the run as well.
   void add(const RunResult& result, bool has_pair) {
-    for (std::size_t i = 0; i < columns_.size(); ++i)
-      columns_[i].push_back(result.error(begin_ + i));
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      columns_[i].push_back(result.error(parameters_[i].*place_));
+    }
     have_pairs_.push_back(has_pair);
   }
   void keep_pairs() {
@@ -70,25 +91,25 @@ class SideErrors {
       errors.resize(num_kept);
     }
   }
-  [[nodiscard]] const std::vector<double>& of(std::size_t parameter) const {
-    return columns_[parameter - begin_];
-  }
+  [[nodiscard]] const std::vector<double>& of(std::size_t i) const { return columns_[i]; }
 
  private:
-  std::size_t begin_;
+  std::span<const CommonQuantity> parameters_;
+  std::size_t CommonQuantity::*place_;
   std::vector<std::vector<double>> columns_;
   std::vector<bool> have_pairs_;
 };
 
 /// Reads the errors that are compared, and sets why they are not those of pairs.
 void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
-                 CampaignComparison& comparison, SideErrors& of_first, SideErrors& of_second) {
+                 std::span<const CommonQuantity> common, CampaignComparison& comparison,
+                 SideErrors& of_first, SideErrors& of_second) {
   std::string why = first.campaign->seed == second.campaign->seed ? "" : "the seeds differ";
   bool has_common_run = false;
   walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
     if (a != nullptr && b != nullptr) {
       has_common_run = true;
-      if (why.empty() && !have_same_draw(*a, *b)) {
+      if (why.empty() && !have_same_draw(common, *a, *b)) {
         why = fmt::format("the draws of run {} differ", a->run.value);
       }
     }
@@ -118,10 +139,10 @@ ComparedAccuracy accuracy_of(std::span<const double> errors, double limit) {
   return accuracy;
 }
 
-ParameterComparison compared_parameter(const std::vector<double>& first,
-                                       const std::vector<double>& second, bool is_paired) {
+/// @param num_quantities  That are compared.
+void compare_parameter(const std::vector<double>& first, const std::vector<double>& second,
+                       bool is_paired, std::size_t num_quantities, ParameterComparison& parameter) {
   const double limit = tail_limit(first, second);
-  ParameterComparison parameter;
   parameter.first = accuracy_of(first, limit);
   parameter.second = accuracy_of(second, limit);
   parameter.tail_limit = limit;
@@ -129,15 +150,14 @@ ParameterComparison compared_parameter(const std::vector<double>& first,
     std::vector<double> differences(first.size());
     std::ranges::transform(second, first, differences.begin(), std::minus<>());
     parameter.bias_interval = mean_interval(moments(differences), default_confidence);
-    parameter.smallest_scale_factor = smallest_paired_scale_factor(first, second, num_quantities());
+    parameter.smallest_scale_factor = smallest_paired_scale_factor(first, second, num_quantities);
     parameter.p_values = compare_paired_errors(first, second);
   } else {
     parameter.bias_interval =
         compare_means(moments(first), moments(second), default_confidence).interval;
-    parameter.smallest_scale_factor = smallest_scale_factor(first, second, num_quantities());
+    parameter.smallest_scale_factor = smallest_scale_factor(first, second, num_quantities);
     parameter.p_values = compare_errors(first, second);
   }
-  return parameter;
 }
 
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
@@ -188,9 +208,11 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
                      .statistics = std::move(checked.results.statistics),
                      .digest = checked.results.digests.results,
                      .missing = missing,
+                     .quantities = store.schema().quantities,
                      .objectives = campaign->objectives(),
                      .comparison = std::nullopt},
           .compared = {.campaign = campaign,
+                       .quantities = store.schema().quantities,
                        .model_version = store.model_version(),
                        .build = store.build(),
                        .open_results = open_results}};
@@ -202,24 +224,40 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
-  comparison.parameters.resize(num_quantities());
+  const std::vector<CommonQuantity> common = common_quantities(first.quantities, second.quantities);
+  if (common.empty()) comparison.why_not_compared = "no quantity is common to both";
+  for (const CommonQuantity& quantity : common) {
+    comparison.parameters.emplace_back().quantity = first.quantities[quantity.in_first];
+  }
   const std::uint64_t size =
       (first.campaign->num_runs + second.campaign->num_runs) * sizeof(double);
-  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_quantities());
-  for (std::size_t begin = 0; begin < num_quantities(); begin += num_at_a_time) {
-    const std::size_t end = std::min(begin + num_at_a_time, num_quantities());
-    SideErrors of_first(begin, end), of_second(begin, end);
-    read_errors(first, second, comparison, of_first, of_second);
-    comparison.num_first = of_first.of(begin).size();
-    comparison.num_second = of_second.of(begin).size();
+  const std::size_t num_at_a_time = std::max(kept_size / size, std::size_t{1});
+  for (std::size_t begin = 0; begin < common.size(); begin += num_at_a_time) {
+    const auto some =
+        std::span(common).subspan(begin, std::min(num_at_a_time, common.size() - begin));
+    SideErrors of_first(some, &CommonQuantity::in_first);
+    SideErrors of_second(some, &CommonQuantity::in_second);
+    read_errors(first, second, common, comparison, of_first, of_second);
+    comparison.num_first = of_first.of(0).size();
+    comparison.num_second = of_second.of(0).size();
     comparison.why_not_compared = why_not_compared(first, second, comparison);
     if (!comparison.why_not_compared.empty()) return comparison;
-    for (std::size_t i = begin; i < end; ++i) {
-      comparison.parameters[i] =
-          compared_parameter(of_first.of(i), of_second.of(i), comparison.is_paired());
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      compare_parameter(of_first.of(i), of_second.of(i), comparison.is_paired(), common.size(),
+                        comparison.parameters[begin + i]);
     }
   }
   return comparison;
+}
+
+std::vector<std::string> lacking(std::span<const Quantity> first,
+                                 std::span<const Quantity> second) {
+  std::vector<std::string> names;
+  for (const Quantity& quantity : first) {
+    if (std::ranges::find(second, quantity.name, &Quantity::name) != second.end()) continue;
+    names.push_back(quantity.name);
+  }
+  return names;
 }
 
 std::vector<ComparedMember> compare_several(std::span<const std::filesystem::path> files,

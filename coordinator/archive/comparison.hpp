@@ -30,6 +30,7 @@ using ResultStream = std::function<std::optional<RunResult>()>;
 /// A campaign that is compared with another.
 struct ComparedCampaign {
   std::shared_ptr<const Campaign> campaign;
+  std::vector<Quantity> quantities;  ///< Of its results.
   std::string model_version;
   std::string build;
   /// Begins with the first result, the same ones each time.
@@ -47,6 +48,7 @@ struct ComparedAccuracy {
 
 /// One parameter in two campaigns.
 struct ParameterComparison {
+  Quantity quantity;  ///< As the first campaign has it.
   ComparedAccuracy first;
   ComparedAccuracy second;
   std::optional<Interval> bias_interval;  ///< Of second bias − first; empty if nothing varies.
@@ -68,14 +70,16 @@ struct CampaignComparison {
   std::size_t num_second = 0;  ///< Runs of the second campaign; num_first if paired.
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
-  std::vector<ParameterComparison> parameters;  ///< Of each quantity.
+  /// Of each quantity that both campaigns have, in the order of the first.
+  std::vector<ParameterComparison> parameters;
 
   [[nodiscard]] bool is_paired() const { return why_unpaired.empty(); }
 };
 
-/// Compares the runs with an estimate: those that both campaigns have, run by run, if their seed
-/// and the truths of all common runs agree to the last bit, and else all of each. P-values are of
-/// compare_paired_errors() for pairs, else of compare_errors(); intervals are of 95 %.
+/// Compares the quantities that both campaigns have, in the runs with an estimate: those that both
+/// have, run by run, if their seed and the truths of these quantities in all common runs agree to
+/// the last bit, and else all of each. P-values are of compare_paired_errors() for pairs, else of
+/// compare_errors(); intervals are of 95 %.
 ///
 /// Keeps the errors of as many parameters at a time as some 128 MB hold, of one at least: up to
 /// 800,000 runs in both together each file is read once.
@@ -93,7 +97,8 @@ struct ComparedMember {
   CampaignStatistics statistics;
   std::string digest;        ///< Of the results.
   MissingEstimates missing;  ///< Finished and given-up runs without an estimate: perhaps its worst.
-  std::vector<double> objectives;  ///< Of each quantity, SI; infinite if there is none.
+  std::vector<Quantity> quantities;  ///< Of its results.
+  std::vector<double> objectives;    ///< Of each quantity, SI; infinite if there is none.
   /// With the first campaign as its first side; empty for the first campaign itself. The adjusted
   /// p-values are those of adjust_together().
   std::optional<CampaignComparison> comparison;
@@ -120,9 +125,13 @@ struct MemberNames {
 /// `A` to `Z`, `AA`, `AB` and so on.
 [[nodiscard]] MemberNames lettered(std::size_t count);
 
+/// Names of the quantities of the first list that the second lacks.
+[[nodiscard]] std::vector<std::string> lacking(std::span<const Quantity> first,
+                                               std::span<const Quantity> second);
+
 /// The campaigns, the keys of their definitions that differ, and tables of bias, scatter and
-/// |error| with a row for each parameter and campaign. Lines have at most 80 characters but for
-/// names of files and values of definitions that are longer.
+/// |error| with a row for each parameter and each campaign that has it. Lines have at most 80
+/// characters but for names of files and values of definitions that are longer.
 [[nodiscard]] std::string comparison_text(std::span<const ComparedMember> members,
                                           const MemberNames& names, Paint paint = Paint::no);
 

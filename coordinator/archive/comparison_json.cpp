@@ -4,7 +4,6 @@
 #include <string>
 
 #include "coordinator/archive/comparison.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -25,9 +24,9 @@ Json json_of(const ChangePValues& p_values) {
   return {{"bias", p_values.location}, {"scatter", p_values.scale}, {"tail", p_values.tail}};
 }
 
-Json json_of(const Quantity& quantity, const ParameterComparison& parameter) {
-  Json json{{"parameter", quantity.name},
-            {"unit", quantity.unit},
+Json json_of(const ParameterComparison& parameter) {
+  Json json{{"parameter", parameter.quantity.name},
+            {"unit", parameter.quantity.unit},
             {"tail_limit", parameter.tail_limit},
             {"first", json_of(parameter.first)},
             {"second", json_of(parameter.second)},
@@ -59,21 +58,22 @@ Json comparison_object(const ComparedMember& first, const ComparedMember& second
             {"num_first_without_estimate", first.missing.total()},
             {"num_second_without_estimate", second.missing.total()},
             {"confidence", default_confidence},
+            {"only_in_first", lacking(first.quantities, second.quantities)},
+            {"only_in_second", lacking(second.quantities, first.quantities)},
             {"parameters", Json::array()}};
   for (const auto& [field, of_first, of_second] : comparison.differences) {
     json["differences"].push_back({{"field", field}, {"first", of_first}, {"second", of_second}});
   }
   if (comparison.why_not_compared.empty()) {
-    for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
-      const Quantity& quantity = model().results().quantities[i];
-      json["parameters"].push_back(json_of(quantity, comparison.parameters[i]));
+    for (const ParameterComparison& parameter : comparison.parameters) {
+      json["parameters"].push_back(json_of(parameter));
     }
   }
   return json;
 }
 
 Json accuracy_json(const ComparedMember& member, std::size_t i) {
-  const Quantity& quantity = model().results().quantities[i];
+  const Quantity& quantity = member.quantities[i];
   Json json{{"parameter", quantity.name},
             {"unit", quantity.unit},
             {"objective", nullptr},

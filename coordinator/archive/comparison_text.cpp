@@ -10,7 +10,6 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/table/figures.hpp"
-#include "core/model.hpp"
 #include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {
@@ -80,6 +79,20 @@ std::string how_compared(const CampaignComparison& comparison) {
                      comparison.num_first == 1 ? "run" : "runs");
 }
 
+/// Names the quantities that only one of two campaigns has, which are not compared.
+void add_own_quantities(const ComparedMember& first, const ComparedMember& other,
+                        std::string_view first_name, std::string_view other_name, Table& table) {
+  const auto add = [&](const ComparedMember& one, std::string_view name, const ComparedMember& two,
+                       std::string_view without) {
+    const std::vector<std::string> own = lacking(one.quantities, two.quantities);
+    if (own.empty()) return;
+    table.notes.push_back(fmt::format("not compared, as {} has them and {} has not: {}", name,
+                                      without, fmt::join(own, ", ")));
+  };
+  add(first, first_name, other, other_name);
+  add(other, other_name, first, first_name);
+}
+
 Table campaign_table(std::span<const ComparedMember> members, const MemberNames& names) {
   Table table{.columns = {{names.title, true},
                           {"file", true},
@@ -94,6 +107,7 @@ Table campaign_table(std::span<const ComparedMember> members, const MemberNames&
       table.notes.push_back(fmt::format("{} cannot be compared: {}", names.names[i],
                                         member.comparison->why_not_compared));
     }
+    add_own_quantities(members.front(), member, names.names.front(), names.names[i], table);
     if (member.missing.total() == 0) continue;
     table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.", names.names[i],
                                          reasons_text(member.missing))});
@@ -111,16 +125,39 @@ bool has_changes(const ComparedMember& member) {
   return member.comparison && member.comparison->why_not_compared.empty();
 }
 
+/// How a quantity differs from the first campaign. Null where that is not compared.
+const ParameterComparison* change_in(const ComparedMember& member, const std::string& quantity) {
+  if (!has_changes(member)) return nullptr;
+  const std::vector<ParameterComparison>& all = member.comparison->parameters;
+  const auto found = std::ranges::find_if(
+      all, [&](const ParameterComparison& one) { return one.quantity.name == quantity; });
+  return found == all.end() ? nullptr : &*found;
+}
+
 /// Errors of a campaign in the runs that are compared: of the first one, with the first other that
 /// can be. Null if it has none.
 const ComparedAccuracy* accuracy_of(std::span<const ComparedMember> members, std::size_t member,
-                                    std::size_t parameter) {
+                                    const std::string& quantity) {
   if (member > 0) {
-    if (!has_changes(members[member])) return nullptr;
-    return &members[member].comparison->parameters[parameter].second;
+    const ParameterComparison* const change = change_in(members[member], quantity);
+    return change == nullptr ? nullptr : &change->second;
   }
-  const auto other = std::ranges::find_if(members, has_changes);
-  return other == members.end() ? nullptr : &other->comparison->parameters[parameter].first;
+  for (const ComparedMember& other : members) {
+    if (const auto* const change = change_in(other, quantity)) return &change->first;
+  }
+  return nullptr;
+}
+
+/// The quantities of all campaigns, each once, those of the first one first.
+std::vector<Quantity> all_quantities(std::span<const ComparedMember> members) {
+  std::vector<Quantity> all;
+  for (const ComparedMember& member : members) {
+    for (const Quantity& quantity : member.quantities) {
+      const bool is_new = std::ranges::find(all, quantity.name, &Quantity::name) == all.end();
+      if (is_new) all.push_back(quantity);
+    }
+  }
+  return all;
 }
 
 /// The tests of bias, scatter and tail.
@@ -163,44 +200,45 @@ std::string percent(std::size_t count, std::size_t of) {
   return fmt::format("{:.1f} %", 100.0 * static_cast<double>(count) / static_cast<double>(of));
 }
 
-/// A row for each parameter and campaign, which begins with their names.
+/// A row for each parameter and each campaign that has it, which begins with their names.
 /// @param columns      Behind those of the names.
-/// @param add_cells    Called with the row, the campaign and the parameter; cells that it does not
-///                     add are empty.
+/// @param add_cells    Called with the row, the campaign, the parameter and its place among those
+///                     of the campaign; cells that it does not add are empty.
 template <typename AddCells>
 Table table_of(std::span<const ComparedMember> members, const MemberNames& names,
                std::string caption, std::vector<Column> columns, const AddCells& add_cells) {
   Table table{.caption = std::move(caption),
               .columns = {{"parameter", true, 10}, {"unit", true, 9}, {names.title, true, 9}}};
   std::ranges::move(columns, std::back_inserter(table.columns));
-  const std::vector<Quantity>& quantities = model().results().quantities;
-  for (std::size_t parameter = 0; parameter < quantities.size(); ++parameter) {
+  for (const Quantity& quantity : all_quantities(members)) {
+    bool is_first = true;
     for (std::size_t member = 0; member < members.size(); ++member) {
+      const std::vector<Quantity>& own = members[member].quantities;
+      const auto found = std::ranges::find(own, quantity.name, &Quantity::name);
+      if (found == own.end()) continue;
       Row& row = table.rows.emplace_back();
-      row.emplace_back(member == 0 ? quantities[parameter].symbol : "");
-      row.emplace_back(member == 0 ? quantities[parameter].display_unit : "");
+      row.emplace_back(is_first ? quantity.symbol : "");
+      row.emplace_back(is_first ? quantity.display_unit : "");
       row.emplace_back(names.names[member]);
-      add_cells(row, member, parameter);
+      add_cells(row, member, quantity, static_cast<std::size_t>(found - own.begin()));
       row.resize(table.columns.size(), Cell(""));
+      is_first = false;
     }
   }
   return table;
 }
 
-double scale_of(std::size_t parameter) {
-  return model().results().quantities[parameter].display_scale;
-}
-
 Table bias_table(std::span<const ComparedMember> members, const MemberNames& names) {
-  const auto add_cells = [&](Row& row, std::size_t member, std::size_t i) {
-    const ComparedAccuracy* const accuracy = accuracy_of(members, member, i);
-    row.emplace_back(accuracy == nullptr ? "-" : figure_with_sign(accuracy->bias / scale_of(i)));
+  const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity, std::size_t) {
+    const double scale = quantity.display_scale;
+    const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity.name);
+    row.emplace_back(accuracy == nullptr ? "-" : figure_with_sign(accuracy->bias / scale));
     if (member == 0 || accuracy == nullptr) return;
-    const ParameterComparison& change = members[member].comparison->parameters[i];
-    row.emplace_back(figure_with_sign((change.second.bias - change.first.bias) / scale_of(i)));
+    const ParameterComparison& change = *change_in(members[member], quantity.name);
+    row.emplace_back(figure_with_sign((change.second.bias - change.first.bias) / scale));
     const auto& interval = change.bias_interval;
-    row.emplace_back(interval ? figure_with_sign(interval->lower / scale_of(i)) : "-");
-    row.emplace_back(interval ? figure_with_sign(interval->upper / scale_of(i)) : "-");
+    row.emplace_back(interval ? figure_with_sign(interval->lower / scale) : "-");
+    row.emplace_back(interval ? figure_with_sign(interval->upper / scale) : "-");
     add_p(change.adjusted_p_values.location, row);
   };
   Table table = table_of(members, names, "Bias: mean of estimate − truth",
@@ -218,13 +256,14 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
 }
 
 Table scatter_table(std::span<const ComparedMember> members, const MemberNames& names) {
-  const auto add_cells = [&](Row& row, std::size_t member, std::size_t i) {
-    const ComparedAccuracy* const accuracy = accuracy_of(members, member, i);
-    row.emplace_back(
-        accuracy == nullptr ? "-" : measured_figure(accuracy->standard_deviation / scale_of(i)));
+  const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity, std::size_t) {
+    const double scale = quantity.display_scale;
+    const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity.name);
+    row.emplace_back(accuracy == nullptr ? "-"
+                                         : measured_figure(accuracy->standard_deviation / scale));
     if (member == 0 || accuracy == nullptr) return;
     const CampaignComparison& comparison = *members[member].comparison;
-    const ParameterComparison& change = comparison.parameters[i];
+    const ParameterComparison& change = *change_in(members[member], quantity.name);
     add_p(change.adjusted_p_values.scale, row);
     const auto& factor = change.smallest_scale_factor;
     row.emplace_back(factor ? measured_figure(100.0 * (*factor - 1.0)) + " %" : "-");
@@ -258,19 +297,20 @@ Table scatter_table(std::span<const ComparedMember> members, const MemberNames& 
 
 /// Of all runs of each campaign, which has them even if it cannot be compared.
 Table magnitude_table(std::span<const ComparedMember> members, const MemberNames& names) {
-  const auto add_cells = [&](Row& row, std::size_t member, std::size_t i) {
+  const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity,
+                             std::size_t i) {
+    const double scale = quantity.display_scale;
     const double objective = members[member].objectives[i];
-    row.emplace_back(std::isfinite(objective) ? given_figure(objective / scale_of(i)) : "-");
+    row.emplace_back(std::isfinite(objective) ? given_figure(objective / scale) : "-");
     const std::uint64_t num_runs = members[member].statistics.num_estimated;
     if (num_runs == 0) {
       row.insert(row.end(), 4, Cell("-"));
       return;
     }
     const AccuracyStatistic& accuracy = members[member].statistics.accuracy[i];
-    row.emplace_back(measured_figure(accuracy.worst / scale_of(i)));
-    row.emplace_back(measured_figure(accuracy.mean / scale_of(i)));
-    row.emplace_back(num_runs < 2 ? "-"
-                                  : measured_figure(accuracy.standard_deviation / scale_of(i)));
+    row.emplace_back(measured_figure(accuracy.worst / scale));
+    row.emplace_back(measured_figure(accuracy.mean / scale));
+    row.emplace_back(num_runs < 2 ? "-" : measured_figure(accuracy.standard_deviation / scale));
     const std::uint64_t beyond = accuracy.num_beyond_objective;
     row.emplace_back(std::isfinite(objective) ? std::to_string(beyond) : "-",
                      beyond > 0 ? Tone::bad : Tone::plain);

@@ -83,11 +83,12 @@ Hdf5Handle position_type(const Hdf5File& file, std::vector<std::string_view> nam
 /// All datasets of an export.
 class Columns {
  public:
-  Columns(const Hdf5File& file, std::shared_ptr<const Campaign> draws)
-      : draws_(std::move(draws)),
+  Columns(const Hdf5File& file, const ResultSchema& schema, std::shared_ptr<const Campaign> draws)
+      : value_columns_(value_columns(schema)),
+        draws_(std::move(draws)),
         status_type_(status_type(file)),
-        loss_cause_type_(position_type(file, model().results().loss_causes)),
-        loss_session_type_(position_type(file, model().results().loss_sessions)),
+        loss_cause_type_(position_type(file, schema.loss_causes)),
+        loss_session_type_(position_type(file, schema.loss_sessions)),
         run_index_(file, file.root(), "run_index", H5T_STD_U64LE, H5T_NATIVE_UINT64),
         status_(file, file.root(), "status", status_type_, status_type_),
         num_draws_(file, file.root(), "num_draws", H5T_STD_U32LE, H5T_NATIVE_UINT32),
@@ -96,7 +97,7 @@ class Columns {
         loss_session_(file, file.root(), "loss_session", loss_session_type_, loss_session_type_) {
     Hdf5Handle group;
     std::string_view group_name;
-    for (const ValueColumn& column : value_columns()) {
+    for (const ValueColumn& column : value_columns_) {
       if (name_of(column.kind) != group_name) {
         group_name = name_of(column.kind);
         group = file.make_group(std::string(group_name));
@@ -115,8 +116,8 @@ class Columns {
     const bool is_lost = result.status == RunStatus::lost;
     loss_cause_.add(static_cast<std::uint8_t>(result.loss.cause));
     loss_session_.add(is_lost ? static_cast<std::uint8_t>(result.loss.session) : std::uint8_t{0});
-    for (std::size_t i = 0; i < value_columns().size(); ++i) {
-      values_[i].add(value_columns()[i].value_in(result).value_or(no_meaning));
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      values_[i].add(value_columns_[i].value_in(result).value_or(no_meaning));
     }
     if (draws_ == nullptr) return;
     const std::vector<double> drawn = draws_->draw(result.run).values;
@@ -148,6 +149,7 @@ class Columns {
     }
   }
 
+  std::vector<ValueColumn> value_columns_;
   std::shared_ptr<const Campaign> draws_;  ///< Null without columns of drawn values.
   Hdf5Handle status_type_;
   Hdf5Handle loss_cause_type_;
@@ -165,7 +167,7 @@ class Columns {
 void write_results(const Hdf5File& file, const Store& store, const IsStopped& is_stopped,
                    DrawColumns draws) {
   const bool has_draws = draws == DrawColumns::included;
-  Columns columns(file, has_draws ? stored_campaign_unchecked(store) : nullptr);
+  Columns columns(file, store.schema(), has_draws ? stored_campaign_unchecked(store) : nullptr);
   const WalkedResults walked =
       walk_results(store, is_stopped, [&](const RunResult& result) { columns.add(result); });
   columns.flush();

@@ -8,7 +8,6 @@
 #include "coordinator/archive/detail/hdf5_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/series_output.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -88,7 +87,7 @@ void describe_run(const Hdf5File& file, const SeriesOrigin& origin, const Record
   file.set_count(root, "run_index", result.run.value);
   file.set_text(root, "status", std::string(name_of(result.status)));
   if (result.status == RunStatus::lost) {
-    const ResultSchema& schema = model().results();
+    const ResultSchema& schema = origin.store.schema();
     file.set_text(root, "loss_cause", std::string(name_at(schema.loss_causes, result.loss.cause)));
     file.set_text(root, "loss_session",
                   std::string(name_at(schema.loss_sessions, result.loss.session)));

@@ -93,7 +93,7 @@ std::vector<ResultDifference> Replay::run(const RunResult& stored, SeriesOutput*
   };
   const RunResult computed =
       plan_->replay({stored.run, campaign_->table_values(stored.run)}, pass_on, stop_if_asked);
-  std::vector<ResultDifference> differences = differences_of(stored, computed);
+  std::vector<ResultDifference> differences = differences_of(stored, computed, store_.schema());
   if (!differences.empty() || output == nullptr) return differences;
   if (stored.status == RunStatus::no_draw) {
     throw ArchiveError(fmt::format(

@@ -51,18 +51,17 @@ void in_threads(std::size_t count, std::size_t num_threads,
 constexpr std::size_t num_at_a_time = 8192;
 
 /// The first difference of a run, in words; empty if there is none.
-std::string difference_of(const Campaign& campaign, const RunResult& stored) {
+std::string difference_of(const Campaign& campaign, const ResultSchema& schema,
+                          const RunResult& stored) {
   const RunDraw draw = campaign.draw(stored.run);
   if (draw.truth.empty() || draw.num_draws != stored.num_draws) {
     return fmt::format("run {}: num_draws = {} (must be {})", stored.run.value, stored.num_draws,
                        draw.num_draws);
   }
-  for (const ValueColumn& column : value_columns()) {
-    if (column.kind != ValueKind::truth) continue;
-    const std::size_t i = column.index;
+  for (std::size_t i = 0; i < draw.truth.size(); ++i) {
     if (have_same_bits(stored.truth[i], draw.truth[i])) continue;
-    return fmt::format("run {}: {} = {} (must be {})", stored.run.value, column.name,
-                       stored.truth[i], draw.truth[i]);
+    return fmt::format("run {}: truth_{} = {} (must be {})", stored.run.value,
+                       schema.quantities[i].column(), stored.truth[i], draw.truth[i]);
   }
   return "";
 }
@@ -85,7 +84,8 @@ RunIndex ChosenRuns::next(std::uint64_t i) {
   return RunIndex{runs_.front().first.value + (place - num_before_)};
 }
 
-std::vector<ResultDifference> differences_of(const RunResult& stored, const RunResult& computed) {
+std::vector<ResultDifference> differences_of(const RunResult& stored, const RunResult& computed,
+                                             const ResultSchema& schema) {
   std::vector<ResultDifference> differences;
   const auto differ = [&](std::string column, std::string of_stored, std::string of_computed) {
     differences.push_back(
@@ -101,7 +101,7 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
   if (stored.num_rounds != computed.num_rounds) {
     differ("num_rounds", std::to_string(stored.num_rounds), std::to_string(computed.num_rounds));
   }
-  for (const ValueColumn& column : value_columns()) {
+  for (const ValueColumn& column : value_columns(schema)) {
     if (column.kind == ValueKind::error) continue;  // It follows from the others.
     const std::optional<double> a = column.value_in(stored), b = column.value_in(computed);
     // A run without a draw has no health.
@@ -113,9 +113,9 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
            fmt::format("[{}]", fmt::join(computed.correlations, ",")));
   }
   if (!(stored.loss == computed.loss)) {
-    const auto text_of = [](const Loss& loss) {
-      return fmt::format("{} in {}", name_at(model().results().loss_causes, loss.cause),
-                         name_at(model().results().loss_sessions, loss.session));
+    const auto text_of = [&](const Loss& loss) {
+      return fmt::format("{} in {}", name_at(schema.loss_causes, loss.cause),
+                         name_at(schema.loss_sessions, loss.session));
     };
     differ("loss_cause", text_of(stored.loss), text_of(computed.loss));
   }
@@ -126,6 +126,7 @@ std::vector<ResultDifference> simulate_again(const Campaign& campaign,
                                              std::span<const RunResult> stored,
                                              std::size_t num_threads, const IsStopped& is_stopped) {
   const std::unique_ptr<const Plan> plan = campaign.prepare();
+  const ResultSchema schema = campaign.results();
   const std::size_t batch_size = model().batch_size();
   std::vector<std::vector<ResultDifference>> found((stored.size() + batch_size - 1) / batch_size);
   in_threads(found.size(), num_threads, [&](std::size_t i, const std::atomic<bool>& has_failed) {
@@ -141,7 +142,8 @@ std::vector<ResultDifference> simulate_again(const Campaign& campaign,
     const std::vector<RunResult> computed =
         plan->simulate_batch(requests, best_instruction_set(), on_progress);
     for (std::size_t k = 0; k < batch.size(); ++k) {
-      std::ranges::move(differences_of(batch[k], computed[k]), std::back_inserter(found[i]));
+      std::ranges::move(differences_of(batch[k], computed[k], schema),
+                        std::back_inserter(found[i]));
     }
   });
   std::vector<ResultDifference> differences;
@@ -158,7 +160,7 @@ Redraw redraw_runs(const Store& store, const Campaign& campaign, std::size_t num
     redraw.num_drawn += results.size();
     std::vector<std::string> differences(results.size());
     in_threads(results.size(), num_threads, [&](std::size_t i, const std::atomic<bool>&) {
-      differences[i] = difference_of(campaign, results[i]);
+      differences[i] = difference_of(campaign, store.schema(), results[i]);
     });
     for (const std::string& difference : differences) {
       if (difference.empty()) continue;

@@ -41,8 +41,10 @@ struct ResultDifference {
 };
 
 /// Every column that differs in a bit that means something; if the status does, that one alone.
+/// @param schema  Of the campaign of both.
 [[nodiscard]] std::vector<ResultDifference> differences_of(const RunResult& stored,
-                                                           const RunResult& computed);
+                                                           const RunResult& computed,
+                                                           const ResultSchema& schema);
 
 /// Simulates the runs of some results again, with the fastest kernel of this processor.
 ///

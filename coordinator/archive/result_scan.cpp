@@ -17,7 +17,6 @@
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/result_columns.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
@@ -26,15 +25,17 @@ namespace {
 /// Holds results against what a simulation can yield.
 class Rules {
  public:
-  Rules(std::int64_t num_rounds_max, ResultScan& scan)
-      : num_rounds_max_(num_rounds_max), scan_(scan) {}
+  Rules(const ResultSchema& schema, std::int64_t num_rounds_max, ResultScan& scan)
+      : columns_(value_columns(schema)),
+        num_draws_max_(schema.num_draws_max),
+        num_rounds_max_(num_rounds_max),
+        scan_(scan) {}
 
   void check(const RunResult& result) {
-    for (const std::string& broken :
-         broken_count_rules(result, model().results().num_draws_max, num_rounds_max_)) {
+    for (const std::string& broken : broken_count_rules(result, num_draws_max_, num_rounds_max_)) {
       violate(result.run, broken);
     }
-    for (const ValueColumn& column : value_columns()) {
+    for (const ValueColumn& column : columns_) {
       if (column.kind == ValueKind::error) continue;  // Follow from the others.
       const std::optional<double> value = column.value_in(result);
       if (!value || is_in_range(*value)) continue;
@@ -49,6 +50,8 @@ class Rules {
   }
 
  private:
+  std::vector<ValueColumn> columns_;
+  std::uint32_t num_draws_max_;
   std::int64_t num_rounds_max_;
   ResultScan& scan_;
 };
@@ -126,8 +129,8 @@ Check check_first(const Store& store, const Campaign& campaign) {
 
 ResultScan scan_results(const Store& store, const Campaign& campaign, const IsStopped& is_stopped) {
   ResultScan scan;
-  Rules rules(campaign.num_rounds_max(), scan);
-  Digest digest;
+  Rules rules(store.schema(), campaign.num_rounds_max(), scan);
+  Digest digest(store.schema());
   std::uint64_t num_visits = 0;
   store.for_each_result([&](const RunResult& result) {
     constexpr std::uint64_t visits_between_questions = 1024;

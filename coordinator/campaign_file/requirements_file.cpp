@@ -7,7 +7,7 @@
 
 #include "coordinator/campaign_file/data_file.hpp"
 #include "core/definition/document.hpp"
-#include "core/model_rules.hpp"
+#include "core/result_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -52,9 +52,9 @@ void read_requirement(Document& document, const std::string& path, std::string& 
 
 /// @throws DefinitionError with what parse_requirement() says.
 void check_requirement_of(const std::filesystem::path& file, std::size_t position,
-                          const StatedRequirement& stated) {
+                          const StatedRequirement& stated, const ResultSchema& results) {
   try {
-    (void)parse_requirement(stated.requirement);
+    (void)parse_requirement(stated.requirement, results);
   } catch (const ConfigError& error) {
     throw DefinitionError(
         fmt::format("{}: requirements[{}].{}", file.string(), position, error.what()));
@@ -63,7 +63,8 @@ void check_requirement_of(const std::filesystem::path& file, std::size_t positio
 
 }  // namespace
 
-std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file) {
+std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file,
+                                                 const ResultSchema& results) {
   Document document(file.string(), read_requirements_text(file), {});
   const std::optional<std::size_t> count =
       document.num_tables("requirements", num_requirements_max);
@@ -77,7 +78,9 @@ std::vector<StatedRequirement> read_requirements(const std::filesystem::path& fi
     read_requirement(document, path + ".requirement", stated[i].requirement);
   }
   document.check();
-  for (std::size_t i = 0; i < stated.size(); ++i) check_requirement_of(file, i, stated[i]);
+  for (std::size_t i = 0; i < stated.size(); ++i) {
+    check_requirement_of(file, i, stated[i], results);
+  }
   return stated;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "coordinator/report/stated_requirement.hpp"
+#include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator {
 
@@ -23,7 +24,9 @@ inline constexpr std::size_t num_requirements_max = 100;
 /// `id` has 1 to 64 bytes and is unique, `text` 1,000 at most and may be absent; see
 /// parse_requirement() for the rest.
 ///
+/// @param results  Of the campaign that they are about.
 /// @throws DefinitionError naming file, line, field, value and rule.
-[[nodiscard]] std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file);
+[[nodiscard]] std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file,
+                                                               const ResultSchema& results);
 
 }  // namespace proofmass::coordinator

@@ -23,9 +23,8 @@ struct Measured {};
 
 /// Size of a campaign database. An empty database has 170 kB; a run adds 8 bytes for each of its
 /// numbers and 90 bytes for how and by whom it was computed. Measured with 25 numbers a run.
-double database_mb(std::uint64_t num_runs) {
+double database_mb(const ResultSchema& schema, std::uint64_t num_runs) {
   constexpr double empty_size = 170e3, number_size = 8.0, further_size = 90.0;
-  const ResultSchema& schema = model().results();
   // Truth and estimate of each quantity.
   const auto num_numbers = static_cast<double>(2 * schema.quantities.size() + schema.health.size());
   const double run_size = number_size * num_numbers + further_size;
@@ -69,13 +68,13 @@ CostEstimate& CostEstimate::operator+=(const CostEstimate& other) {
   return *this;
 }
 
-CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s) {
+CostEstimate estimated_cost(const ResultSchema& results, std::uint64_t num_runs, double batch_s) {
   const auto time_s = [&](std::uint64_t num_at_a_time) {
     return static_cast<double>((num_runs + num_at_a_time - 1) / num_at_a_time) * batch_s;
   };
   return {.one_core_s = time_s(model().batch_size()),
           .all_cores_s = time_s(model().batch_size() * wire::num_processors()),
-          .disk_mb = database_mb(num_runs)};
+          .disk_mb = database_mb(results, num_runs)};
 }
 
 std::string cost_text(const CostEstimate& cost) {

@@ -8,7 +8,8 @@
 #include "coordinator/cli/program.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
-#include "core/model_rules.hpp"
+#include "core/model.hpp"
+#include "core/result_rules.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 
@@ -27,7 +28,7 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
 }
 
 std::string example_requirement() {
-  const Quantity& quantity = example_quantity(model().results());
+  const Quantity quantity = example_quantity(example_results());
   const double limit =
       std::isfinite(quantity.objective) ? quantity.objective : quantity.display_scale;
   return fmt::format("{} < {} for 99% with 95%", quantity.name,
@@ -35,23 +36,23 @@ std::string example_requirement() {
 }
 
 void add_stop_options(CLI::App& command, StopOptions& options) {
-  command
-      .add_option("--until", options.rule,
-                  fmt::format("Stop as soon as the rule holds, as in\n\"std({}) within 5%\",\n"
-                              "\"all objectives within 2%\" or\n\"{} decided\"",
-                              example_quantity(model().results()).name, example_requirement()))
-      ->check([](const std::string& rule) {
-        try {
-          (void)parse_stop_rule(rule);
-        } catch (const ConfigError& error) {
-          throw UsageError(error.what());
-        }
-        return std::string();
-      });
+  command.add_option("--until", options.rule,
+                     fmt::format("Stop as soon as the rule holds, as in\n\"std({}) within 5%\",\n"
+                                 "\"all objectives within 2%\" or\n\"{} decided\"",
+                                 example_quantity(example_results()).name, example_requirement()));
   command
       .add_option("--failures", options.failures_max,
                   "Cancel when more runs than this lack an estimate")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
+}
+
+void check_stop_rule(const std::string& rule, const Campaign& campaign) {
+  if (rule.empty()) return;
+  try {
+    (void)parse_stop_rule(rule, campaign.results());
+  } catch (const ConfigError& error) {
+    throw UsageError(error.what());
+  }
 }
 
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {

@@ -23,12 +23,15 @@ struct StopOptions {
   std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate.
 };
 
-/// A requirement about a quantity of the model, for help texts: `gain < 1e-3 for 99% with 95%`.
+/// A requirement about a quantity of the example, for help texts: `gain < 1e-3 for 99% with 95%`.
 [[nodiscard]] std::string example_requirement();
 
 /// Declares --until and --failures.
 /// @param options  Lives as long as the command.
 void add_stop_options(CLI::App& command, StopOptions& options);
+
+/// @throws UsageError `until = RULE (what is wrong)` if a rule is none about the campaign.
+void check_stop_rule(const std::string& rule, const Campaign& campaign);
 
 /// Declares --audit.
 /// @param audit_fraction  Lives as long as the command.

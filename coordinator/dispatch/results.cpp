@@ -14,7 +14,6 @@
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/workers.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 #include "proto/wire/conversions.hpp"
 
 namespace proofmass::coordinator {
@@ -146,10 +145,12 @@ bool is_made_up(const State& state, const CampaignState& campaign, const RunResu
 std::string broken_rule(const State& state, const CampaignState& campaign,
                         std::span<const wire::ComputedRun> results, WorkerId id) {
   const std::int64_t num_rounds_max = campaign.definition->num_rounds_max();
-  const std::uint32_t num_draws_max = model().results().num_draws_max;
+  const ResultSchema schema = campaign.definition->results();
   for (const wire::ComputedRun& computed : results) {
-    const std::vector<std::string> broken =
-        broken_count_rules(computed.result, num_draws_max, num_rounds_max);
+    std::vector<std::string> broken = broken_size_rules(computed.result, schema);
+    if (broken.empty()) {
+      broken = broken_count_rules(computed.result, schema.num_draws_max, num_rounds_max);
+    }
     if (!broken.empty()) {
       return fmt::format("run {}: {}", computed.result.run.value, broken.front());
     }

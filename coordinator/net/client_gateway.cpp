@@ -11,6 +11,7 @@
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "core/result_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -44,6 +45,8 @@ Request request_of(proto::RequestEnvelope message) {
   std::shared_ptr<const Campaign> campaign = model().campaign_of(
       wire::take_definition(*message.mutable_submit()), TableColumns::included, "definition");
   check_campaign_name(campaign->name, NameOrigin::given);
+  const std::string& rule = message.submit().stop_rule();
+  if (!rule.empty()) (void)parse_stop_rule(rule, campaign->results());
   return {.message = std::move(message), .campaign = std::move(campaign)};
 }
 

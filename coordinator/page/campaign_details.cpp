@@ -16,7 +16,6 @@
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/net/server_paths.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
@@ -152,7 +151,7 @@ CampaignDetails without_room(TimePoint now) {
 }  // namespace
 
 ResultsReading::ResultsReading(const Store& store)
-    : campaign_(store.id()), results_(*stored_campaign(store)) {}
+    : campaign_(store.id()), results_(*stored_campaign(store), store.schema()) {}
 
 bool ResultsReading::is_of(const Store& store) const { return campaign_ == store.id(); }
 
@@ -161,7 +160,7 @@ void ResultsReading::read_further(const Store& store, std::uint64_t num_results_
   for (const RunRange& range : missing_from(read_, next_run_, store.num_runs())) {
     ResultReader reader = store.results(range);
     while (const std::optional<RunResult> result = reader.next()) {
-      require_in_range(*result, model().results());
+      require_in_range(*result, store.schema());
       results_.add(*result);
       read_.add(RunRange{result->run, 1});
       next_run_ = result->run.value + 1;

@@ -65,11 +65,11 @@ std::unique_ptr<detail::Database> open_files(const QueryFiles& files) {
   PROOFMASS_EXPECT(files.attached.size() <= attached_files_max);
   detail::check_presence(files.main);
   auto database = std::make_unique<detail::Database>(files.main, detail::Access::read_only);
-  detail::prepare_reader(*database, files.main);
+  (void)detail::prepare_reader(*database, files.main);
   for (const auto& [name, file] : files.attached) {
     detail::check_presence(file);
     detail::Database other(file, detail::Access::read_only);
-    detail::prepare_reader(other, file);
+    (void)detail::prepare_reader(other, file);
     database->attach(other, name);
   }
   // A private copy has it on: the caller has tables of its own to add before it is turned on again.

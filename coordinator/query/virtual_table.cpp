@@ -77,7 +77,7 @@ std::string quoted_name(std::string_view name) {
 
 std::vector<DataTable> data_tables_of(sqlite3* connection, const std::string& database) {
   std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model().results().tables) {
+  for (const DataTableSchema& schema : model().tables()) {
     const int num_columns = static_cast<int>(schema.columns.size());
     DataTable table{.key = std::string(schema.key),
                     .num_columns = static_cast<std::uint32_t>(num_columns)};

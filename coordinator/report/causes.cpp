@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "coordinator/report/sensitivity.hpp"
-#include "core/model.hpp"
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/sensitivity.hpp"
@@ -88,7 +87,7 @@ void add_correlated(const DrawnRuns& drawn, std::size_t quantity,
 std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) {
   DrawnRuns drawn = read_drawn_runs(store, campaign, cause_runs_max);
   if (drawn.runs.size() < sensitivity_values_min) return std::nullopt;
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const std::vector<Quantity>& quantities = drawn.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {  // The last columns are the truths.
     drawn.names.end()[static_cast<std::ptrdiff_t>(i) - std::ssize(quantities)] =
         fmt::format("true {}", quantities[i].symbol);

@@ -10,8 +10,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/model.hpp"
-
 namespace proofmass::coordinator {
 namespace {
 
@@ -43,16 +41,17 @@ class Layout {
 
 }  // namespace
 
+Digest::Digest(const ResultSchema& schema) : num_quantities_(schema.quantities.size()) {}
+
 void Digest::add(const RunResult& result) {
-  const std::size_t num_quantities = model().results().quantities.size();
   Layout layout(bytes_);
   layout.put(result.run.value);
   layout.put(static_cast<std::uint32_t>(result.status));
   layout.put(result.num_draws);
   layout.put(result.num_rounds);
   layout.put(std::uint32_t{0});
-  layout.put(result.truth, result.has_truth(), num_quantities);
-  layout.put(result.estimate, result.has_estimate(), num_quantities);
+  layout.put(result.truth, result.has_truth(), num_quantities_);
+  layout.put(result.estimate, result.has_estimate(), num_quantities_);
   layout.put(result.standard_error, true, result.standard_error.size());
   layout.put(result.fit, true, result.fit.size());
   layout.put(result.correlations, true, result.correlations.size());
@@ -76,7 +75,7 @@ ResultDigests Digest::finish() {
 }
 
 std::string digest_of(const Store& store) {
-  Digest digest;
+  Digest digest(store.schema());
   store.for_each_result([&](const RunResult& result) { digest.add(result); });
   return digest.finish().results;
 }
@@ -116,7 +115,7 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results,
 WalkedResults walk_checked(const Store& store, const std::function<void(const RunResult&)>& visit) {
   WalkedResults walked;
   store.read_one_state([&] {
-    Digest digest;
+    Digest digest(store.schema());
     store.for_each_result([&](const RunResult& result) {
       visit(result);
       digest.add(result);

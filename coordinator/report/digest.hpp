@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -24,12 +25,16 @@ namespace proofmass::coordinator {
 /// ResultSchema::health, cause and session of the loss (32 bits each; 0 unless the run is lost).
 class Digest {
  public:
+  /// @param schema  Of the campaign.
+  explicit Digest(const ResultSchema& schema);
+
   void add(const RunResult& result);
 
   /// @pre Called once, at the end.
   [[nodiscard]] ResultDigests finish();
 
  private:
+  std::size_t num_quantities_;
   Sha256 hash_;
   Sha256 health_hash_;
   std::vector<unsigned char> bytes_;  // Of one result: kept from one to the next.

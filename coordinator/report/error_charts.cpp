@@ -6,12 +6,13 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-const Quantity& quantity_at(std::size_t index) { return model().results().quantities[index]; }
+const Quantity& quantity_at(const Review& review, std::size_t index) {
+  return review.schema.quantities[index];
+}
 
 /// `|error| of offset, nm`; of a pure number without a unit.
 std::string axis_label(std::string_view what, const Quantity& quantity) {
@@ -31,7 +32,7 @@ Bars bars_of(const Histogram& histogram, double scale) {
 std::string objective_sentence(const Review& review, std::size_t index) {
   const double objective = review.objectives[index];
   if (!std::isfinite(objective)) return "It has no objective.";
-  const Quantity& quantity = quantity_at(index);
+  const Quantity& quantity = quantity_at(review, index);
   const std::uint64_t beyond = review.results.statistics.num_estimated == 0
                                    ? 0
                                    : review.results.statistics.accuracy[index].num_beyond_objective;
@@ -43,7 +44,7 @@ std::string objective_sentence(const Review& review, std::size_t index) {
 std::string worst_sentence(const Review& review, std::size_t index) {
   const std::vector<RunValue>& worst = review.figures[index].worst;
   if (worst.empty()) return "No run has an estimate.";
-  const Quantity& quantity = quantity_at(index);
+  const Quantity& quantity = quantity_at(review, index);
   std::string text = "The largest errors are";
   for (std::size_t i = 0; i < worst.size(); ++i) {
     text += fmt::format("{} {} in run {}", i == 0 ? "" : ",",
@@ -106,7 +107,7 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
   const std::vector<ConvergencePoint>& points = review.figures[index].convergence;
   if (points.empty()) return "No run has an estimate.";
   const ConvergencePoint& last = points.back();
-  const double scale = quantity_at(index).display_scale;
+  const double scale = quantity_at(review, index).display_scale;
   std::string text = fmt::format("After {} runs the worst is {}, the mean {}", last.num_runs,
                                  figure_text(last.worst / scale), figure_text(last.mean / scale));
   if (last.mean_interval) {
@@ -115,7 +116,7 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
                         figure_text(last.mean_interval->upper / scale));
   }
   return text + fmt::format(", and the standard deviation {}.",
-                            quantity_text(last.standard_deviation, quantity_at(index)));
+                            quantity_text(last.standard_deviation, quantity_at(review, index)));
 }
 
 /// Half the width of an interval over the value in its middle, percent.
@@ -127,7 +128,7 @@ std::optional<double> relative_percent(const std::optional<Interval>& interval, 
 }  // namespace
 
 Chart magnitude_chart(const Review& review, std::size_t index) {
-  const Quantity& quantity = quantity_at(index);
+  const Quantity& quantity = quantity_at(review, index);
   const Histogram& histogram = review.figures[index].magnitudes;
   Chart chart{.text = {.id = fmt::format("histogram-{}", quantity.name),
                        .title = fmt::format("|error| of {}", quantity.symbol),
@@ -144,7 +145,7 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
 }
 
 Chart error_chart(const Review& review, std::size_t index) {
-  const Quantity& quantity = quantity_at(index);
+  const Quantity& quantity = quantity_at(review, index);
   const CampaignStatistics& statistics = review.results.statistics;
   Chart chart{.text = {.id = fmt::format("error-{}", quantity.name),
                        .title = fmt::format("Error of {}", quantity.symbol),
@@ -172,7 +173,7 @@ Chart error_chart(const Review& review, std::size_t index) {
 }
 
 Chart convergence_chart(const Review& review, std::size_t index) {
-  const Quantity& quantity = quantity_at(index);
+  const Quantity& quantity = quantity_at(review, index);
   const double scale = quantity.display_scale;
   Line worst{.name = "worst", .ink = Ink::second, .dash = Dash::dashed};
   Line mean{.name = "mean", .ink = Ink::first};
@@ -203,7 +204,7 @@ ChartGrid magnitude_overview(const Review& review) {
       .num_columns = 2,
       .charts = {}};
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
-    const Quantity& quantity = quantity_at(i);
+    const Quantity& quantity = quantity_at(review, i);
     const double objective = review.objectives[i];
     const std::vector<RunValue>& worst = review.figures[i].worst;
     double scale = std::isfinite(objective) ? objective : 1.0;
@@ -247,13 +248,14 @@ ChartGrid convergence_overview(const Review& review) {
         deviation.points.push_back({n, *width});
       }
     }
-    grid.charts.push_back({.text = {.id = fmt::format("convergence-of-{}", quantity_at(i).name),
-                                    .title = std::string(quantity_at(i).symbol),
-                                    .description = ""},
-                           .x = {.label = "runs", .scale = Scale::logarithmic},
-                           .y = {.label = "± %", .from = 0.0, .to = 100.0},
-                           .layers = {std::move(mean), std::move(deviation)},
-                           .plot_height = 90.0});
+    grid.charts.push_back(
+        {.text = {.id = fmt::format("convergence-of-{}", quantity_at(review, i).name),
+                  .title = std::string(quantity_at(review, i).symbol),
+                  .description = ""},
+         .x = {.label = "runs", .scale = Scale::logarithmic},
+         .y = {.label = "± %", .from = 0.0, .to = 100.0},
+         .layers = {std::move(mean), std::move(deviation)},
+         .plot_height = 90.0});
   }
   return grid;
 }

@@ -11,22 +11,10 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 #include "core/statistics/moments.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-/// Position among a result's standard errors; empty if the quantity has none.
-std::optional<std::size_t> standard_error_of(std::size_t quantity) {
-  const std::vector<proofmass::Quantity>& all = model().results().quantities;
-  if (!all[quantity].has_standard_error) return std::nullopt;
-  std::size_t position = 0;
-  for (std::size_t i = 0; i < quantity; ++i) {
-    if (all[i].has_standard_error) ++position;
-  }
-  return position;
-}
 
 GroupedShare share_of(const GroupedHits& hits) {
   return {hits.share(), hits.interval(default_confidence)};
@@ -39,7 +27,8 @@ std::uint64_t count_of(std::span<const RunResult> runs, const IsHit& is_hit) {
 
 }  // namespace
 
-RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint64_t realisations)
+RunningInstruments::RunningInstruments(const ResultSchema& schema, std::vector<double> objectives,
+                                       std::uint64_t realisations)
     : objectives_(std::move(objectives)), realisations_(realisations), within_(realisations) {
   PROOFMASS_EXPECT(realisations_ > 1);
   counts_.realisations = realisations_;
@@ -48,6 +37,10 @@ RunningInstruments::RunningInstruments(std::vector<double> objectives, std::uint
                                           .beyond = hits,
                                           .covered = hits,
                                           .covered_within = hits});
+  std::size_t num_standard_errors = 0;
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    if (schema.quantities[i].has_standard_error) quantities_[i].position = num_standard_errors++;
+  }
 }
 
 void RunningInstruments::add(const RunResult& run) {
@@ -99,7 +92,7 @@ void RunningInstruments::add_shares(std::size_t i) {
   quantity.beyond.add(count_of(runs_, [&](const RunResult& run) {
     return !run.is_completed() || std::abs(run.error(i)) > objectives_[i];
   }));
-  const std::optional<std::size_t> position = standard_error_of(i);
+  const std::optional<std::size_t>& position = quantity.position;
   if (!position) return;
   const auto has_sigma = [](const RunResult& run) {
     return run.is_completed() && !run.standard_error.empty();
@@ -127,7 +120,7 @@ void RunningInstruments::add_shares(std::size_t i) {
 
 void RunningInstruments::add_values(std::size_t i) {
   Quantity& quantity = quantities_[i];
-  const std::optional<std::size_t> position = standard_error_of(i);
+  const std::optional<std::size_t>& position = quantity.position;
   std::vector<double> errors;
   CompensatedSum magnitudes;
   for (const RunResult& run : runs_) {
@@ -156,7 +149,7 @@ InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
       of.magnitude_interval->lower = std::fmax(of.magnitude_interval->lower, 0.0);
     }
   }
-  if (!have_standard_errors_ || !standard_error_of(i)) return of;
+  if (!have_standard_errors_ || !quantity.position) return of;
   of.standard_errors = {.within_ratio = {},
                         .covered = share_of(quantity.covered),
                         .covered_within = share_of(quantity.covered_within)};
@@ -282,7 +275,7 @@ std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) 
 
 }  // namespace
 
-Table variance_table(const InstrumentStatistics& statistics) {
+Table variance_table(const ResultSchema& schema, const InstrumentStatistics& statistics) {
   if (statistics.quantities.empty()) return no_instruments(statistics);
   constexpr const char* mean = "mean of |error|";
   constexpr const char* deviation = "std of the error";
@@ -301,12 +294,12 @@ Table variance_table(const InstrumentStatistics& statistics) {
                           {"to", false, 6, noise}},
               .notes = variance_notes(statistics)};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    table.rows.push_back(variance_row(model().results().quantities[i], statistics.quantities[i]));
+    table.rows.push_back(variance_row(schema.quantities[i], statistics.quantities[i]));
   }
   return table;
 }
 
-Table instrument_table(const InstrumentStatistics& statistics) {
+Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   constexpr const char* beyond = "beyond, %";
   constexpr const char* covered = "in 1.96 σ, %";
@@ -338,7 +331,7 @@ Table instrument_table(const InstrumentStatistics& statistics) {
                    share_text(statistics.ensemble), statistics.realisations),
        temporal_text(statistics)});
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    const proofmass::Quantity& quantity = model().results().quantities[i];
+    const proofmass::Quantity& quantity = schema.quantities[i];
     const InstrumentQuantity& of = statistics.quantities[i];
     Row row{quantity.symbol};
     add_ends(of.error.mean_interval, quantity.display_scale, row);
@@ -397,7 +390,7 @@ Json json_of(const InstrumentQuantity& of) {
 
 }  // namespace
 
-nlohmann::ordered_json json_of(const InstrumentStatistics& statistics) {
+nlohmann::ordered_json json_of(const ResultSchema& schema, const InstrumentStatistics& statistics) {
   Json json{{"realisations", statistics.realisations},
             {"num_instruments", statistics.num_instruments},
             {"num_incomplete", statistics.num_incomplete},
@@ -413,7 +406,7 @@ nlohmann::ordered_json json_of(const InstrumentStatistics& statistics) {
                                 {"first_instrument", statistics.temporal_instrument}}}};
   }
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    Json row{{"parameter", model().results().quantities[i].name}};
+    Json row{{"parameter", schema.quantities[i].name}};
     row.update(json_of(statistics.quantities[i]));
     json["parameters"].push_back(std::move(row));
   }

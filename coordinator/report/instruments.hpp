@@ -60,9 +60,11 @@ struct InstrumentStatistics {
 /// as a lost one.
 class RunningInstruments {
  public:
+  /// @param schema        Of the campaign.
   /// @param objectives    Of each quantity, SI.
   /// @param realisations  At least 2.
-  RunningInstruments(std::vector<double> objectives, std::uint64_t realisations);
+  RunningInstruments(const ResultSchema& schema, std::vector<double> objectives,
+                     std::uint64_t realisations);
 
   void add(const RunResult& result);
   /// @pre Every result was added; to be called once.
@@ -73,7 +75,8 @@ class RunningInstruments {
     GroupedValues errors;
     MomentSums magnitudes{0.0};  ///< Of the instruments' means.
     GroupedHits beyond, covered, covered_within;
-    double squared_standard_errors = 0.0;  ///< Sum over the runs in `errors`.
+    std::optional<std::size_t> position = {};  ///< Of its standard error, if it has one.
+    double squared_standard_errors = 0.0;      ///< Sum over the runs in `errors`.
   };
   void finish_instrument();
   void add_objectives();
@@ -93,12 +96,15 @@ class RunningInstruments {
 };
 
 /// Variances between instruments and within; says so if there is no complete instrument.
-[[nodiscard]] Table variance_table(const InstrumentStatistics& statistics);
+[[nodiscard]] Table variance_table(const ResultSchema& schema,
+                                   const InstrumentStatistics& statistics);
 
 /// Biases, and shares of runs. No rows without a complete instrument.
-[[nodiscard]] Table instrument_table(const InstrumentStatistics& statistics);
+[[nodiscard]] Table instrument_table(const ResultSchema& schema,
+                                     const InstrumentStatistics& statistics);
 
 /// All of it for programs.
-[[nodiscard]] nlohmann::ordered_json json_of(const InstrumentStatistics& statistics);
+[[nodiscard]] nlohmann::ordered_json json_of(const ResultSchema& schema,
+                                             const InstrumentStatistics& statistics);
 
 }  // namespace proofmass::coordinator

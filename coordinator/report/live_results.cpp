@@ -14,10 +14,12 @@
 
 namespace proofmass::coordinator {
 
-LiveResults::LiveResults(const Campaign& campaign)
-    : objectives_(campaign.objectives()),
+LiveResults::LiveResults(const Campaign& campaign, const ResultSchema& schema)
+    : schema_(schema),
+      objectives_(campaign.objectives()),
       are_draws_independent_(why_not_independent(campaign).empty()),
       statistics_(objectives_),
+      standard_errors_(schema_),
       magnitudes_(objectives_.size()) {}
 
 void LiveResults::add(const RunResult& result) {
@@ -37,6 +39,7 @@ CampaignStatistics LiveResults::statistics() const {
 
 std::string LiveResults::html() const {
   Review review;
+  review.schema = schema_;
   review.objectives = objectives_;
   review.results.statistics = statistics();
   for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
@@ -50,9 +53,9 @@ std::string LiveResults::html() const {
   }
   StandardErrorStatistics errors = standard_errors_.statistics();
   if (!are_draws_independent_) leave_out_intervals(errors);
-  const Table of_errors = standard_error_table(errors);
+  const Table of_errors = standard_error_table(schema_, errors);
   return "<h3>Accuracy so far</h3>\n" +
-         html_table(accuracy_table(objectives_, review.results.statistics)) +
+         html_table(accuracy_table(schema_, objectives_, review.results.statistics)) +
          (of_errors.rows.empty() ? "" : html_table(of_errors)) +
          "<h3>Errors so far</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";

@@ -15,7 +15,8 @@ namespace proofmass::coordinator {
 /// 17 kB a quantity, so that a copy costs little.
 class LiveResults {
  public:
-  explicit LiveResults(const Campaign& campaign);
+  /// @param schema  Of the results, which are the campaign's.
+  LiveResults(const Campaign& campaign, const ResultSchema& schema);
 
   /// @param result  Its numbers are in range; the run was not added before.
   void add(const RunResult& result);
@@ -27,6 +28,7 @@ class LiveResults {
   [[nodiscard]] std::string html() const;
 
  private:
+  ResultSchema schema_;
   std::vector<double> objectives_;
   bool are_draws_independent_;
   RunningStatistics statistics_;

@@ -5,32 +5,26 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "core/model.hpp"
-#include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 Cell count_cell(std::uint64_t count) { return {std::to_string(count), static_cast<double>(count)}; }
 
-Quantity quantity_of(const RequirementAnswer& row) {
-  return requirement_subject(row.requirement.parameter);
-}
-
 /// `|error| of a_c12`, or the budget or a term of it.
-std::string subject_of(const RequirementAnswer& row) {
+std::string subject_of(const RequirementAnswer& row, std::size_t num_quantities) {
   if (row.is_joint()) return "all objectives";
-  const std::string symbol(quantity_of(row).symbol);
-  const bool is_error = row.requirement.parameter < model().results().quantities.size();
+  const std::string symbol(row.subject.symbol);
+  const bool is_error = row.requirement.parameter < num_quantities;
   return is_error ? "|error| of " + symbol : symbol;
 }
 
 /// In the unit of the tables; a ratio to the objectives without one.
 Cell value_cell(const RequirementAnswer& row, const std::optional<double>& value) {
   if (!value) return "none";
-  return {row.is_joint() ? figure_text(*value) + " × objective"
-                         : quantity_text(*value, quantity_of(row)),
-          *value};
+  return {
+      row.is_joint() ? figure_text(*value) + " × objective" : quantity_text(*value, row.subject),
+      *value};
 }
 
 Cell margin_cell(const RequirementAnswer& row) {
@@ -40,19 +34,19 @@ Cell margin_cell(const RequirementAnswer& row) {
 }
 
 /// `|error| of a_c12, for 95 % with 90 %`, after the words of the project.
-std::string statement_of(const RequirementAnswer& row) {
+std::string statement_of(const RequirementAnswer& row, std::size_t num_quantities) {
   const Tolerance& tolerance = row.requirement.tolerance;
   const std::string text =
-      fmt::format("{}, for {} with {}", subject_of(row), given_percent(tolerance.coverage),
-                  given_percent(tolerance.confidence));
+      fmt::format("{}, for {} with {}", subject_of(row, num_quantities),
+                  given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   return row.stated.text.empty() || is_default(row) ? text
                                                     : fmt::format("{} ({})", row.stated.text, text);
 }
 
-Row matrix_cells(const RequirementAnswer& row) {
+Row matrix_cells(const RequirementAnswer& row, std::size_t num_quantities) {
   const RequirementCheck& check = row.check;
   return {requirement_name(row),
-          statement_of(row),
+          statement_of(row, num_quantities),
           value_cell(row, row.limit),
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
@@ -111,7 +105,7 @@ bool is_default(const RequirementAnswer& row) {
 }
 
 std::string requirement_name(const RequirementAnswer& row) {
-  return is_default(row) && !row.is_joint() ? std::string(quantity_of(row).symbol) : row.stated.id;
+  return is_default(row) && !row.is_joint() ? std::string(row.subject.symbol) : row.stated.id;
 }
 
 Table matrix_table(const Review& review) {
@@ -135,7 +129,9 @@ Table matrix_table(const Review& review) {
     table.notes = {fmt::format("No verdicts: {}.", review.why_not_independent)};
     return table;
   }
-  for (const RequirementAnswer& row : review.matrix) table.rows.push_back(matrix_cells(row));
+  for (const RequirementAnswer& row : review.matrix) {
+    table.rows.push_back(matrix_cells(row, review.schema.quantities.size()));
+  }
   return table;
 }
 

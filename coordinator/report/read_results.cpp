@@ -11,7 +11,6 @@
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/order.hpp"
 
@@ -86,8 +85,12 @@ class RunGroups {
   RunGroups(const Store& store, const Campaign& campaign) {
     const std::uint64_t realisations = campaign.num_realisations();
     const SamplingDesign design = campaign.sampling_design();
-    if (realisations > 1) instruments_.emplace(campaign.objectives(), realisations);
-    if (design.points > 1) replicates_.emplace(campaign.objectives(), design);
+    if (realisations > 1) {
+      instruments_.emplace(store.schema(), campaign.objectives(), realisations);
+    }
+    if (design.points > 1) {
+      replicates_.emplace(store.schema(), campaign.objectives(), design);
+    }
     if (!instruments_ && !replicates_) return;
     given_up_ = store.given_up_runs();
     std::ranges::reverse(given_up_);
@@ -194,14 +197,14 @@ void add_warnings(const Warner& warner, const RunResult& result, CampaignWarning
 
 }  // namespace
 
-std::string warnings_text(const CampaignWarnings& warnings) {
+std::string warnings_text(const ResultSchema& schema, const CampaignWarnings& warnings) {
   if (warnings.num_runs == 0) return "";
   std::string text =
       fmt::format("          {} completed with a warning, of shifts up to\n", warnings.num_runs);
   for (const WarnedQuantity& of : warnings.quantities) {
     text += fmt::format("          {:.2g} of the objective of {}, by {} ({} {}, most in run {})\n",
-                        of.largest_part, model().results().quantities[of.quantity].symbol,
-                        of.effect, of.num_runs, of.num_runs == 1 ? "run" : "runs", of.run.value);
+                        of.largest_part, schema.quantities[of.quantity].symbol, of.effect,
+                        of.num_runs, of.num_runs == 1 ? "run" : "runs", of.run.value);
   }
   return text;
 }
@@ -212,16 +215,16 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       .statistics = {}, .digests = {}, .totals = {}, .warnings = {}, .standard_errors = {}};
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
-  RunningStandardErrors standard_errors;
+  RunningStandardErrors standard_errors(store.schema());
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   const Warner warner = campaign.warner();
   store.read_one_state([&] {
     RunGroups groups(store, campaign);
-    Digest digest;
+    Digest digest(store.schema());
     store.for_each_result([&](const RunResult& result) {
-      require_in_range(result, model().results());
+      require_in_range(result, store.schema());
       statistics.add(result);
       standard_errors.add(result);
       groups.add(result);

@@ -67,7 +67,8 @@ struct CampaignWarnings {
 };
 
 /// `12 with a warning` and a line for each effect and quantity; empty without warnings.
-[[nodiscard]] std::string warnings_text(const CampaignWarnings& warnings);
+[[nodiscard]] std::string warnings_text(const ResultSchema& schema,
+                                        const CampaignWarnings& warnings);
 
 /// What the results of a campaign database yield.
 struct ReadResults {

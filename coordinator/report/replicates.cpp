@@ -9,7 +9,6 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -18,10 +17,14 @@ constexpr std::size_t num_incomplete_named = 5;
 
 }  // namespace
 
-RunningReplicates::RunningReplicates(std::vector<double> objectives, const SamplingDesign& design)
+RunningReplicates::RunningReplicates(const ResultSchema& schema, std::vector<double> objectives,
+                                     const SamplingDesign& design)
     : objectives_(std::move(objectives)), quantities_(objectives_.size()) {
   PROOFMASS_EXPECT(design.points > 1);
   counts_.design = design;
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    quantities_[i].has_standard_error = schema.quantities[i].has_standard_error;
+  }
 }
 
 void RunningReplicates::add(const RunResult& result) {
@@ -49,7 +52,7 @@ void RunningReplicates::add_errors(const RunResult& result) {
     quantity.beyond.sum += is_beyond ? 1.0 : 0.0;
     is_within = is_within && !is_beyond;
     if (sigma == result.standard_error.end()) continue;
-    if (!model().results().quantities[i].has_standard_error) continue;
+    if (!quantity.has_standard_error) continue;
     quantity.covered.sum += std::abs(error) < normal_95 * *sigma++ ? 1.0 : 0.0;
   }
   within_.sum += is_within ? 1.0 : 0.0;
@@ -128,7 +131,7 @@ ReplicateStatistics RunningReplicates::statistics() const {
                           .mean_square = quantity.mean_square.mean(),
                           .beyond = quantity.beyond.share(num_runs),
                           .covered = {}};
-    if (have_standard_errors_ && model().results().quantities[i].has_standard_error) {
+    if (have_standard_errors_ && quantity.has_standard_error) {
       of.covered = quantity.covered.share(statistics.num_estimated);
     }
     statistics.quantities.push_back(std::move(of));
@@ -202,7 +205,7 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
 
 }  // namespace
 
-Table replicate_table(const ReplicateStatistics& statistics) {
+Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   constexpr const char* magnitude = "mean of |error|";
   constexpr const char* bias = "bias";
@@ -221,7 +224,7 @@ Table replicate_table(const ReplicateStatistics& statistics) {
                           {"to", false, 8, beyond}},
               .notes = replicate_notes(statistics)};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    const proofmass::Quantity& quantity = model().results().quantities[i];
+    const proofmass::Quantity& quantity = schema.quantities[i];
     const ReplicatedQuantity& of = statistics.quantities[i];
     const double scale = quantity.display_scale;
     Row row{quantity.symbol};
@@ -246,7 +249,7 @@ Json json_of(const ReplicatedMean& of) {
 
 }  // namespace
 
-nlohmann::ordered_json json_of(const ReplicateStatistics& statistics) {
+nlohmann::ordered_json json_of(const ResultSchema& schema, const ReplicateStatistics& statistics) {
   Json json{{"design", name_of(statistics.design.kind)},
             {"points", statistics.design.points},
             {"num_replicates", statistics.num_replicates},
@@ -258,7 +261,7 @@ nlohmann::ordered_json json_of(const ReplicateStatistics& statistics) {
             {"parameters", Json::array()}};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     const ReplicatedQuantity& of = statistics.quantities[i];
-    json["parameters"].push_back({{"parameter", model().results().quantities[i].name},
+    json["parameters"].push_back({{"parameter", schema.quantities[i].name},
                                   {"magnitude", json_of(of.magnitude)},
                                   {"bias", json_of(of.bias)},
                                   {"mean_square", json_of(of.mean_square)},

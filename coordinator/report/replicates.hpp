@@ -60,9 +60,11 @@ inline constexpr double count_deviation_min = 0.5;
 /// as a lost one.
 class RunningReplicates {
  public:
+  /// @param schema      Of the campaign.
   /// @param objectives  Of each quantity, SI.
   /// @param design      Not `random`.
-  RunningReplicates(std::vector<double> objectives, const SamplingDesign& design);
+  RunningReplicates(const ResultSchema& schema, std::vector<double> objectives,
+                    const SamplingDesign& design);
 
   void add(const RunResult& result);
   /// An interval needs num_replicates_of_interval replicates, one of a share also
@@ -82,6 +84,7 @@ class RunningReplicates {
     [[nodiscard]] ReplicatedMean share(std::uint64_t num_runs) const;
   };
   struct Quantity {
+    bool has_standard_error = false;
     Mean magnitude, bias, mean_square, beyond, covered;
   };
   void add_errors(const RunResult& result);
@@ -98,9 +101,11 @@ class RunningReplicates {
 
 /// Intervals with the replicate as their unit, and shares of runs. No rows without a completed run
 /// in a complete replicate.
-[[nodiscard]] Table replicate_table(const ReplicateStatistics& statistics);
+[[nodiscard]] Table replicate_table(const ResultSchema& schema,
+                                    const ReplicateStatistics& statistics);
 
 /// The same for programs.
-[[nodiscard]] nlohmann::ordered_json json_of(const ReplicateStatistics& statistics);
+[[nodiscard]] nlohmann::ordered_json json_of(const ResultSchema& schema,
+                                             const ReplicateStatistics& statistics);
 
 }  // namespace proofmass::coordinator

@@ -14,21 +14,24 @@ namespace {
 
 std::string report_of_one_state(const Store& store, const Campaign& campaign, Paint paint) {
   const auto [results, check, given_up] = read_checked_results(store, campaign);
+  const ResultSchema& schema = store.schema();
   const CampaignStatistics& statistics = results.statistics;
   const std::uint64_t num_given_up = num_runs_in(given_up);
-  std::string text = wire::visible_lines(summary_text(store.name(), store.seed(), store.num_runs(),
-                                                      statistics, results.digests.results, check)) +
-                     given_up_text(given_up, paint) +
-                     wire::visible_lines(warnings_text(results.warnings) + stop_text(store));
+  std::string text =
+      wire::visible_lines(summary_text(store.name(), store.seed(), store.num_runs(), statistics,
+                                       results.digests.results, check)) +
+      given_up_text(given_up, paint) +
+      wire::visible_lines(warnings_text(schema, results.warnings) + stop_text(store));
   const InstrumentStatistics instruments = results.instruments.value_or(InstrumentStatistics{});
   for (const Table& table :
-       {accuracy_table(campaign.objectives(), statistics), interval_table(statistics, num_given_up),
-        error_table(statistics, num_given_up, campaign.interpretation(),
+       {accuracy_table(schema, campaign.objectives(), statistics),
+        interval_table(schema, statistics, num_given_up),
+        error_table(schema, statistics, num_given_up, campaign.interpretation(),
                     why_not_independent(campaign)),
-        standard_error_table(results.standard_errors), variance_table(instruments),
-        instrument_table(instruments),
-        replicate_table(results.replicates.value_or(ReplicateStatistics{})),
-        budget_table(campaign.error_budget(), statistics, results.totals)}) {
+        standard_error_table(schema, results.standard_errors), variance_table(schema, instruments),
+        instrument_table(schema, instruments),
+        replicate_table(schema, results.replicates.value_or(ReplicateStatistics{})),
+        budget_table(schema, campaign.error_budget(), statistics, results.totals)}) {
     if (!table.rows.empty()) text += "\n" + terminal_text(table, {.paint = paint});
   }
   return text;

@@ -10,8 +10,6 @@
 #include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
-#include "core/model.hpp"
-#include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -70,8 +68,8 @@ Json statistics_of(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
   return json;
 }
 
-Json parameters_of(const std::vector<double>& objectives, const CampaignStatistics& statistics) {
-  const std::vector<Quantity>& quantities = model().results().quantities;
+Json parameters_of(const std::vector<Quantity>& quantities, const std::vector<double>& objectives,
+                   const CampaignStatistics& statistics) {
   Json json = Json::array();
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     Json parameter{{"parameter", quantities[i].name},
@@ -84,7 +82,7 @@ Json parameters_of(const std::vector<double>& objectives, const CampaignStatisti
   return json;
 }
 
-Json budget_of(const Campaign& campaign, const ReadResults& results) {
+Json budget_of(const ResultSchema& schema, const Campaign& campaign, const ReadResults& results) {
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   if (!budget) return nullptr;
   const auto& [before, worst, mean] = budget_columns(*budget, results.statistics);
@@ -98,7 +96,7 @@ Json budget_of(const Campaign& campaign, const ReadResults& results) {
             {"total", row(budget->total_info.name, [](const Budget& of) { return of.total; })},
             {"single_runs", nullptr},
             {"level",
-             {{"quantity", model().results().health.at(budget->level).column()},
+             {{"quantity", schema.health.at(budget->level).column()},
               {"worst", nullptr},
               {"mean", nullptr},
               {"assumed", budget->assumed_level}}}};
@@ -119,11 +117,11 @@ Json budget_of(const Campaign& campaign, const ReadResults& results) {
   return json;
 }
 
-Json warnings_of(const CampaignWarnings& warnings) {
+Json warnings_of(const ResultSchema& schema, const CampaignWarnings& warnings) {
   Json json = Json::array();
   for (const WarnedQuantity& of : warnings.quantities) {
     json.push_back({{"effect", of.effect},
-                    {"parameter", model().results().quantities[of.quantity].name},
+                    {"parameter", schema.quantities[of.quantity].name},
                     {"num_runs", of.num_runs},
                     {"largest_part", of.largest_part},
                     {"largest_run", of.run.value}});
@@ -132,11 +130,11 @@ Json warnings_of(const CampaignWarnings& warnings) {
 }
 
 /// Null without standard errors.
-Json standard_errors_of(const StandardErrorStatistics& statistics) {
+Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return nullptr;
   Json json{{"parameters", Json::array()}, {"fit", Json::object()}};
   for (const StandardErrorStatistic& of : statistics.quantities) {
-    json["parameters"].push_back({{"parameter", model().results().quantities[of.quantity].name},
+    json["parameters"].push_back({{"parameter", schema.quantities[of.quantity].name},
                                   {"num_runs", of.num_runs},
                                   {"mean", of.mean},
                                   {"squared_ratio", of.squared_ratio},
@@ -145,7 +143,7 @@ Json standard_errors_of(const StandardErrorStatistics& statistics) {
                                   {"fraction_within_95_interval", bounds_of(of.within)}});
   }
   for (std::size_t i = 0; i < statistics.fit.size(); ++i) {
-    json["fit"]["mean_" + model().results().fit[i].column()] = statistics.fit[i];
+    json["fit"]["mean_" + schema.fit[i].column()] = statistics.fit[i];
   }
   return json;
 }
@@ -169,7 +167,7 @@ Json json_of(const RequirementAnswer& answer) {
             {"num_runs_at_best", or_null(check.num_runs_at_best)},
             {"num_runs_at_this_rate", or_null(check.num_runs_at_this_rate)}};
   if (!answer.is_joint()) {
-    json["parameter"] = requirement_subject(requirement.parameter).name;
+    json["parameter"] = answer.subject.name;
     json["limit"] = requirement.limit;
   }
   return json;
@@ -193,8 +191,9 @@ Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
 std::string report_json(const Store& store, const Campaign& campaign,
                         std::span<const RequirementAnswer> answers,
                         std::span<const StatedRequirement> stated) {
+  const ResultSchema& schema = store.schema();
   VerificationMatrix matrix(
-      matrix_requirements({stated.begin(), stated.end()}, campaign.objectives()),
+      schema, matrix_requirements(schema, {stated.begin(), stated.end()}, campaign.objectives()),
       campaign.objectives(), num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
       campaign.error_budget());
   const CheckedResults checked = read_checked_results(
@@ -217,22 +216,22 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"num_lost", statistics.num_lost},
             {"num_given_up", num_given_up},
             {"num_warned", checked.results.warnings.num_runs},
-            {"warnings", warnings_of(checked.results.warnings)},
+            {"warnings", warnings_of(schema, checked.results.warnings)},
             {"confidence", default_confidence},
-            {"parameters", parameters_of(campaign.objectives(), statistics)},
+            {"parameters", parameters_of(schema.quantities, campaign.objectives(), statistics)},
             {"all_objectives",
              {{"num_within", statistics.num_within_objectives},
               {"num_runs", statistics.num_runs + num_given_up},
               {"fraction_within_interval", bounds_of(statistics.within_objectives(num_given_up))}}},
-            {"standard_errors", standard_errors_of(checked.results.standard_errors)},
-            {"budget", budget_of(campaign, checked.results)},
+            {"standard_errors", standard_errors_of(schema, checked.results.standard_errors)},
+            {"budget", budget_of(schema, campaign, checked.results)},
             {"requirements", Json::array()},
             {"matrix", Json::array()}};
   if (const auto& instruments = checked.results.instruments) {
-    json["instruments"] = json_of(*instruments);
+    json["instruments"] = json_of(schema, *instruments);
   }
   if (const auto& replicates = checked.results.replicates) {
-    json["replicates"] = json_of(*replicates);
+    json["replicates"] = json_of(schema, *replicates);
   }
   json["why_not_independent"] = why_not_independent(campaign);
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));

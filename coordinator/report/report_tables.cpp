@@ -12,8 +12,6 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/figures.hpp"
-#include "core/model.hpp"
-#include "core/model_rules.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/interval.hpp"
@@ -138,7 +136,7 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
 }
 
 /// Which biases differ from 0 if all parameters are looked at together.
-std::string bias_sentence(const CampaignStatistics& statistics) {
+std::string bias_sentence(const ResultSchema& schema, const CampaignStatistics& statistics) {
   std::vector<double> p_values;
   for (const AccuracyStatistic& accuracy : statistics.accuracy) {
     p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
@@ -147,7 +145,7 @@ std::string bias_sentence(const CampaignStatistics& statistics) {
   std::string names;
   for (std::size_t i = 0; i < adjusted.size(); ++i) {
     if (adjusted[i] >= 1.0 - default_confidence) continue;
-    names += (names.empty() ? "" : ", ") + std::string(model().results().quantities[i].symbol);
+    names += (names.empty() ? "" : ", ") + std::string(schema.quantities[i].symbol);
   }
   return fmt::format(
       "Bias: each interval holds by itself. Of all {} together (Holm, 5 %) {}.", adjusted.size(),
@@ -166,8 +164,9 @@ std::string joint_sentence(const CampaignStatistics& statistics, std::uint64_t n
 }
 
 /// What the level of a budget is, and that it is the one of the runs or an assumed one.
-std::string level_sentence(const ErrorBudget& budget, const CampaignStatistics& statistics) {
-  const std::string_view unit = model().results().health.at(budget.level).unit;
+std::string level_sentence(const ResultSchema& schema, const ErrorBudget& budget,
+                           const CampaignStatistics& statistics) {
+  const std::string_view unit = schema.health.at(budget.level).unit;
   if (statistics.health.empty() || statistics.health.at(budget.level).worst == 0.0) {
     return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
   }
@@ -177,8 +176,9 @@ std::string level_sentence(const ErrorBudget& budget, const CampaignStatistics& 
 }
 
 /// What error_table() shows where draws are not independent and there is no interval.
-Table dependent_error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                            Interpretation interpretation, const std::string& why) {
+Table dependent_error_table(const ResultSchema& schema, const CampaignStatistics& statistics,
+                            std::uint64_t num_given_up, Interpretation interpretation,
+                            const std::string& why) {
   constexpr const char* percentiles = "percentiles of |error|";
   Table table{.id = "error-table",
               .caption = "Errors, in the units above",
@@ -192,7 +192,7 @@ Table dependent_error_table(const CampaignStatistics& statistics, std::uint64_t 
               .notes = {"no intervals over runs: " + why,
                         joint_sentence(statistics, num_given_up, interpretation)}};
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    const Quantity& quantity = model().results().quantities[i];
+    const Quantity& quantity = schema.quantities[i];
     const AccuracyStatistic& accuracy = statistics.accuracy[i];
     Row row{quantity.symbol, figure_cell(accuracy.error.bias, quantity.display_scale),
             skewness_cell(accuracy, statistics.num_estimated)};
@@ -212,12 +212,12 @@ std::string totals_sentence(const RunTotals& totals) {
       totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
 }
 
-std::vector<std::string> budget_notes(const ErrorBudget& budget,
+std::vector<std::string> budget_notes(const ResultSchema& schema, const ErrorBudget& budget,
                                       const CampaignStatistics& statistics,
                                       const std::optional<RunTotals>& totals) {
   std::vector<std::string> notes{
       "before: bounds of construction; worst, mean: left by errors of the estimates",
-      level_sentence(budget, statistics)};
+      level_sentence(schema, budget, statistics)};
   std::istringstream lines(budget.note);
   for (std::string line; std::getline(lines, line);) notes.push_back(line);
   if (totals) notes.push_back(totals_sentence(*totals));
@@ -251,8 +251,8 @@ Cell unit_cell(const Quantity& quantity) {
   return cell;
 }
 
-Table accuracy_table(std::span<const double> objectives, const CampaignStatistics& statistics) {
-  const ResultSchema& schema = model().results();
+Table accuracy_table(const ResultSchema& schema, std::span<const double> objectives,
+                     const CampaignStatistics& statistics) {
   Table table{.id = "accuracy",
               .caption = fmt::format("Accuracy of the estimates: |estimate − truth| of {} {}",
                                      statistics.num_estimated,
@@ -281,7 +281,8 @@ Table accuracy_table(std::span<const double> objectives, const CampaignStatistic
   return table;
 }
 
-Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+Table interval_table(const ResultSchema& schema, const CampaignStatistics& statistics,
+                     std::uint64_t num_given_up) {
   if (statistics.num_estimated == 0 || !statistics.are_draws_independent) return {};
   constexpr const char* mean = "mean of |error|";
   constexpr const char* deviation = "std of |error|";
@@ -297,8 +298,8 @@ Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_giv
                           {"bias", false, 9, "error", true},
                           {"skew", false, 7, "error"}}};
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(interval_row(model().results().quantities[i], statistics.accuracy[i],
-                                      statistics.num_estimated));
+    table.rows.push_back(
+        interval_row(schema.quantities[i], statistics.accuracy[i], statistics.num_estimated));
   }
   if (statistics.num_estimated < num_runs_of_bootstrap) {
     table.notes.emplace_back(
@@ -309,11 +310,13 @@ Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_giv
   return table;
 }
 
-Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                  Interpretation interpretation, const std::string& why_not_independent) {
+Table error_table(const ResultSchema& schema, const CampaignStatistics& statistics,
+                  std::uint64_t num_given_up, Interpretation interpretation,
+                  const std::string& why_not_independent) {
   if (statistics.num_estimated == 0) return {};
   if (!why_not_independent.empty()) {
-    return dependent_error_table(statistics, num_given_up, interpretation, why_not_independent);
+    return dependent_error_table(schema, statistics, num_given_up, interpretation,
+                                 why_not_independent);
   }
   constexpr const char* percentiles = "percentiles of |error|";
   static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
@@ -329,15 +332,15 @@ Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_
                           {"from", false, 7, "beyond, %", true},
                           {"to", false, 8, "beyond, %"}}};
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(error_row(model().results().quantities[i], statistics.accuracy[i]));
+    table.rows.push_back(error_row(schema.quantities[i], statistics.accuracy[i]));
   }
-  table.notes.push_back(bias_sentence(statistics));
+  table.notes.push_back(bias_sentence(schema, statistics));
   table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
   return table;
 }
 
-Table budget_table(const std::optional<ErrorBudget>& budget, const CampaignStatistics& statistics,
-                   const std::optional<RunTotals>& totals) {
+Table budget_table(const ResultSchema& schema, const std::optional<ErrorBudget>& budget,
+                   const CampaignStatistics& statistics, const std::optional<RunTotals>& totals) {
   if (!budget) return {};
   Table table{.id = "budget-table",
               .caption = std::string(budget->title),
@@ -349,7 +352,7 @@ Table budget_table(const std::optional<ErrorBudget>& budget, const CampaignStati
                           {"worst", false, 9, theirs},
                           {"mean", false, 9, theirs}},
               .has_total = true,
-              .notes = budget_notes(*budget, statistics, totals)};
+              .notes = budget_notes(schema, *budget, statistics, totals)};
   const auto figure = [](double value) {
     Cell cell = figure_cell(value);
     cell.text = fmt::format("{:.1e}", value);

@@ -12,6 +12,7 @@
 namespace proofmass::coordinator {
 
 // The tables of `proofmass report`, which are those of a review report and of the live page, too.
+// `schema` is that of the campaign whose statistics are shown.
 // Without an estimate, a table has no rows unless it says otherwise.
 
 /// A number in the display unit, and in SI units for programs.
@@ -24,13 +25,13 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
 
 /// Accuracy of each parameter beside the published one, and whose that is; always with rows.
 /// @param objectives  Of each quantity, SI.
-[[nodiscard]] Table accuracy_table(std::span<const double> objectives,
+[[nodiscard]] Table accuracy_table(const ResultSchema& schema, std::span<const double> objectives,
                                    const CampaignStatistics& statistics);
 
 /// What the draws that were made say about all draws: 95 % intervals of mean and standard
 /// deviation, and the errors' bias and skewness. No rows if they are not independent.
 /// @param num_given_up  Runs that have no result, beside those in the statistics.
-[[nodiscard]] Table interval_table(const CampaignStatistics& statistics,
+[[nodiscard]] Table interval_table(const ResultSchema& schema, const CampaignStatistics& statistics,
                                    std::uint64_t num_given_up);
 
 /// Of the error with its sign the interval of its bias; percentiles of |error|; how often a
@@ -41,13 +42,14 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
 /// @param interpretation  What the probabilities are over.
 /// @param why_not_independent  Of the draws: then bias, skewness and percentiles without intervals,
 ///                             and this reason.
-[[nodiscard]] Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                                Interpretation interpretation,
+[[nodiscard]] Table error_table(const ResultSchema& schema, const CampaignStatistics& statistics,
+                                std::uint64_t num_given_up, Interpretation interpretation,
                                 const std::string& why_not_independent = "");
 
 /// Budget before and after estimation beside the published one, and what single runs have. A
 /// campaign without a budget has no rows; one without an estimate has.
-[[nodiscard]] Table budget_table(const std::optional<ErrorBudget>& budget,
+[[nodiscard]] Table budget_table(const ResultSchema& schema,
+                                 const std::optional<ErrorBudget>& budget,
                                  const CampaignStatistics& statistics,
                                  const std::optional<RunTotals>& totals);
 

@@ -7,7 +7,6 @@
 
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
-#include "core/model_rules.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -87,7 +86,7 @@ std::string bound_line(const RequirementAnswer& answer) {
     return fmt::format("Bound        none of so few draws, for {} with {}\n",
                        given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
-  const Quantity quantity = requirement_subject(answer.requirement.parameter);
+  const Quantity& quantity = answer.subject;
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
                      given_percent(tolerance.coverage), *answer.bound,
                      quantity.unit == "1" ? "" : " ", quantity.unit == "1" ? "" : quantity.unit,

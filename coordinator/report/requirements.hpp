@@ -84,6 +84,7 @@ struct RunValue {
 struct RequirementAnswer {
   StatedRequirement stated;
   Requirement requirement;
+  Quantity subject;  ///< What it is about, see requirement_subject(); unless is_joint().
   RequirementCheck check;
   MissingEstimates missing;  ///< The exceedances for want of an estimate.
   /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest

@@ -5,7 +5,6 @@
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
@@ -25,6 +24,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                          std::vector<StatedRequirement> stated) {
   Review review{.database = {},
                 .identity = identity_of(store),
+                .schema = store.schema(),
                 .results = {},
                 .missing = {},
                 .objectives = campaign.objectives(),
@@ -39,8 +39,8 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                 .stop = {}};
   review.num_given_up = num_runs_in(store.given_up_runs());
   ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()));
-  VerificationMatrix matrix(std::move(stated), review.objectives, review.num_given_up,
-                            store.num_runs_fixed(), review.budget);
+  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives,
+                            review.num_given_up, store.num_runs_fixed(), review.budget);
   CheckedResults checked = read_checked_results(
       store, campaign,
       {.result =
@@ -75,7 +75,7 @@ Review read_review(const Store& store, const Campaign& campaign, std::string_vie
                    std::vector<StatedRequirement> stated, WithCauses with_causes) {
   Review review;
   if (!stated.empty()) require_independent(campaign, "requirement", stated.front().requirement);
-  stated = matrix_requirements(std::move(stated), campaign.objectives());
+  stated = matrix_requirements(store.schema(), std::move(stated), campaign.objectives());
   store.read_one_state([&] {
     review = read_of_one_state(store, campaign, std::move(stated));
     if (with_causes == WithCauses::yes && review.why_not_independent.empty())

@@ -32,6 +32,7 @@ struct CampaignIdentity {
 struct Review {
   std::string database;  ///< As commands name it.
   CampaignIdentity identity;
+  ResultSchema schema;  ///< What the results are.
   ReadResults results;
   DigestCheck digest_check = DigestCheck::not_checked;
   std::uint64_t num_given_up = 0;

@@ -12,7 +12,6 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_tables.hpp"
 #include "coordinator/table/terminal_table.hpp"
-#include "core/model.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
@@ -98,13 +97,13 @@ std::string cell_label(double correlation) {
   return fmt::format("{}.{:02}", correlation < 0.0 ? "−" : "", hundredths);
 }
 
-std::string strongest_sentence(const Causes& causes) {
+std::string strongest_sentence(const ResultSchema& schema, const Causes& causes) {
   std::string text;
   for (const CauseTerm& term : causes.terms) {
     if (term.share < 0.5) continue;
     text += fmt::format(" The error of {} is {} times {}, which explains {:.0f} % of its variance.",
-                        model().results().quantities[term.quantity].symbol, figure_text(term.slope),
-                        term.name, 100.0 * term.share);
+                        schema.quantities[term.quantity].symbol, figure_text(term.slope), term.name,
+                        100.0 * term.share);
   }
   return text;
 }
@@ -156,12 +155,13 @@ std::optional<HeatMap> cause_map(const Review& review) {
   const Causes& causes = *review.causes;
   HeatMap map{.text = {.id = "causes",
                        .title = "Correlation of the errors with draws and their products",
-                       .description = fmt::format("Linear correlation coefficients of {} runs.{}",
-                                                  causes.num_runs, strongest_sentence(causes))},
+                       .description =
+                           fmt::format("Linear correlation coefficients of {} runs.{}",
+                                       causes.num_runs, strongest_sentence(review.schema, causes))},
               .rows = causes.inputs,
               .columns = {},
               .cells = {}};
-  for (const Quantity& quantity : model().results().quantities) {
+  for (const Quantity& quantity : review.schema.quantities) {
     map.columns.emplace_back(quantity.symbol);
   }
   for (const auto& row : causes.correlations) {
@@ -175,14 +175,14 @@ std::optional<HeatMap> cause_map(const Review& review) {
 std::vector<NamedPicture> review_pictures(const Review& review) {
   std::vector<NamedPicture> pictures{{"errors", magnitude_overview(review)},
                                      {"convergence", convergence_overview(review)}};
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const std::vector<Quantity>& quantities = review.schema.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
-    const std::string_view name = quantities[i].name;
+    const std::string& name = quantities[i].name;
     pictures.push_back({fmt::format("histogram:{}", name), magnitude_chart(review, i)});
     pictures.push_back({fmt::format("error:{}", name), error_chart(review, i)});
     pictures.push_back({fmt::format("convergence:{}", name), convergence_chart(review, i)});
   }
-  if (auto grid = pull_overview(review.results.standard_errors)) {
+  if (auto grid = pull_overview(review.schema, review.results.standard_errors)) {
     pictures.push_back({"pulls", *std::move(grid)});
   }
   for (Chart& chart : characteristic_charts(review)) {
@@ -192,7 +192,7 @@ std::vector<NamedPicture> review_pictures(const Review& review) {
   if (auto chart = budget_chart(review)) pictures.push_back({"budget", *std::move(chart)});
   if (auto map = cause_map(review)) pictures.push_back({"causes", *std::move(map)});
   if (!review.spectra) return pictures;
-  std::vector<Chart> spectra = spectrum_charts(*review.spectra);
+  std::vector<Chart> spectra = spectrum_charts(review);
   for (std::size_t i = 0; i < spectra.size(); ++i) {
     pictures.push_back({spectrum_name(review.spectra->sessions[i].session), std::move(spectra[i])});
   }
@@ -241,26 +241,27 @@ std::string spectrum_description(const SessionSpectrum& spectrum, RunIndex run) 
   return text;
 }
 
-Chart spectrum_chart(const SessionSpectrum& spectrum, RunIndex run) {
-  return {
-      .text = {.id = "spectrum-" + spectrum.session,
-               .title = fmt::format("{}: {}", name_in_symbols(spectrum.session), spectrum.meaning),
-               .description = spectrum_description(spectrum, run)},
-      .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
-      .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
-      .layers = {
-          line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
-          line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
-                  Dash::solid),
-          line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed),
-          line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
-          line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
+Chart spectrum_chart(const ResultSchema& schema, const SessionSpectrum& spectrum, RunIndex run) {
+  return {.text = {.id = "spectrum-" + spectrum.session,
+                   .title = fmt::format("{}: {}", name_in_symbols(schema, spectrum.session),
+                                        spectrum.meaning),
+                   .description = spectrum_description(spectrum, run)},
+          .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
+          .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
+          .layers = {
+              line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
+              line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
+                      Dash::solid),
+              line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed),
+              line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
+              line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
 }
 
 /// A line of the estimate, and the noise about it.
-Row line_cells(const SessionSpectrum& spectrum, const SpectrumLine& line) {
+Row line_cells(const ResultSchema& schema, const SessionSpectrum& spectrum,
+               const SpectrumLine& line) {
   const auto& ratio = spectrum.noise_ratio;
-  return {name_in_symbols(spectrum.session),
+  return {name_in_symbols(schema, spectrum.session),
           {figure_text(1e3 * line.frequency_hz), line.frequency_hz},
           {figure_text(line.amplitude), line.amplitude},
           spectrum.unit,
@@ -269,17 +270,19 @@ Row line_cells(const SessionSpectrum& spectrum, const SpectrumLine& line) {
 
 }  // namespace
 
-std::vector<Chart> spectrum_charts(const RunSpectra& spectra) {
+std::vector<Chart> spectrum_charts(const Review& review) {
+  const RunSpectra& spectra = *review.spectra;
   std::vector<Chart> charts;
   for (const SessionSpectrum& spectrum : spectra.sessions) {
-    charts.push_back(spectrum_chart(spectrum, spectra.run));
+    charts.push_back(spectrum_chart(review.schema, spectrum, spectra.run));
   }
   return charts;
 }
 
 std::string spectrum_name(std::string_view session) { return fmt::format("spectrum:{}", session); }
 
-Table spectrum_table(const RunSpectra& spectra) {
+Table spectrum_table(const Review& review) {
+  const RunSpectra& spectra = *review.spectra;
   Table table{.id = "spectra",
               .caption = fmt::format("Lines that the estimates of run {} use", spectra.run.value),
               .columns = {{"session", true},
@@ -292,7 +295,7 @@ Table spectrum_table(const RunSpectra& spectra) {
                         "standard error."}};
   for (const SessionSpectrum& spectrum : spectra.sessions) {
     for (const SpectrumLine& line : spectrum.lines) {
-      if (line.is_used) table.rows.push_back(line_cells(spectrum, line));
+      if (line.is_used) table.rows.push_back(line_cells(review.schema, spectrum, line));
     }
   }
   return table;

@@ -41,8 +41,8 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::optional<HeatMap> cause_map(const Review& review);
 
 /// One for each session with a spectrum: measured, without the fitted lines, and of the noise
-/// model.
-[[nodiscard]] std::vector<Chart> spectrum_charts(const RunSpectra& spectra);
+/// model. @pre There are spectra.
+[[nodiscard]] std::vector<Chart> spectrum_charts(const Review& review);
 
 /// `spectrum:SESSION`, the name of a session's chart.
 [[nodiscard]] std::string spectrum_name(std::string_view session);

@@ -11,7 +11,6 @@
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_tables.hpp"
 #include "coordinator/table/document_table.hpp"
-#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -87,7 +86,7 @@ std::string flow(std::string_view markup) {
 
 std::string error_figures_markup(const Review& review) {
   std::string html;
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const std::vector<Quantity>& quantities = review.schema.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     html += fmt::format("<h3>{}</h3>\n", markup_text(quantities[i].symbol)) +
             flow(figure_of(magnitude_chart(review, i)) + figure_of(error_chart(review, i)) +
@@ -110,15 +109,20 @@ std::string characteristics_markup(const Review& review) {
 
 std::string standard_errors_markup(const Review& review) {
   const StandardErrorStatistics& statistics = review.results.standard_errors;
-  const std::optional<ChartGrid> pulls = pull_overview(statistics);
-  return pulls ? flow(table_part(standard_error_table(statistics)) + figure_of(*pulls)) : "";
+  const std::optional<ChartGrid> pulls = pull_overview(review.schema, statistics);
+  if (!pulls) return "";
+  return flow(table_part(standard_error_table(review.schema, statistics)) + figure_of(*pulls));
 }
 
 std::string instruments_markup(const Review& review) {
-  if (review.results.replicates) return table_part(replicate_table(*review.results.replicates));
-  if (!review.results.instruments) return "";
-  return table_part(variance_table(*review.results.instruments)) +
-         table_part(instrument_table(*review.results.instruments));
+  const ResultSchema& schema = review.schema;
+  if (const auto& replicates = review.results.replicates) {
+    return table_part(replicate_table(schema, *replicates));
+  }
+  const auto& instruments = review.results.instruments;
+  if (!instruments) return "";
+  return table_part(variance_table(schema, *instruments)) +
+         table_part(instrument_table(schema, *instruments));
 }
 
 std::string budget_markup(const Review& review) {
@@ -154,8 +158,8 @@ std::string spectra_markup(const Review& review) {
       "{}</p>\n",
       spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
   std::string figures;
-  for (const Chart& chart : spectrum_charts(spectra)) figures += figure_of(chart);
-  return html + flow(figures + table_part(spectrum_table(spectra)));
+  for (const Chart& chart : spectrum_charts(review)) figures += figure_of(chart);
+  return html + flow(figures + table_part(spectrum_table(review)));
 }
 
 std::string execution_markup(const Review& review) {
@@ -169,14 +173,15 @@ std::string execution_markup(const Review& review) {
 }
 
 std::vector<Section> sections_of(const Review& review) {
+  const ResultSchema& schema = review.schema;
   const CampaignStatistics& statistics = review.results.statistics;
   return {{"verification", "Verification matrix", html_table(matrix_table(review))},
           {"results", "Accuracy",
-           flow(table_part(accuracy_table(review.objectives, statistics)) +
+           flow(table_part(accuracy_table(schema, review.objectives, statistics)) +
                 characteristics_markup(review)) +
-               table_part(interval_table(statistics, review.num_given_up)) +
-               table_part(error_table(statistics, review.num_given_up, review.interpretation,
-                                      review.why_not_independent))},
+               table_part(interval_table(schema, statistics, review.num_given_up)) +
+               table_part(error_table(schema, statistics, review.num_given_up,
+                                      review.interpretation, review.why_not_independent))},
           {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
           {"instruments-section", "Instruments", instruments_markup(review)},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
@@ -283,6 +288,7 @@ std::string section(std::string_view title, std::initializer_list<Table> tables)
 }  // namespace
 
 std::string review_markdown(const Review& review) {
+  const ResultSchema& schema = review.schema;
   const CampaignStatistics& statistics = review.results.statistics;
   const InstrumentStatistics instruments =
       review.results.instruments.value_or(InstrumentStatistics{});
@@ -291,20 +297,22 @@ std::string review_markdown(const Review& review) {
     text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
   }
   text += "\n";
-  text += section("Verification matrix", {matrix_table(review)}) +
-          section("Accuracy", {accuracy_table(review.objectives, statistics),
-                               interval_table(statistics, review.num_given_up),
-                               error_table(statistics, review.num_given_up, review.interpretation,
-                                           review.why_not_independent)}) +
-          section("Standard errors", {standard_error_table(review.results.standard_errors)}) +
-          section("Instruments",
-                  {variance_table(instruments), instrument_table(instruments),
-                   replicate_table(review.results.replicates.value_or(ReplicateStatistics{}))}) +
-          section("Budget", {review_budget_table(review)}) +
-          section("Causes of the errors", {cause_table(review)}) +
-          section("How it was run",
-                  {identity_table(review), execution_table(review), host_table(review)}) +
-          "## How to reproduce it\n\n";
+  text +=
+      section("Verification matrix", {matrix_table(review)}) +
+      section("Accuracy", {accuracy_table(schema, review.objectives, statistics),
+                           interval_table(schema, statistics, review.num_given_up),
+                           error_table(schema, statistics, review.num_given_up,
+                                       review.interpretation, review.why_not_independent)}) +
+      section("Standard errors", {standard_error_table(schema, review.results.standard_errors)}) +
+      section(
+          "Instruments",
+          {variance_table(schema, instruments), instrument_table(schema, instruments),
+           replicate_table(schema, review.results.replicates.value_or(ReplicateStatistics{}))}) +
+      section("Budget", {review_budget_table(review)}) +
+      section("Causes of the errors", {cause_table(review)}) +
+      section("How it was run",
+              {identity_table(review), execution_table(review), host_table(review)}) +
+      "## How to reproduce it\n\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     text += fmt::format("- {} {}\n", code_span(command), markdown_text(effect));
   }

@@ -7,7 +7,6 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -109,7 +108,7 @@ SummarySentence worst_error(const Review& review) {
   }
   const std::optional<std::size_t> worst = worst_quantity(review);
   if (!worst) return {"No parameter has an objective to hold its worst error against.", "Accuracy"};
-  const Quantity& quantity = model().results().quantities[*worst];
+  const Quantity& quantity = review.schema.quantities[*worst];
   const AccuracyStatistic& accuracy = statistics.accuracy[*worst];
   return {fmt::format("The worst error is that of {} in run {}, {} or {} of its objective; {}.",
                       quantity.symbol, accuracy.worst_run.value,

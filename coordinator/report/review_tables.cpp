@@ -9,7 +9,6 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "core/model.hpp"
 #include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
@@ -56,14 +55,15 @@ std::string quantity_text(double value, const Quantity& quantity) {
                    : figure + "×" + unit;
 }
 
-std::string name_in_symbols(std::string_view name) {
-  const std::vector<Quantity>& quantities = model().results().quantities;
+std::string name_in_symbols(const ResultSchema& schema, std::string_view name) {
+  const std::vector<Quantity>& quantities = schema.quantities;
   const auto found = std::ranges::find(quantities, name, &Quantity::name);
   return std::string(found == quantities.end() ? name : found->symbol);
 }
 
 Table review_budget_table(const Review& review) {
-  Table table = budget_table(review.budget, review.results.statistics, review.results.totals);
+  Table table =
+      budget_table(review.schema, review.budget, review.results.statistics, review.results.totals);
   for (std::string& note : table.notes) note = with_powers_of_ten(note);
   return table;
 }
@@ -76,7 +76,7 @@ Table cause_table(const Review& review) {
       .columns = {
           {"error of", true}, {"term", true}, {"slope, SI"}, {"of the variance, %"}, {"p"}}};
   for (const CauseTerm& term : review.causes->terms) {
-    table.rows.push_back({model().results().quantities[term.quantity].symbol, term.name,
+    table.rows.push_back({review.schema.quantities[term.quantity].symbol, term.name,
                           figure_cell(term.slope), figure_cell(term.share, 0.01),
                           term.p_value < 1e-9 ? "<10⁻⁹" : figure_text(term.p_value)});
   }

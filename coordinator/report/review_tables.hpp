@@ -14,7 +14,7 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string quantity_text(double value, const Quantity& quantity);
 
 /// A name, or the symbol of the quantity that has it: sessions are called after what they are for.
-[[nodiscard]] std::string name_in_symbols(std::string_view name);
+[[nodiscard]] std::string name_in_symbols(const ResultSchema& schema, std::string_view name);
 
 /// True of a requirement that nobody stated: an objective of the campaign, or all together.
 [[nodiscard]] bool is_default(const RequirementAnswer& row);
@@ -30,8 +30,8 @@ namespace proofmass::coordinator {
 /// The sums that explain the errors. No rows without causes.
 [[nodiscard]] Table cause_table(const Review& review);
 
-/// The lines that the estimates use, and the noise about them. No rows without spectra.
-[[nodiscard]] Table spectrum_table(const RunSpectra& spectra);
+/// The lines that the estimates use, and the noise about them. @pre There are spectra.
+[[nodiscard]] Table spectrum_table(const Review& review);
 
 /// What was run: identity, counts, digest.
 [[nodiscard]] Table identity_table(const Review& review);

@@ -21,10 +21,10 @@ namespace {
 
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
 
-std::vector<std::string> column_names() {
+std::vector<std::string> column_names(const ResultSchema& schema) {
   std::vector<std::string> names;
   for (const DrawnQuantity& drawn : model().drawn()) names.emplace_back(drawn.name);
-  for (const Quantity& quantity : model().results().quantities) {
+  for (const Quantity& quantity : schema.quantities) {
     names.push_back("truth_" + quantity.column());
   }
   return names;
@@ -151,8 +151,7 @@ RunIndex worst_run_of(const DrawnRuns& drawn, std::size_t quantity) {
 /// Which run is the worst, and how to ask why.
 std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity) {
   return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n",
-                     worst_run_of(drawn, quantity).value,
-                     model().results().quantities[quantity].name);
+                     worst_run_of(drawn, quantity).value, drawn.quantities[quantity].name);
 }
 
 /// The rows to name: as many as were asked for, else the first five, but none where no quantity has
@@ -231,10 +230,12 @@ std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
 
 DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uint64_t num_runs_max,
                           std::optional<RunIndex> also) {
+  const ResultSchema& schema = store.schema();
   DrawnRuns drawn;
-  drawn.names = column_names();
+  drawn.names = column_names(schema);
+  drawn.quantities = schema.quantities;
   drawn.columns.resize(drawn.names.size());
-  drawn.errors.resize(model().results().quantities.size());
+  drawn.errors.resize(schema.quantities.size());
   drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
   (void)walk_checked(store, [&](const RunResult& result) {
     const bool is_first = drawn.num_first < num_runs_max;
@@ -246,7 +247,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
     drawn.last_with_estimate = result.run;
     if (!is_first && result.run != also) return;
     if (is_first) ++drawn.num_first;
-    require_in_range(result, model().results());
+    require_in_range(result, schema);
     const RunDraw draw = campaign.draw(result.run);
     if (draw.values.empty()) {
       store.refuse_as_damaged(fmt::format(
@@ -269,8 +270,8 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                     both[1].size()));
   }
   return fmt::format(
-      "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", model().results().quantities[quantity].symbol,
-      drawn.runs.size(), limit_line(drawn), left_out(drawn),
+      "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", drawn.quantities[quantity].symbol, drawn.runs.size(),
+      limit_line(drawn), left_out(drawn),
       terminal_text(driver_table(drawn, first_of(both[1], num_rows), "|error|", std::nullopt),
                     style),
       terminal_text(drivers, style), terminal_text(term_table(drawn, quantity), style),
@@ -281,7 +282,7 @@ std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIn
                              std::optional<std::size_t> num_rows, Paint paint) {
   const TerminalStyle style{.paint = paint};
   const std::size_t position = position_of(drawn, run);
-  const Quantity& info = model().results().quantities[quantity];
+  const Quantity& info = drawn.quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];
   const auto both = sensitivities_of(drawn, quantity);
   return fmt::format(
@@ -310,7 +311,7 @@ std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,
 
 std::string choice_text(const DrawnRuns& drawn, RunIndex run, std::span<const double> objectives) {
   const std::size_t quantity = worst_quantity_of(drawn, run, objectives);
-  const std::string_view name = model().results().quantities[quantity].name;
+  const std::string& name = drawn.quantities[quantity].name;
   if (!std::isfinite(objectives[quantity])) {
     return fmt::format("Of {}, no parameter having an objective: that of the highest rank\n", name);
   }
@@ -335,8 +336,8 @@ std::string sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t
     const std::vector<double>& errors = drawn.errors[quantity];
     const auto both = sensitivities_of(drawn, quantity);
     json["parameters"].push_back(
-        {{"parameter", model().results().quantities[quantity].name},
-         {"unit", model().results().quantities[quantity].unit},
+        {{"parameter", drawn.quantities[quantity].name},
+         {"unit", drawn.quantities[quantity].unit},
          {"worst_run", worst_run_of(drawn, quantity).value},
          {"run_error", position ? Json(errors[*position]) : Json(nullptr)},
          {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},

@@ -11,6 +11,7 @@
 #include "coordinator/store/store.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/sensitivity.hpp"
 
@@ -27,6 +28,7 @@ struct DrawnRuns {
   /// Drawn quantities as in Model::drawn(), then the true parameters that follow from them, as in
   /// `truth_offset_m`. Units are in the names.
   std::vector<std::string> names;
+  std::vector<Quantity> quantities;          ///< Whose errors these are.
   std::vector<std::vector<double>> columns;  ///< Their values, shape [names.size()][n].
   std::vector<std::vector<double>> errors;   ///< estimate − truth, SI; shape [quantities][n].
 };

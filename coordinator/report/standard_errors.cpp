@@ -9,40 +9,26 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
-#include "core/model.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-std::vector<std::size_t> quantities_with_errors() {
-  std::vector<std::size_t> indices;
-  const std::vector<Quantity>& quantities = model().results().quantities;
-  for (std::size_t i = 0; i < quantities.size(); ++i) {
-    if (quantities[i].has_standard_error) indices.push_back(i);
-  }
-  return indices;
-}
-
-const Quantity& quantity_of(const StandardErrorStatistic& statistic) {
-  return model().results().quantities[statistic.quantity];
-}
 
 double share_within(const StandardErrorStatistic& statistic) {
   return static_cast<double>(statistic.num_within) / static_cast<double>(statistic.num_runs);
 }
 
 /// `the fits have a mean chi_squared of 36.4, degrees_of_freedom 36.2`; empty without any.
-std::string fit_sentence(const std::vector<double>& fit) {
+std::string fit_sentence(const ResultSchema& schema, const std::vector<double>& fit) {
   std::string text;
   for (std::size_t i = 0; i < fit.size(); ++i) {
     text += fmt::format("{}{} {}", text.empty() ? "means of the fits: " : ", ",
-                        model().results().fit[i].column(), figure_text(fit[i]));
+                        schema.fit[i].column(), figure_text(fit[i]));
   }
   return text;
 }
 
-Chart pull_chart(const StandardErrorStatistic& statistic, bool is_first) {
+Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statistic, bool is_first) {
   const Histogram& histogram = statistic.pulls;
   Bars bars{.edges = histogram.edges};
   Line law{.name = is_first ? "normal law" : "", .ink = Ink::second, .dash = Dash::dashed};
@@ -53,7 +39,6 @@ Chart pull_chart(const StandardErrorStatistic& statistic, bool is_first) {
         {0.5 * (from + to), static_cast<double>(statistic.num_runs) *
                                 (normal_cumulative(to) - normal_cumulative(from))});
   }
-  const Quantity& quantity = quantity_of(statistic);
   return {.text = {.id = fmt::format("pull-{}", quantity.name),
                    .title = std::string(quantity.symbol),
                    .description = ""},
@@ -73,13 +58,18 @@ void leave_out_intervals(StandardErrorStatistics& statistics) {
   }
 }
 
+RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema) {
+  for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
+    if (schema.quantities[i].has_standard_error) indices_.push_back(i);
+  }
+}
+
 void RunningStandardErrors::add(const RunResult& result) {
   if (!result.is_completed() || result.standard_error.empty()) return;
   ++num_runs_;
-  const std::vector<std::size_t> indices = quantities_with_errors();
-  quantities_.resize(indices.size());
-  for (std::size_t i = 0; i < indices.size(); ++i) {
-    const double error = result.error(indices[i]);
+  quantities_.resize(indices_.size());
+  for (std::size_t i = 0; i < indices_.size(); ++i) {
+    const double error = result.error(indices_[i]);
     const double sigma = result.standard_error[i];
     Sums& sums = quantities_[i];
     sums.errors += sigma;
@@ -95,7 +85,6 @@ void RunningStandardErrors::add(const RunResult& result) {
 
 StandardErrorStatistics RunningStandardErrors::statistics() const {
   StandardErrorStatistics statistics;
-  const std::vector<std::size_t> indices = quantities_with_errors();
   const auto n = static_cast<double>(num_runs_);
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     const Sums& sums = quantities_[i];
@@ -103,7 +92,7 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
     const double scatter = sums.fourth_powers / n - squared_error * squared_error;
     const auto over_square = [&](double x) { return mean_square > 0.0 ? x / mean_square : 0.0; };
     statistics.quantities.push_back(
-        {.quantity = indices[i],
+        {.quantity = indices_[i],
          .num_runs = num_runs_,
          .mean = sums.errors / n,
          .squared_ratio = over_square(squared_error),
@@ -117,7 +106,7 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
   return statistics;
 }
 
-Table standard_error_table(const StandardErrorStatistics& statistics) {
+Table standard_error_table(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   // Draws that are not independent have no standard error of the ratio; those of a design may have
   // intervals from its replicates.
@@ -144,7 +133,7 @@ Table standard_error_table(const StandardErrorStatistics& statistics) {
     if (!have_ratio_errors) table.notes.emplace_back("from, to: 95 % interval from replicates");
   }
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
-    const Quantity& quantity = quantity_of(statistic);
+    const Quantity& quantity = schema.quantities[statistic.quantity];
     Row row{quantity.symbol, unit_cell(quantity),
             figure_cell(statistic.mean, quantity.display_scale),
             figure_cell(statistic.squared_ratio)};
@@ -153,11 +142,12 @@ Table standard_error_table(const StandardErrorStatistics& statistics) {
     if (have_intervals) add_ends(statistic.within, 0.01, row);
     table.rows.push_back(std::move(row));
   }
-  if (!statistics.fit.empty()) table.notes.push_back(fit_sentence(statistics.fit));
+  if (!statistics.fit.empty()) table.notes.push_back(fit_sentence(schema, statistics.fit));
   return table;
 }
 
-std::optional<ChartGrid> pull_overview(const StandardErrorStatistics& statistics) {
+std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
+                                       const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return std::nullopt;
   ChartGrid grid{.text = {.id = "pulls",
                           .title = "Errors in units of their standard errors",
@@ -166,8 +156,9 @@ std::optional<ChartGrid> pull_overview(const StandardErrorStatistics& statistics
                  .num_columns = 2,
                  .charts = {}};
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
-    grid.charts.push_back(pull_chart(statistic, grid.charts.empty()));
-    grid.text.description += fmt::format(" {}: {} % of the runs.", quantity_of(statistic).symbol,
+    const Quantity& quantity = schema.quantities[statistic.quantity];
+    grid.charts.push_back(pull_chart(quantity, statistic, grid.charts.empty()));
+    grid.text.description += fmt::format(" {}: {} % of the runs.", quantity.symbol,
                                          figure_text(100.0 * share_within(statistic)));
   }
   return grid;

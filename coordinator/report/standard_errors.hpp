@@ -42,6 +42,8 @@ void leave_out_intervals(StandardErrorStatistics& statistics);
 /// Computes them from results that are seen once. Memory is fixed.
 class RunningStandardErrors {
  public:
+  explicit RunningStandardErrors(const ResultSchema& schema);
+
   void add(const RunResult& result);
   [[nodiscard]] StandardErrorStatistics statistics() const;
 
@@ -54,16 +56,19 @@ class RunningStandardErrors {
     std::uint64_t num_within = 0;
     ErrorBins pulls;
   };
+  std::vector<std::size_t> indices_;  ///< Of the quantities that have a standard error.
   std::uint64_t num_runs_ = 0;
-  std::vector<Sums> quantities_;  ///< Of those that have a standard error.
+  std::vector<Sums> quantities_;  ///< Of these.
   std::vector<double> fit_;
 };
 
 /// No rows without standard errors; no columns of intervals if no quantity has one.
-[[nodiscard]] Table standard_error_table(const StandardErrorStatistics& statistics);
+[[nodiscard]] Table standard_error_table(const ResultSchema& schema,
+                                         const StandardErrorStatistics& statistics);
 
 /// Error over standard error of each quantity beside the normal law that it should follow; nothing
 /// without standard errors.
-[[nodiscard]] std::optional<ChartGrid> pull_overview(const StandardErrorStatistics& statistics);
+[[nodiscard]] std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
+                                                     const StandardErrorStatistics& statistics);
 
 }  // namespace proofmass::coordinator

@@ -10,7 +10,7 @@
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "core/model.hpp"
-#include "core/model_rules.hpp"
+#include "core/result_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -60,7 +60,7 @@ std::optional<std::uint64_t> summarise_file(
     plan = reader.stop_plan();
     num_runs = reader.num_runs();
     if (plan.stop_rule.empty()) return;
-    rule = parse_stop_rule(plan.stop_rule);
+    rule = parse_stop_rule(plan.stop_rule, reader.schema());
     check = check_with(rule, reader, campaign.objectives(), num_runs);
   });
   if (plan.stop_rule.empty()) {
@@ -79,10 +79,10 @@ std::optional<std::uint64_t> summarise_file(
 namespace {
 
 /// A rule of the statistic that a row is of; empty if there is no such statistic.
-std::optional<StopRule> rule_of(const StopCheckRow& row) {
+std::optional<StopRule> rule_of(const StopCheckRow& row, const ResultSchema& schema) {
   const bool is_whole = std::string_view(row.statistic).ends_with("decided");
   try {
-    return parse_stop_rule(is_whole ? row.statistic : row.statistic + " within 5%");
+    return parse_stop_rule(is_whole ? row.statistic : row.statistic + " within 5%", schema);
   } catch (const ConfigError&) {
     return std::nullopt;
   }
@@ -109,7 +109,7 @@ StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule, const Sto
 std::optional<StopCheckRow> deciding_check(const Store& store, std::span<const double> objectives) {
   const std::string text = store.stop_plan().stop_rule;
   if (text.empty() || store.control().phase != wire::CampaignPhase::finished) return std::nullopt;
-  const StopRule rule = parse_stop_rule(text);
+  const StopRule rule = parse_stop_rule(text, store.schema());
   const std::uint64_t num_runs = store.num_runs();
   return StopCheckRow{.statistic = std::string(statistic_of(text)),
                       .num_runs = num_runs,
@@ -135,7 +135,7 @@ std::vector<std::string> stop_check_differences(const Store& store,
   const std::uint64_t num_runs = store.num_runs();
   const std::uint64_t num_runs_held = num_held(store);
   for (const StopCheckRow& row : store.stop_checks()) {
-    const std::optional<StopRule> rule = rule_of(row);
+    const std::optional<StopRule> rule = rule_of(row, store.schema());
     if (!rule) {
       differences.push_back(
           fmt::format("stop_check.statistic = {} (must be that of a stop rule)", row.statistic));
@@ -213,7 +213,7 @@ bool is_rule_missed(const Store& store) {
   const StopPlan plan = store.stop_plan();
   const auto check = last_check(store, plan);
   if (!check) return false;
-  const StopRule rule = parse_stop_rule(plan.stop_rule);
+  const StopRule rule = parse_stop_rule(plan.stop_rule, store.schema());
   if (rule.statistic != StopRule::Statistic::verdict) return !check->check.is_reached;
   return verdict_of(rule, check->check) != RequirementVerdict::met;
 }
@@ -222,7 +222,7 @@ std::string stop_text(const Store& store) {
   const StopPlan plan = store.stop_plan();
   const auto check = last_check(store, plan);
   if (!check) return "";
-  const StopRule rule = parse_stop_rule(plan.stop_rule);
+  const StopRule rule = parse_stop_rule(plan.stop_rule, store.schema());
   if (rule.statistic == StopRule::Statistic::verdict) {
     return fmt::format("Stopping  {}\n{}", plan.stop_rule, verdict_text(rule, *check));
   }

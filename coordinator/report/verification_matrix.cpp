@@ -10,8 +10,7 @@
 #include <utility>
 
 #include "coordinator/report/digest.hpp"
-#include "core/model.hpp"
-#include "core/model_rules.hpp"
+#include "core/result_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -28,24 +27,21 @@ bool has_finite(std::span<const double> objectives) {
   return std::ranges::any_of(objectives, [](double value) { return std::isfinite(value); });
 }
 
-bool is_joint(const StatedRequirement& stated) {
-  return parse_requirement(stated.requirement).subject == Requirement::Subject::all_objectives;
-}
-
 std::size_t key_of(const RequirementAnswer& answer) {
   return answer.is_joint() ? key_of_joint : answer.requirement.parameter;
 }
 
 }  // namespace
 
-std::vector<StatedRequirement> requirements_of_objectives(std::span<const double> objectives) {
-  const std::vector<Quantity>& quantities = model().results().quantities;
+std::vector<StatedRequirement> requirements_of_objectives(const ResultSchema& schema,
+                                                          std::span<const double> objectives) {
+  const std::vector<Quantity>& quantities = schema.quantities;
   std::vector<StatedRequirement> stated;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     if (!std::isfinite(objectives[i])) continue;
-    const std::string_view name = quantities[i].name;
+    const std::string& name = quantities[i].name;
     stated.push_back(
-        {.id = std::string(name),
+        {.id = name,
          .text = fmt::format("Objective of {}", quantities[i].symbol),
          // The shortest text that reads back to the same bits.
          .requirement = fmt::format("{} < {} {}", name, objectives[i], default_tolerance_text())});
@@ -68,9 +64,14 @@ std::vector<StatedRequirement> numbered_requirements(std::span<const std::string
   return stated;
 }
 
-std::vector<StatedRequirement> matrix_requirements(std::vector<StatedRequirement> stated,
+std::vector<StatedRequirement> matrix_requirements(const ResultSchema& schema,
+                                                   std::vector<StatedRequirement> stated,
                                                    std::span<const double> objectives) {
-  if (stated.empty()) stated = requirements_of_objectives(objectives);
+  const auto is_joint = [&](const StatedRequirement& each) {
+    return parse_requirement(each.requirement, schema).subject ==
+           Requirement::Subject::all_objectives;
+  };
+  if (stated.empty()) stated = requirements_of_objectives(schema, objectives);
   if (has_finite(objectives) && std::ranges::none_of(stated, is_joint)) {
     stated.push_back(joint_requirement());
   }
@@ -78,7 +79,8 @@ std::vector<StatedRequirement> matrix_requirements(std::vector<StatedRequirement
   return stated;
 }
 
-VerificationMatrix::VerificationMatrix(std::vector<StatedRequirement> stated,
+VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
+                                       std::vector<StatedRequirement> stated,
                                        std::span<const double> objectives,
                                        std::uint64_t num_given_up,
                                        std::optional<std::uint64_t> num_fixed,
@@ -91,8 +93,11 @@ VerificationMatrix::VerificationMatrix(std::vector<StatedRequirement> stated,
   for (StatedRequirement& each : stated) {
     RequirementAnswer answer;
     answer.stated = std::move(each);
-    answer.requirement = parse_requirement(answer.stated.requirement);
-    if (!answer.is_joint()) answer.limit = answer.requirement.limit;
+    answer.requirement = parse_requirement(answer.stated.requirement, schema);
+    if (!answer.is_joint()) {
+      answer.subject = requirement_subject(schema, answer.requirement.parameter);
+      answer.limit = answer.requirement.limit;
+    }
     if (answer.is_joint() && has_finite(objectives)) answer.limit = 1.0;
     exceedances_.emplace_back(answer.requirement, objectives, budget);
     subjects_.try_emplace(key_of(answer));
@@ -166,10 +171,10 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
   if (stated.empty()) return {};
   std::vector<RequirementAnswer> answers;
   store.read_one_state([&] {
-    VerificationMatrix matrix(std::move(stated), objectives, num_runs_in(store.given_up_runs()),
-                              store.num_runs_fixed(), budget);
+    VerificationMatrix matrix(store.schema(), std::move(stated), objectives,
+                              num_runs_in(store.given_up_runs()), store.num_runs_fixed(), budget);
     (void)walk_checked(store, [&](const RunResult& result) {
-      require_in_range(result, model().results());
+      require_in_range(result, store.schema());
       matrix.add(result);
     });
     std::set<std::size_t> parameters;

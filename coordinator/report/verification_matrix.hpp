@@ -19,7 +19,7 @@ inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.9
 
 /// A requirement for each objective of the campaign, with the default tolerance.
 [[nodiscard]] std::vector<StatedRequirement> requirements_of_objectives(
-    std::span<const double> objectives);
+    const ResultSchema& schema, std::span<const double> objectives);
 
 /// All objectives together, with the default tolerance.
 [[nodiscard]] StatedRequirement joint_requirement();
@@ -30,22 +30,26 @@ inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.9
 
 /// What the rows of a matrix are about: these, or the objectives if there are none, and then all
 /// objectives together unless that is asked for or no objective is finite.
+/// @throws ConfigError as parse_requirement().
 [[nodiscard]] std::vector<StatedRequirement> matrix_requirements(
-    std::vector<StatedRequirement> stated, std::span<const double> objectives);
+    const ResultSchema& schema, std::vector<StatedRequirement> stated,
+    std::span<const double> objectives);
 
 /// Answers requirements from results that are seen once, and then from the errors of one parameter
 /// after the other. Memory is 8 bytes a run for each requirement about the budget, and for all
 /// objectives together.
 class VerificationMatrix {
  public:
+  /// @param schema        Of the campaign.
   /// @param stated        Their order is that of the answers.
   /// @param objectives    Of the campaign, SI.
   /// @param num_given_up  Runs that have no result, and count as exceedances.
   /// @param num_fixed     As for decide().
   /// @param budget        Of the campaign, for requirements about it.
   /// @throws ConfigError as parse_requirement().
-  VerificationMatrix(std::vector<StatedRequirement> stated, std::span<const double> objectives,
-                     std::uint64_t num_given_up, std::optional<std::uint64_t> num_fixed,
+  VerificationMatrix(const ResultSchema& schema, std::vector<StatedRequirement> stated,
+                     std::span<const double> objectives, std::uint64_t num_given_up,
+                     std::optional<std::uint64_t> num_fixed,
                      const std::optional<ErrorBudget>& budget = std::nullopt);
 
   /// @param result  Its numbers are in range.

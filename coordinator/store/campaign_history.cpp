@@ -131,7 +131,7 @@ std::optional<std::string> utc_of(const Database& database, std::string_view bou
 CampaignHistory::CampaignHistory(const std::filesystem::path& file) {
   detail::check_presence(file);
   database_ = std::make_unique<Database>(file, detail::Access::read_only);
-  detail::prepare_reader(*database_, file);
+  (void)detail::prepare_reader(*database_, file);
 }
 
 CampaignHistory::~CampaignHistory() = default;

@@ -66,10 +66,10 @@ CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth)
   Database database(path, detail::Access::immutable);
   database.execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
   if (depth == PeekDepth::pages) {
-    detail::check_campaign_file(database);
+    (void)detail::check_campaign_file(database);
     (void)detail::check_all_pages(database);
   } else {
-    detail::check_kind(database);
+    (void)detail::check_kind(database);
   }
   CampaignRecord record = read_record(database);
   record.file = path;

@@ -5,7 +5,6 @@
 #include <span>
 
 #include "core/error.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -19,7 +18,9 @@ void append(std::vector<ValueColumn>& columns, ValueKind kind, std::size_t index
                      .unit = quantity.unit});
 }
 
-std::vector<ValueColumn> make_columns(const ResultSchema& schema) {
+}  // namespace
+
+std::vector<ValueColumn> value_columns(const ResultSchema& schema) {
   std::vector<ValueColumn> columns;
   for (const ValueKind kind : {ValueKind::truth, ValueKind::estimate, ValueKind::error}) {
     for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
@@ -39,6 +40,8 @@ std::vector<ValueColumn> make_columns(const ResultSchema& schema) {
   }
   return columns;
 }
+
+namespace {
 
 /// The list that has the value; empty if the run's status leaves it without a meaning.
 std::span<const double> values_in(const RunResult& result, ValueKind kind) {
@@ -86,11 +89,6 @@ std::optional<double> ValueColumn::value_in(const RunResult& result) const {
   const std::span<const double> values = values_in(result, kind);
   if (index >= values.size()) return std::nullopt;
   return kind == ValueKind::error ? result.error(index) : values[index];
-}
-
-const std::vector<ValueColumn>& value_columns() {
-  static const std::vector<ValueColumn> columns = make_columns(model().results());
-  return columns;
 }
 
 }  // namespace proofmass::coordinator

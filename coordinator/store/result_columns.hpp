@@ -37,6 +37,6 @@ struct ValueColumn {
 
 /// Truths, estimates, errors, standard errors and their fit if there are any, and health: all
 /// columns of values of the table `run_result`.
-[[nodiscard]] const std::vector<ValueColumn>& value_columns();
+[[nodiscard]] std::vector<ValueColumn> value_columns(const ResultSchema& schema);
 
 }  // namespace proofmass::coordinator

@@ -51,7 +51,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   detail::configure(database);
   database.execute("PRAGMA synchronous = OFF");  // It is made durable before it gets its name.
   Transaction transaction(database);
-  detail::migrate(database);
+  detail::migrate(database, campaign.results());
   detail::insert_campaign(database, campaign, definition);
   detail::replace_budgets(database, campaign.error_budget(), {});
   fill(database);
@@ -118,6 +118,8 @@ std::string Store::definition() const {
   return impl_->database.text("SELECT definition FROM campaign");
 }
 
+const ResultSchema& Store::schema() const { return impl_->results; }
+
 std::string Store::model_version() const {
   const std::string version = impl_->database.text("SELECT model_version FROM campaign");
   // It is shown, and compared with ours, which has no control characters.
@@ -170,12 +172,12 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   const std::uint64_t num_runs_wanted = num_runs();
   for (const Entry& entry : entries) {
     const auto* delivery = std::get_if<Delivery>(&entry);
-    if (delivery != nullptr) detail::check_delivery(*delivery, num_runs_wanted);
+    if (delivery != nullptr) detail::check_delivery(*delivery, schema(), num_runs_wanted);
   }
   CommitSummary summary;
   try {
     impl_->commit([&](Database& database) {
-      if (!impl_->rows) impl_->rows.emplace(database);
+      if (!impl_->rows) impl_->rows.emplace(database, schema());
       summary = impl_->rows->write(entries);
       wire::kill_point(wire::KillPoint::before_commit);
     });
@@ -209,14 +211,14 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
 
 void Store::for_each_error(std::size_t quantity, std::uint64_t num_runs,
                            const std::function<void(double)>& visit) const {
-  detail::Statement row = detail::select_errors(impl_->database, quantity);
+  detail::Statement row = detail::select_errors(impl_->database, schema().quantities[quantity]);
   row.bind_all(num_runs);
   while (row.step()) visit(row.real(0));
 }
 
-ResultReader Store::results() const { return ResultReader(impl_->database); }
+ResultReader Store::results() const { return {impl_->database, schema()}; }
 
-ResultReader Store::results(RunRange runs) const { return ResultReader(impl_->database, runs); }
+ResultReader Store::results(RunRange runs) const { return {impl_->database, schema(), runs}; }
 
 void Store::refuse_as_damaged(std::string_view what) const {
   impl_->database.refuse_as_damaged(what);
@@ -235,7 +237,7 @@ void Store::read_one_state(const std::function<void()>& read) const {
 std::uint64_t Store::log_size() const { return impl_->database.log_size(); }
 
 void Store::check_integrity() const {
-  read_one_state([&] { detail::check_integrity(impl_->database); });
+  read_one_state([&] { detail::check_integrity(impl_->database, schema()); });
 }
 
 void Store::write_plain(const std::filesystem::path& draft) const {

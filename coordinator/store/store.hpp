@@ -32,10 +32,11 @@ struct CampaignRecord;
 /// made it outlives it.
 class ResultReader {
  public:
-  /// @param runs  Whose results are read; all if empty. Where a damaged file has them in another
-  ///              order, some of a range are missed.
-  explicit ResultReader(const detail::Database& database,
-                        std::optional<RunRange> runs = std::nullopt);
+  /// @param schema  Of the file; outlives the reader.
+  /// @param runs    Whose results are read; all if empty. Where a damaged file has them in another
+  ///                order, some of a range are missed.
+  ResultReader(const detail::Database& database, const ResultSchema& schema,
+               std::optional<RunRange> runs = std::nullopt);
   ~ResultReader();
   ResultReader(ResultReader&&) noexcept;
   ResultReader& operator=(ResultReader&&) noexcept;
@@ -115,6 +116,9 @@ class Store {
   /// program began the campaign, or if it began with a stop rule.
   [[nodiscard]] std::optional<std::uint64_t> num_runs_fixed() const;
   [[nodiscard]] std::string definition() const;
+  /// What the results in the file are: those of its definition, as the model that began the
+  /// campaign recorded them. It lives as long as the Store.
+  [[nodiscard]] const ResultSchema& schema() const;
   [[nodiscard]] std::string model_version() const;  ///< Of the program that made the file.
   [[nodiscard]] std::string build() const;          ///< Of the program that made the file.
   [[nodiscard]] std::string created_utc() const;    ///< As in `2024-02-29T12:00:10Z`.

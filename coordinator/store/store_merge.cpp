@@ -95,8 +95,9 @@ void copy_rows(const Database& part, const Database& whole, const MergedTable& t
 /// that has a run gives its delivery.
 class MergeRows {
  public:
-  /// @param whole  A new file of the campaign; outlives this object.
-  explicit MergeRows(Database& whole);
+  /// @param whole   A new file of the campaign; outlives this object.
+  /// @param schema  Of the campaign; outlives this object.
+  MergeRows(Database& whole, const ResultSchema& schema);
 
   /// @pre Inside a transaction; the part has been checked.
   /// @throws StoreError naming the run, if it has another result in a part before this one, or if
@@ -112,16 +113,18 @@ class MergeRows {
   [[nodiscard]] MergedPart add_results(const Database& part, const WorkerKeys& workers);
 
   Database& whole_;
+  const ResultSchema& schema_;
   std::uint64_t num_runs_;
   ResultRows results_;
   LargestErrorRows largest_errors_;
 };
 
-MergeRows::MergeRows(Database& whole)
+MergeRows::MergeRows(Database& whole, const ResultSchema& schema)
     : whole_(whole),
+      schema_(schema),
       num_runs_(whole.count("SELECT num_runs FROM campaign")),
-      results_(whole),
-      largest_errors_(whole) {}
+      results_(whole, schema),
+      largest_errors_(whole, schema) {}
 
 MergedPart MergeRows::add(const Database& part) {
   const WorkerKeys workers = add_workers(part);
@@ -170,7 +173,7 @@ WorkerKeys MergeRows::add_workers(const Database& part) {
 
 MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& workers) {
   MergedPart merged;
-  ResultReader results(part);
+  ResultReader results(part, schema_);
   Statement delivery = part.prepare(
       "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM delivery"
       " ORDER BY run_index");
@@ -182,7 +185,8 @@ MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& worker
           fmt::format("delivery lacks run {}, which has a result", result.run.value));
     }
     detail::check_delivery(
-        {.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)}, num_runs_);
+        {.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)}, schema_,
+        num_runs_);
     if (results_.insert(result)) {
       insert.run(result.run.value, key_of(workers, delivery, 1), delivery.count(2),
                  delivery.real(3), delivery.integer(4));
@@ -207,7 +211,8 @@ Store Store::merge(const std::filesystem::path& path, const Campaign& campaign,
                    std::string_view definition, std::span<const std::filesystem::path> parts,
                    const std::function<void(const MergedPart&)>& on_part) {
   return create_filled(path, campaign, definition, [&](Database& whole) {
-    MergeRows rows(whole);
+    const ResultSchema schema = campaign.results();
+    MergeRows rows(whole, schema);
     for (const std::filesystem::path& file : parts) {
       const Store part = open_read_only(file);
       part.read_one_state([&] { on_part(rows.add(part.impl_->database)); });

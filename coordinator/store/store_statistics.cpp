@@ -17,9 +17,9 @@ using detail::Database;
 
 namespace {
 
-void replace_all(Database& database, const CampaignStatistics& statistics,
-                 const std::optional<ErrorBudget>& budget) {
-  detail::replace_statistics(database, statistics);
+void replace_all(Database& database, const ResultSchema& schema,
+                 const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) {
+  detail::replace_statistics(database, schema, statistics);
   detail::replace_budgets(database, budget, statistics);
 }
 
@@ -34,9 +34,9 @@ void Store::write_statistics(const CampaignStatistics& statistics,
                              const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
                              std::span<const RunWarning> warnings) {
   impl_->commit([&](Database& database) {
-    replace_all(database, statistics, budget);
+    replace_all(database, schema(), statistics, budget);
     detail::replace_summary(database, statistics, digests);
-    detail::replace_warnings(database, warnings);
+    detail::replace_warnings(database, schema(), warnings);
   });
 }
 
@@ -47,7 +47,8 @@ std::vector<std::string> Store::parameter_differences(const Campaign& campaign) 
       ComparedTable{.name = "parameter", .row_name = "parameter"},
       ComparedTable{.name = "budget_coefficient", .row_name = "parameter || ' in ' || term"}};
   return detail::table_differences(
-      impl_->database, [&](Database& expected) { detail::insert_parameters(expected, campaign); },
+      impl_->database, schema(),
+      [&](Database& expected) { detail::insert_parameters(expected, campaign); },
       std::span(tables).first(has_own_budget(impl_->database) ? 2 : 1));
 }
 
@@ -65,10 +66,10 @@ std::vector<std::string> Store::statistic_differences(const CampaignStatistics& 
                     .row_name = "effect || ' on ' || parameter || ' in run ' || run_index",
                     .tolerance = rounding}};
   return detail::table_differences(
-      impl_->database,
+      impl_->database, schema(),
       [&](Database& expected) {
-        replace_all(expected, statistics, budget);
-        detail::replace_warnings(expected, warnings);
+        replace_all(expected, schema(), statistics, budget);
+        detail::replace_warnings(expected, schema(), warnings);
       },
       std::span(tables).first(has_own_budget(impl_->database) ? 3 : 1));
 }
@@ -81,7 +82,7 @@ std::vector<std::string> Store::stop_check_differences(
                     .columns = "estimate, lower, upper, relative_half_width, is_reached",
                     .tolerance = rounding}};
   return detail::table_differences(
-      impl_->database,
+      impl_->database, schema(),
       [&](Database& database) {
         for (const StopCheckRow& row : expected) {
           detail::replace_stop_check(database, row.num_runs, row.statistic, row.check);

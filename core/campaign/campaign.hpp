@@ -176,6 +176,9 @@ class Campaign {
   [[nodiscard]] virtual std::vector<DefinitionDifference> differences_from(
       const Campaign& other) const = 0;
 
+  /// What the results of its runs are: a pure function of its definition.
+  /// @pre validate() passed, but for `table_columns`.
+  [[nodiscard]] virtual ResultSchema results() const = 0;
   /// Largest acceptable |error| of each quantity, SI; infinite if there is none.
   [[nodiscard]] virtual std::vector<double> objectives() const = 0;
   /// Most estimation rounds of a run.

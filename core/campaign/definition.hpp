@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -18,6 +19,14 @@ struct DataTable {
       {};  ///< Row by row, shape [rows, num_columns]; units as in the file.
 
   bool operator==(const DataTable&) const = default;
+};
+
+/// Data that all runs of a campaign may share and that a database keeps as a table of its own.
+struct DataTableSchema {
+  std::string_view key;                   ///< As DataTable::key.
+  std::string_view table;                 ///< In the database: `environment_row`.
+  std::string_view comment;               ///< One line, for readers of the schema.
+  std::vector<std::string_view> columns;  ///< With their units: `time_s`.
 };
 
 /// All that the runs of a campaign follow from, as it travels from program to program: nobody on

@@ -20,13 +20,17 @@ std::optional<std::size_t> find_quantity(const ResultSchema& schema, std::string
   return static_cast<std::size_t>(found - schema.quantities.begin());
 }
 
-std::size_t num_correlations(const ResultSchema& schema) {
-  const auto n = static_cast<std::size_t>(
+std::size_t num_standard_errors(const ResultSchema& schema) {
+  return static_cast<std::size_t>(
       std::ranges::count_if(schema.quantities, &Quantity::has_standard_error));
+}
+
+std::size_t num_correlations(const ResultSchema& schema) {
+  const std::size_t n = num_standard_errors(schema);
   return n == 0 ? 0 : n * (n - 1) / 2;
 }
 
-const Quantity& example_quantity(const ResultSchema& schema) {
+Quantity example_quantity(const ResultSchema& schema) {
   return schema.quantities.at((schema.quantities.size() - 1) / 2);
 }
 
@@ -67,6 +71,37 @@ std::vector<std::string> broken_count_rules(const RunResult& result, std::uint32
   require_between("num_draws", result.num_draws, has_draw ? 1 : num_draws_max, num_draws_max);
   require_between("num_rounds", result.num_rounds, used_all_rounds ? num_rounds_max : 0,
                   has_draw ? num_rounds_max : 0);
+  return broken;
+}
+
+std::vector<std::string> broken_size_rules(const RunResult& result, const ResultSchema& schema) {
+  std::vector<std::string> broken;
+  const auto require = [&](std::string_view name, std::size_t size, std::size_t must) {
+    if (size == must) return;
+    broken.push_back(fmt::format("{} = {} entries (must be {} if {})", name, size, must,
+                                 name_of(result.status)));
+  };
+  const std::size_t num_truths = result.has_truth() ? schema.quantities.size() : 0;
+  const bool has_errors = result.has_estimate() && !result.standard_error.empty();
+  const auto if_errors = [&](std::size_t size) { return has_errors ? size : 0; };
+  require("truth", result.truth.size(), num_truths);
+  require("estimate", result.estimate.size(), result.has_estimate() ? num_truths : 0);
+  require("standard_error", result.standard_error.size(), if_errors(num_standard_errors(schema)));
+  require("fit", result.fit.size(), if_errors(schema.fit.size()));
+  require("correlation", result.correlations.size(), if_errors(num_correlations(schema)));
+  if (!result.health.empty()) {
+    require("health", result.health.size(), result.has_truth() ? schema.health.size() : 0);
+  }
+  const auto require_name = [&](std::string_view name, std::uint32_t position,
+                                const std::vector<std::string_view>& names) {
+    const std::size_t least = result.status == RunStatus::lost ? 1 : 0;
+    const std::size_t most = least * names.size();
+    if (position >= least && position <= most) return;
+    broken.push_back(fmt::format("{} = {} (must be in [{}, {}] if {})", name, position, least, most,
+                                 name_of(result.status)));
+  };
+  require_name("loss_cause", result.loss.cause, schema.loss_causes);
+  require_name("loss_session", result.loss.session, schema.loss_sessions);
   return broken;
 }
 

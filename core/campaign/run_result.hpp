@@ -22,7 +22,7 @@ struct PublishedAccuracy {
 
 /// A quantity that a model estimates in each run, and whose true value it knows.
 struct Quantity {
-  std::string_view name;          ///< In files, SQL and logs: `a_c11_delta_x`; [a-z0-9_]+.
+  std::string name;               ///< In files, SQL and logs: `a_c11_delta_x`; [a-z0-9_]+.
   std::string_view unit_suffix;   ///< Unit as a name suffix: `_m`, `_rad`, `_s2_m` or empty.
   std::string_view symbol;        ///< For people: `a_c11·Δx`.
   std::string_view unit;          ///< For people, SI: `m`, `rad`, `s²/m` or `1`.
@@ -34,37 +34,31 @@ struct Quantity {
   bool has_standard_error = false;  ///< True if estimates come with one.
 
   /// `a_c11_delta_x_m`, the end of the column names of this quantity.
-  [[nodiscard]] std::string column() const { return std::string(name) + std::string(unit_suffix); }
+  [[nodiscard]] std::string column() const { return name + std::string(unit_suffix); }
 };
 
 /// A number from 0 to magnitude_max that tells how well a run went, the larger, the worse; or how
 /// well its estimates fit what was measured.
 struct HealthQuantity {
-  std::string_view name;         ///< In files: `acceleration`.
+  std::string name;              ///< In files: `acceleration`; [A-Za-z0-9_]+.
   std::string_view unit_suffix;  ///< `_m_s2`, `_rad` or empty.
   std::string_view unit;         ///< `m/s²`, `rad` or `1`.
 
-  [[nodiscard]] std::string column() const { return std::string(name) + std::string(unit_suffix); }
+  [[nodiscard]] std::string column() const { return name + std::string(unit_suffix); }
 };
 
-/// Data that all runs of a campaign share and that a database keeps as a table of its own.
-struct DataTableSchema {
-  std::string_view key;    ///< Of the definition, the one that names the file: `environment.file`.
-  std::string_view table;  ///< In the database: `environment_row`.
-  std::string_view comment;               ///< One line, for readers of the schema.
-  std::vector<std::string_view> columns;  ///< With their units: `time_s`.
-};
+/// Most quantities of a campaign: a database keeps a bit for each.
+inline constexpr std::size_t quantities_max = 63;
 
-/// Says what the numbers of a model's results are. The order of the lists is that of the values in
-/// a RunResult, of columns, exports and digests. Numbers that are stored count from 1, so that
+/// Says what the numbers of a campaign's results are. The order of the lists is that of the values
+/// in a RunResult, of columns, exports and digests. Numbers that are stored count from 1, so that
 /// lists may grow at their end and never otherwise.
 struct ResultSchema {
-  std::vector<Quantity> quantities;  ///< 1 to 63: a database keeps a bit for each.
+  std::vector<Quantity> quantities;  ///< 1 to quantities_max.
   std::vector<HealthQuantity> health;
   std::vector<std::string_view> loss_causes;    ///< Why a run may be lost: `saturation`.
   std::vector<std::string_view> loss_sessions;  ///< In which part of it: `a_c12`.
   std::uint32_t num_draws_max = 1;              ///< Most draws of one run.
-  std::vector<DataTableSchema> tables;
   /// Of the published figures, for people: `Hardy et al. 2013`, 20 characters at most; empty
   /// without any.
   std::string_view published_source = {};
@@ -75,6 +69,9 @@ struct ResultSchema {
   /// How well estimates that have standard errors fit what was measured.
   std::vector<HealthQuantity> fit = {};
 };
+
+/// Quantities that have a standard error.
+[[nodiscard]] std::size_t num_standard_errors(const ResultSchema& schema);
 
 /// How many RunResult::correlations there are.
 [[nodiscard]] std::size_t num_correlations(const ResultSchema& schema);
@@ -89,9 +86,9 @@ struct ResultSchema {
 
 /// The quantity that texts take as an example: the one in the middle. It is the same as long as the
 /// list is, because comments in the schema of every database name it.
-[[nodiscard]] const Quantity& example_quantity(const ResultSchema& schema);
+[[nodiscard]] Quantity example_quantity(const ResultSchema& schema);
 
-/// The names of all quantities, in their order.
+/// The names of all quantities, in their order; they are those of the schema, which outlives them.
 [[nodiscard]] std::vector<std::string_view> quantity_names(const ResultSchema& schema);
 
 /// What is larger than any truth or estimate, SI: cubes of errors can be added up over any number
@@ -156,12 +153,18 @@ struct RunResult {
 
 /// The rules about its counts that a result breaks; no simulation yields a result that breaks one.
 ///
-/// @param num_draws_max   Of the model's ResultSchema.
+/// @param num_draws_max   Of the campaign's ResultSchema.
 /// @param num_rounds_max  Of the campaign: Campaign::num_rounds_max().
 /// @return Each as `num_draws = 0 (must be 1 to 1000 if completed)`.
 [[nodiscard]] std::vector<std::string> broken_count_rules(const RunResult& result,
                                                           std::uint32_t num_draws_max,
                                                           std::int64_t num_rounds_max);
+
+/// The lists of a new result that are not as long as its status and the schema make them, and a
+/// loss for which the schema has no name; no simulation yields a result with one.
+/// @return Each as `truth = 9 entries (must be 10 if completed)`.
+[[nodiscard]] std::vector<std::string> broken_size_rules(const RunResult& result,
+                                                         const ResultSchema& schema);
 
 /// Statistics would be nonsense, or never end.
 /// @throws Error if a truth or estimate that means something is out of range.

@@ -1,5 +1,9 @@
+#include <fmt/format.h>
+
 #include <array>
 #include <memory>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "core/error.hpp"
@@ -37,8 +41,29 @@ std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
   return compare_definitions(*this, *second);
 }
 
+// With the columns of standard errors whatever the method is, as databases of all campaigns had them
+// from the first; where sessions test, of what has them, and the quantities of the test.
+ResultSchema MicroscopeCampaign::results() const {
+  const bool has_tests = scenario.has_tests();
+  const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
+  ResultSchema schema =
+      has_tests && !has_errors ? microscope_results() : results_of(estimation_methods());
+  if (has_tests) {
+    schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
+                             test_quantities().end());
+  }
+  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
+  schema.budget_level = budget_level();
+  return schema;
+}
+
 std::vector<double> MicroscopeCampaign::objectives() const {
-  return {scenario.objectives.begin(), scenario.objectives.end()};
+  std::vector<double> objectives(scenario.objectives.begin(), scenario.objectives.end());
+  if (scenario.has_tests()) {
+    objectives.insert(objectives.end(), scenario.test_objectives.begin(),
+                      scenario.test_objectives.end());
+  }
+  return objectives;
 }
 
 std::int64_t MicroscopeCampaign::num_rounds_max() const {
@@ -58,7 +83,7 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
   const ParameterArray truth =
       true_parameters(*accepted.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
   draw.values.assign(accepted.values.begin(), accepted.values.end());
-  draw.truth.assign(truth.begin(), truth.end());
+  draw.truth = run_truth(scenario, truth, accepted.instrument->eotvos_parameter);
   return draw;
 }
 
@@ -70,8 +95,10 @@ Warner MicroscopeCampaign::warner() const {
   return [bounds = ShiftBounds(scenario)](const RunResult& result) {
     std::vector<Warning> warnings;
     if (result.health.empty()) return warnings;
-    for (const Shift& shift :
-         bounds.of(health_of(result.health), result.truth, result.standard_error)) {
+    // A test alone has standard errors where the calibration has none.
+    std::span<const double> errors = result.standard_error;
+    if (errors.size() < num_parameters) errors = {};
+    for (const Shift& shift : bounds.of(health_of(result.health), result.truth, errors)) {
       if (shift.part < warned_part) continue;
       warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
     }
@@ -87,12 +114,6 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   return drawn;
 }
 
-ResultSchema with_budget(ResultSchema schema) {
-  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
-  schema.budget_level = budget_level();
-  return schema;
-}
-
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -101,9 +122,26 @@ class MicroscopeModel final : public Model {
     return "Validates the in-flight calibration of drag-free accelerometers.";
   }
 
-  [[nodiscard]] const ResultSchema& results() const override {
-    static const ResultSchema results = with_budget(results_of(estimation_methods()));
-    return results;
+  /// Of a canonical text: the quantities depend on whether it tests, and then on its method.
+  [[nodiscard]] ResultSchema results_of(std::string_view definition,
+                                        std::string_view /*version*/) const override {
+    MicroscopeCampaign campaign = hardy2013_campaign();
+    if (definition.find("\ntarget = \"ep_test\"\n") == std::string_view::npos) {
+      return campaign.results();
+    }
+    campaign.scenario.sessions.front().target = SessionTarget::ep_test;
+    const auto methods = estimation_methods();
+    for (std::size_t i = 0; i < methods.size(); ++i) {
+      const std::string line = fmt::format("\nmethod = \"{}\"\n", methods[i].name);
+      if (definition.find(line) == std::string_view::npos) continue;
+      campaign.scenario.estimation.method = static_cast<EstimationMethod>(i + 1);
+    }
+    return campaign.results();
+  }
+
+  [[nodiscard]] std::span<const DataTableSchema> tables() const override {
+    static const std::array<DataTableSchema, 1> tables{environment_table_schema()};
+    return tables;
   }
 
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override {

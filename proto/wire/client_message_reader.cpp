@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/model_rules.hpp"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/definition_codec.hpp"
@@ -42,7 +41,6 @@ void check(const proto::SubmitRequest& message) {
   const std::string& rule = message.stop_rule();
   require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
           fmt::format("must be at most {}", stop_rule_size_max));
-  if (!rule.empty()) (void)parse_stop_rule(rule);
   check_priority(message.priority());
   require_in(message.failures_max(), 0, num_runs_max, "failures");
 }

@@ -154,21 +154,18 @@ void check(const proto::GiveBack& give_back) {
   for (const proto::HeldRuns& held : give_back.runs()) check_held(held, num_ranges);
 }
 
-void require_size(int size, std::size_t must, std::string_view field) {
-  if (static_cast<std::size_t>(size) == must) return;
-  throw ConfigError(field, fmt::format("{} entries", size),
-                    fmt::format("must be {} with this status", must));
-}
-
 using Values = google::protobuf::RepeatedField<double>;
 
-/// One value in range for each of `count`.
-void check_values(const Values& values, std::size_t count, std::string_view field) {
-  require_size(values.size(), count, field);
+/// Values in range; none if they have no meaning. How many there are depends on the campaign, see
+/// broken_size_rules().
+void check_values(const Values& values, bool have_meaning, double least, double most,
+                  std::string_view field) {
+  require(have_meaning || values.empty(), field, fmt::format("{} entries", values.size()),
+          "must be 0 with this status");
   for (const double value : values) {
-    if (is_in_range(value)) continue;
+    if (value >= least && value <= most) continue;
     throw ConfigError(field, fmt::format("{}", value),
-                      fmt::format("must be in [{}, {}]", -magnitude_max, magnitude_max));
+                      fmt::format("must be in [{}, {}]", least, most));
   }
 }
 
@@ -177,50 +174,28 @@ void check_time(double time_s, std::string_view field) {
   throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", run_time_s_max));
 }
 
-/// One value from 0 on for each quantity of `health` or `fit`, or none.
-void check_magnitudes(const Values& values, bool has_values,
-                      const std::vector<HealthQuantity>& quantities, std::string_view field) {
-  require_size(values.size(), has_values ? quantities.size() : 0, field);
-  for (int i = 0; i < values.size(); ++i) {
-    if (values[i] >= 0.0 && values[i] <= magnitude_max) continue;
-    const std::string name = quantities[static_cast<std::size_t>(i)].column();
-    throw ConfigError(fmt::format("{}.{}", field, name), fmt::format("{}", values[i]),
-                      fmt::format("must be in [0, {}]", magnitude_max));
-  }
+void check_loss(std::uint32_t position, bool is_lost, std::string_view field) {
+  constexpr std::uint64_t positions_max = 255;
+  require_in(position, is_lost ? 1 : 0, is_lost ? positions_max : 0, field);
 }
 
-void check_correlations(const Values& correlations, std::size_t count) {
-  require_size(correlations.size(), count, "correlation");
-  for (const double value : correlations) {
-    if (value >= -1.0 && value <= 1.0) continue;
-    throw ConfigError("correlation", fmt::format("{}", value), "must be in [-1, 1]");
-  }
-}
-
-void check_loss(const proto::ComputedRun& run, bool is_lost, const ResultSchema& schema) {
-  require_in(run.loss_cause(), is_lost ? 1 : 0, is_lost ? schema.loss_causes.size() : 0,
-             "loss_cause");
-  require_in(run.loss_session(), is_lost ? 1 : 0, is_lost ? schema.loss_sessions.size() : 0,
-             "loss_session");
-}
-
-/// Every list is as long as the model's results say; its numbers are in range.
-void check(const proto::ComputedRun& run, const ResultSchema& schema, std::size_t num_errors) {
+void check(const proto::ComputedRun& run) {
   require_in(static_cast<std::uint64_t>(static_cast<int>(run.status())), 1, proto::RunStatus_MAX,
              "status");
   check_run(run.run());
   RunResult result;
   result.status = static_cast<RunStatus>(run.status());
+  const bool has_truth = result.has_truth();
   const bool has_estimate = result.has_estimate();
   const bool has_errors = has_estimate && run.standard_error_size() > 0;
-  const std::size_t num_quantities = schema.quantities.size();
-  check_values(run.truth(), result.has_truth() ? num_quantities : 0, "truth");
-  check_values(run.estimate(), has_estimate ? num_quantities : 0, "estimate");
-  check_values(run.standard_error(), has_errors ? num_errors : 0, "standard_error");
-  check_magnitudes(run.health(), result.has_truth(), schema.health, "health");
-  check_magnitudes(run.fit(), has_errors, schema.fit, "fit");
-  check_correlations(run.correlation(), has_errors ? num_correlations(schema) : 0);
-  check_loss(run, result.status == RunStatus::lost, schema);
+  check_values(run.truth(), has_truth, -magnitude_max, magnitude_max, "truth");
+  check_values(run.estimate(), has_estimate, -magnitude_max, magnitude_max, "estimate");
+  check_values(run.standard_error(), has_estimate, -magnitude_max, magnitude_max, "standard_error");
+  check_values(run.health(), has_truth, 0.0, magnitude_max, "health");
+  check_values(run.fit(), has_errors, 0.0, magnitude_max, "fit");
+  check_values(run.correlation(), has_errors, -1.0, 1.0, "correlation");
+  check_loss(run.loss_cause(), result.status == RunStatus::lost, "loss_cause");
+  check_loss(run.loss_session(), result.status == RunStatus::lost, "loss_session");
   check_time(run.compute_s(), "compute_s");
   check_time(run.elapsed_s(), "elapsed_s");
 }
@@ -229,10 +204,7 @@ void check(const proto::ResultBatch& batch) {
   require_count(batch.results_size(), 1, runs_per_lease_max, "results");
   check_campaign(batch.campaign());
   check_attempt(batch.attempt());
-  const ResultSchema& schema = model().results();
-  const auto num_errors = static_cast<std::size_t>(
-      std::ranges::count_if(schema.quantities, &Quantity::has_standard_error));
-  for (const proto::ComputedRun& run : batch.results()) check(run, schema, num_errors);
+  for (const proto::ComputedRun& run : batch.results()) check(run);
 }
 
 void check(const proto::ResultAck& ack) {

@@ -3,8 +3,6 @@
 #include <string>
 #include <utility>
 
-#include "core/model.hpp"
-
 namespace proofmass::wire {
 
 std::vector<RunRange> ranges_of(const Ranges& ranges) {
@@ -62,9 +60,7 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   message.set_num_rounds(result.num_rounds);
   if (result.has_truth()) {
     message.mutable_truth()->Assign(result.truth.begin(), result.truth.end());
-    // What was simulated has health; the message has it whenever the status allows it.
     message.mutable_health()->Assign(result.health.begin(), result.health.end());
-    message.mutable_health()->Resize(static_cast<int>(model().results().health.size()), 0.0);
   }
   if (result.has_estimate()) {
     message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());

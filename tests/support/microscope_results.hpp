@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <string_view>
 #include <vector>
 
 #include "core/campaign/run_result.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/results/health.hpp"
 #include "core/microscope/results/results.hpp"
-#include "core/model_rules.hpp"
+#include "core/result_rules.hpp"
 
 namespace proofmass::test {
 
@@ -25,6 +26,20 @@ inline const std::vector<ParameterInfo>& parameter_infos() {
     return all;
   }();
   return infos;
+}
+
+/// What the results of MICROSCOPE's nominal campaign are.
+inline const ResultSchema& schema() {
+  static const ResultSchema results = MicroscopeCampaign().results();
+  return results;
+}
+
+/// Rules about them.
+inline Requirement parse_requirement(std::string_view text) {
+  return proofmass::parse_requirement(text, schema());
+}
+inline StopRule parse_stop_rule(std::string_view text) {
+  return proofmass::parse_stop_rule(text, schema());
 }
 
 /// The result with a value for every parameter, 0, as far as its status lets them mean something.

@@ -79,7 +79,7 @@ void expect_order(const std::string& folder, const std::vector<std::string>& par
 TEST(CheckLayers, KeepTheOrderOfCore) {
   expect_order("core", {"error.hpp", "runs.hpp", "math/a.hpp", "random/a.hpp", "signal/a.hpp",
                         "statistics/detail/a.hpp", "campaign/a.hpp", "definition/a.hpp",
-                        "model.hpp", "model_rules.hpp"});
+                        "model.hpp", "result_rules.hpp"});
   EXPECT_THAT(layers("core/campaign/a.cpp", "\"core/model.hpp\""),
               ElementsAre("core/campaign/a.cpp:1: core/model.hpp: campaign comes before model in "
                           "the order of core"));

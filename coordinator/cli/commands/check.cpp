@@ -64,7 +64,8 @@ std::string check_text(const CheckOptions& options, const Campaign& campaign, co
 int check_campaign_file(const CheckOptions& options) {
   const std::unique_ptr<const Campaign> campaign = read_campaign(options.file, options.overrides);
   const std::unique_ptr<const Plan> plan = campaign->prepare();
-  const CostEstimate cost = estimated_cost(campaign->num_runs, measure_batch_s(*campaign, *plan));
+  const CostEstimate cost =
+      estimated_cost(campaign->results(), campaign->num_runs, measure_batch_s(*campaign, *plan));
   if (options.format == OutputFormat::json) {
     print_json(check_json(options, *campaign, *plan, cost));
   } else {

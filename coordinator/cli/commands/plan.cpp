@@ -44,6 +44,7 @@ struct Planned {
   std::vector<int> num_steps;
   int num_steps_in_all;
   PlanBound bound;
+  std::vector<Quantity> quantities;
   std::vector<double> objectives;
   std::size_t num_instruments;
   std::size_t num_probed;
@@ -60,6 +61,7 @@ Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<in
           .num_steps = std::move(num_steps),
           .num_steps_in_all = in_all,
           .bound = std::move(bound),
+          .quantities = campaign.results().quantities,
           .objectives = campaign.objectives(),
           .num_instruments = study.num_instruments(),
           .num_probed = study.num_probed(),
@@ -102,7 +104,7 @@ void add_undetermined(const Planned& plan, Table& table) {
   for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
     if (plan.bound.standard_errors[i] <= plan.objectives[i]) continue;
     table.notes.push_back(fmt::format("σ of {} is larger than the objective; {} would reduce it",
-                                      model().results().quantities[i].symbol, plan.remedies[i]));
+                                      plan.quantities[i].symbol, plan.remedies[i]));
   }
 }
 
@@ -113,7 +115,7 @@ Table bound_table(const Planned& plan) {
                           {.title = "σ"},
                           {.title = "objective/σ"},
                           {.title = "holds, %"}}};
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const std::vector<Quantity>& quantities = plan.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     const auto& [objective, sigma] = std::pair(plan.objectives[i], plan.bound.standard_errors[i]);
     const double scale = quantities[i].display_scale;
@@ -174,7 +176,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
                               {"detail", loss.detail},
                               {"num_runs", loss.num_runs}});
   }
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const std::vector<Quantity>& quantities = plan.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     json["parameters"].push_back({{"parameter", quantities[i].name},
                                   {"unit", quantities[i].unit},

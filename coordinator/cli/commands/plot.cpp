@@ -144,7 +144,7 @@ void add_plot(CLI::App& app, Command& chosen) {
   add_database(command, options.database);
   command.add_option("--chart", options.chart,
                      fmt::format("Which one, as in errors or histogram:{};\nsee --list",
-                                 example_quantity(model().results()).name));
+                                 example_quantity(example_results()).name));
   command
       .add_option("--output", options.output,
                   "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output")

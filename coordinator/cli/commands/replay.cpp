@@ -16,7 +16,6 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
@@ -94,9 +93,8 @@ void check_arguments(const ReplayOptions& options) {
   }
 }
 
-std::string text_of(const RunResult& result) {
+std::string text_of(const RunResult& result, const ResultSchema& schema) {
   if (result.status != RunStatus::lost) return std::string(name_of(result.status));
-  const ResultSchema& schema = model().results();
   return fmt::format("lost ({} in {})", name_at(schema.loss_causes, result.loss.cause),
                      name_at(schema.loss_sessions, result.loss.session));
 }
@@ -181,7 +179,7 @@ class ReplayCommand {
     }
     if (!differences.empty()) return;
     print_lines(fmt::format("run {} {}: all values equal the stored ones\n", stored.run.value,
-                            text_of(stored)));
+                            text_of(stored, store_.schema())));
     if (is_written()) {
       for (const auto& file : files_of(options_, stored.run, selection_)) {
         print_lines(fmt::format("wrote {}\n", file.string()));

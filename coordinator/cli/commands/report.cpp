@@ -42,13 +42,14 @@ struct ReportOptions {
   [[nodiscard]] bool has_document() const { return !html.empty() || !markdown.empty(); }
 };
 
-std::vector<StatedRequirement> stated_in(const ReportOptions& options) {
+std::vector<StatedRequirement> stated_in(const ReportOptions& options,
+                                         const ResultSchema& results) {
   if (options.requirements_file.empty()) return numbered_requirements(options.requirements);
   if (!options.requirements.empty()) {
     throw UsageError("requirement = " + options.requirements.front() +
                      " (must not be given with --requirements)");
   }
-  return read_requirements(options.requirements_file);
+  return read_requirements(options.requirements_file, results);
 }
 
 std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
@@ -125,8 +126,8 @@ int print_report(const ReportOptions& options) {
   check_standard_output(options);
   check_document(options.html, options.if_there);
   check_document(options.markdown, options.if_there);
-  const std::vector<StatedRequirement> stated = stated_in(options);
   const Store store = Store::open_read_only(options.database);
+  const std::vector<StatedRequirement> stated = stated_in(options, store.schema());
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   if (options.has_document()) {
     const int exit_code = write_documents(options, store, *campaign, stated);

@@ -33,8 +33,7 @@ struct SensitivityOptions {
   ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 };
 
-std::size_t quantity_named(std::string_view name) {
-  const ResultSchema& schema = model().results();
+std::size_t quantity_named(std::string_view name, const ResultSchema& schema) {
   if (const std::optional<std::size_t> found = find_quantity(schema, name)) return *found;
   throw UsageError(fmt::format("parameter = {} (must be one of {})", name,
                                fmt::join(quantity_names(schema), " ")));
@@ -52,9 +51,9 @@ int print_remote_sensitivity(const SensitivityOptions& options) {
 
 int print_sensitivity(const SensitivityOptions& options) {
   if (is_remote(options.connection)) return print_remote_sensitivity(options);
-  std::vector<std::size_t> quantities;
-  if (options.parameter) quantities.push_back(quantity_named(*options.parameter));
   const Store store = Store::open_read_only(options.database);
+  std::vector<std::size_t> quantities;
+  if (options.parameter) quantities.push_back(quantity_named(*options.parameter, store.schema()));
   std::optional<RunIndex> explained;
   if (options.run) explained = RunIndex{*options.run};
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
@@ -108,8 +107,7 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
       .add_option("--rows", options.num_rows,
                   "Quantities to name for each error; by default 5,\n"
                   "or none if chance explains all influences")
-      ->check(wire::in_range(std::size_t{1},
-                             model().drawn().size() + model().results().quantities.size()));
+      ->check(wire::in_range(std::size_t{1}, model().drawn().size() + quantities_max));
   add_json_flag(command, options.format);
   add_optional_connection(command, options.connection);
 }

@@ -33,6 +33,7 @@ struct SubmitOptions {
 /// The campaign that the arguments name.
 std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
+  check_stop_rule(options.stop.rule, *campaign);
   if (options.name) {
     campaign->name = *options.name;
     try {

@@ -126,6 +126,7 @@ Sweep plan_sweep(const SweepOptions& options) {
       throw UsageError(
           fmt::format("vary = {} (makes the same campaign as {})", text_of(values), same->second));
     }
+    check_stop_rule(swept.run.stop.rule, *campaign);
     const FoundCampaign found = look_for(*campaign, swept.run);
     swept.num_missing = found.num_missing;
     swept.exit_code = found.exit_code;
@@ -142,14 +143,16 @@ CostEstimate cost_of(const std::vector<const SweptCampaign*>& unfinished) {
   CostEstimate cost;
   double step_s = 0.0;  // Of a batch.
   int num_steps = 0;
+  ResultSchema results;
   for (std::size_t i = 0; i < unfinished.size(); ++i) {
     if (i % stride == 0) {
       const std::unique_ptr<const Campaign> campaign = read_swept(*unfinished[i]);
       const std::unique_ptr<const Plan> plan = campaign->prepare();
       num_steps = plan->num_steps();
+      results = campaign->results();
       if (i == 0) step_s = measure_batch_s(*campaign, *plan) / num_steps;
     }
-    cost += estimated_cost(unfinished[i]->num_missing, step_s * num_steps);
+    cost += estimated_cost(results, unfinished[i]->num_missing, step_s * num_steps);
   }
   return cost;
 }

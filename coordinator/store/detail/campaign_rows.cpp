@@ -33,7 +33,7 @@ wire::CampaignPhase read_phase(const Database& database, std::string_view name) 
 }
 
 void insert_data_tables(Database& database, const std::vector<DataTable>& tables) {
-  for (const DataTableSchema& schema : model().results().tables) {
+  for (const DataTableSchema& schema : model().tables()) {
     const auto table = std::ranges::find(tables, schema.key, &DataTable::key);
     if (table == tables.end()) continue;
     const int num_columns = static_cast<int>(schema.columns.size());
@@ -75,7 +75,7 @@ void insert_budget_coefficients(Database& database, const Campaign& campaign) {
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   if (!budget) return;
   Statement insert = database.prepare("INSERT INTO budget_coefficient VALUES (?, ?, ?, ?)");
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const std::vector<Quantity> quantities = campaign.results().quantities;
   for (const BudgetTerm& term : budget->terms) {
     std::optional<double> level;
     if (term.follows_level) level = budget->assumed_level;
@@ -92,7 +92,7 @@ void insert_parameters(Database& database, const Campaign& campaign) {
   Statement insert = database.prepare("INSERT INTO parameter VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
   const std::vector<double> objectives = campaign.objectives();
   std::uint64_t position = 0;
-  for (const Quantity& quantity : model().results().quantities) {
+  for (const Quantity& quantity : campaign.results().quantities) {
     const double objective = objectives[position++];
     const auto published = [&](double PublishedAccuracy::*figure) {
       return quantity.published ? std::optional((*quantity.published).*figure) : std::nullopt;
@@ -122,7 +122,7 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
 
 std::vector<DataTable> read_data_tables(const Database& database) {
   std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model().results().tables) {
+  for (const DataTableSchema& schema : model().tables()) {
     DataTable table{.key = std::string(schema.key),
                     .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
     Statement select = database.prepare(fmt::format("SELECT {} FROM {} ORDER BY position",

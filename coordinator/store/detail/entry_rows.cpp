@@ -136,10 +136,10 @@ void WorkerRows::write_counts(std::int64_t now_unix_s) {
   counts_.clear();
 }
 
-EntryRows::EntryRows(const Database& database)
+EntryRows::EntryRows(const Database& database, const ResultSchema& results)
     : database_(database),
-      results_(database),
-      largest_errors_(database),
+      results_(database, results),
+      largest_errors_(database, results),
       workers_(database),
       insert_delivery_(database.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)")),
       select_failures_(database.prepare("SELECT EXISTS (SELECT 1 FROM run_failure)")),

@@ -75,7 +75,8 @@ inline constexpr std::uint64_t num_further_audits_max = 1'000'000;
 /// to be thrown away with a transaction that is rolled back.
 class EntryRows {
  public:
-  explicit EntryRows(const Database& database);
+  /// @param results  Of the campaign; outlives the object.
+  EntryRows(const Database& database, const ResultSchema& results);
 
   /// @pre Inside a transaction.
   CommitSummary write(std::span<const Entry> entries);

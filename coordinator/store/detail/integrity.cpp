@@ -36,7 +36,7 @@ void add_campaign(const Database& database, Sha256& hash) {
 }
 
 void add_data_tables(const Database& database, Sha256& hash) {
-  for (const DataTableSchema& table : model().results().tables) {
+  for (const DataTableSchema& table : model().tables()) {
     hash.add(database.count(fmt::format("SELECT count(*) FROM {}", table.table)));
     Statement row = database.prepare(fmt::format("SELECT position, {} FROM {} ORDER BY position",
                                                  fmt::join(table.columns, ", "), table.table));
@@ -85,13 +85,12 @@ bool has_row(Statement& select, RunIndex run, std::uint64_t number) {
 }
 
 // `overrun` and `worst_run` follow from the results.
-void check_largest_errors(const Database& database) {
-  const std::vector<double> objectives = read_objectives(database);
-  const std::vector<Quantity>& quantities = model().results().quantities;
-  WorstRunTable worst(quantities.size());
+void check_largest_errors(const Database& database, const ResultSchema& schema) {
+  const std::vector<double> objectives = read_objectives(database, schema);
+  WorstRunTable worst(schema.quantities.size());
   Statement overrun =
       database.prepare("SELECT run_index, parameters FROM overrun ORDER BY run_index");
-  ResultReader results(database);
+  ResultReader results(database, schema);
   while (const std::optional<RunResult> result = results.next()) {
     const std::uint64_t exceeded = exceeded_objectives(*result, objectives);
     if (exceeded != 0 && !has_row(overrun, result->run, exceeded)) {
@@ -104,11 +103,11 @@ void check_largest_errors(const Database& database) {
     }
   }
   if (overrun.step()) database.refuse("is damaged: overrun has a run too many");
-  const WorstRunTable stored = read_worst_runs(database);
+  const WorstRunTable stored = read_worst_runs(database, schema);
   for (std::size_t i = 0; i < worst.size(); ++i) {
     if (stored[i].runs() == worst[i].runs()) continue;
     database.refuse(fmt::format("is damaged: worst_run does not follow from the results of {}",
-                                quantities[i].name));
+                                schema.quantities[i].name));
   }
 }
 
@@ -146,10 +145,10 @@ void check_workers(const Database& database) {
 }
 
 // An audit has the digest of the stored result, and is equal if the second one has the same.
-void check_audits(const Database& database) {
+void check_audits(const Database& database, const ResultSchema& schema) {
   Statement select = database.prepare(
       "SELECT run_index, worker_key, stored_digest, second_digest, is_equal FROM audit");
-  ResultRows results(database);
+  ResultRows results(database, schema);
   while (select.step()) {
     const std::string row =
         fmt::format("run {} by worker_key {}", select.count(0), select.integer(1));
@@ -220,24 +219,24 @@ void write_table_digest(const Database& database) {
   database.prepare("UPDATE campaign SET table_digest = ?").run(compute_table_digest(database));
 }
 
-void check_integrity(const Database& database) {
+void check_integrity(const Database& database, const ResultSchema& results) {
   const std::string finding = database.text("PRAGMA integrity_check(1)");
   if (finding != "ok") database.refuse_as_damaged(finding);
-  check_schema(database, schema_version());
+  check_schema(database, schema_version(), results);
   check_references(database);
   check_single_rows(database);
-  check_largest_errors(database);
+  check_largest_errors(database, results);
   check_workers(database);
-  check_audits(database);
+  check_audits(database, results);
 }
 
-std::vector<std::string> table_differences(const Database& database,
+std::vector<std::string> table_differences(const Database& database, const ResultSchema& results,
                                            const std::function<void(Database&)>& write,
                                            std::span<const ComparedTable> tables,
                                            FurtherRows further) {
   Database expected("new campaign", Access::memory);
   Transaction transaction(expected);
-  migrate(expected);
+  migrate(expected, results);
   write(expected);
   std::vector<std::string> differences;
   for (const ComparedTable& table : tables) {

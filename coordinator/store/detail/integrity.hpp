@@ -26,7 +26,7 @@ void write_table_digest(const Database& database);
 
 /// Checks everything that SQLite can check, and that the schema is that of a new file.
 /// @throws StoreError naming the first finding.
-void check_integrity(const Database& database);
+void check_integrity(const Database& database, const ResultSchema& results);
 
 /// What is compared of a table.
 struct ComparedTable {
@@ -42,10 +42,12 @@ enum class FurtherRows : std::uint8_t { refuse, ignore };
 /// What tables have other than they would have in a new file, a line each: `statistic lacks gain`,
 /// `statistic.mean of gain = 1 (must be 25.5)`.
 ///
-/// @param write  Writes to a new file in memory what is expected. The same functions as those that
-/// write to a campaign database: nothing is said twice of what a table holds.
+/// @param results  Of the campaign.
+/// @param write    Writes to a new file in memory what is expected. The same functions as those
+/// that write to a campaign database: nothing is said twice of what a table holds.
 [[nodiscard]] std::vector<std::string> table_differences(
-    const Database& database, const std::function<void(Database&)>& write,
-    std::span<const ComparedTable> tables, FurtherRows further = FurtherRows::refuse);
+    const Database& database, const ResultSchema& results,
+    const std::function<void(Database&)>& write, std::span<const ComparedTable> tables,
+    FurtherRows further = FurtherRows::refuse);
 
 }  // namespace proofmass::coordinator::detail

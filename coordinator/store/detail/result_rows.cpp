@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -17,7 +16,6 @@
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -25,52 +23,25 @@ namespace {
 // Columns before the values: run_index, status, num_draws, num_rounds.
 constexpr int num_leading_columns = 4;
 
-/// Where the columns of the model's values stand, from 0. Standard errors and their fit are read by
-/// themselves: where there are none, reading them would cost a tenth of all reading.
-struct Columns {
-  explicit Columns(const ResultSchema& schema)
-      : num_quantities(static_cast<int>(schema.quantities.size())),
-        num_standard_errors(static_cast<int>(
-            std::ranges::count_if(schema.quantities, &Quantity::has_standard_error))),
-        num_fit(static_cast<int>(schema.fit.size())),
-        num_correlations(proofmass::num_correlations(schema)),
-        num_health(static_cast<int>(schema.health.size())) {}
-
-  int num_quantities, num_standard_errors, num_fit;
-  std::size_t num_correlations;
-  int num_health;
-  int truth = num_leading_columns;
-  int estimate = truth + num_quantities;
-  int health = estimate + num_quantities;
-  int loss_cause = health + num_health;
-  int loss_session = loss_cause + 1;
-  int num_all = loss_session + 1 + num_standard_errors + num_fit + (num_correlations > 0 ? 1 : 0);
-};
-
 bool is_of_standard_errors(const ValueColumn& column) {
   return column.kind == ValueKind::standard_error || column.kind == ValueKind::fit;
 }
 
-const Columns& columns() {
-  static const Columns columns(model().results());
-  return columns;
-}
-
-std::string column_list() {
+std::string column_list(const ResultColumns& columns) {
   std::string list = "run_index, status, num_draws, num_rounds";
-  for (const ValueColumn& column : value_columns()) {
+  for (const ValueColumn& column : columns.values) {
     if (column.kind == ValueKind::error || is_of_standard_errors(column)) continue;
     list += ", " + column.name;
   }
   return list + ", loss_cause, loss_session";
 }
 
-std::string list_of_standard_errors() {
+std::string list_of_standard_errors(const ResultColumns& columns) {
   std::string list;
-  for (const ValueColumn& column : value_columns()) {
+  for (const ValueColumn& column : columns.values) {
     if (is_of_standard_errors(column)) list += ", " + column.name;
   }
-  return columns().num_correlations > 0 ? list + ", correlations" : list;
+  return columns.num_correlations > 0 ? list + ", correlations" : list;
 }
 
 /// `[0.25,-0.125]`, a JSON array.
@@ -78,21 +49,22 @@ std::string format_correlations(const std::vector<double>& values) {
   return fmt::format("[{}]", fmt::join(values, ","));
 }
 
-std::string insert_sql() {
+std::string insert_sql(const ResultColumns& columns) {
   return fmt::format("INSERT INTO run_result ({}{}) VALUES ({}) ON CONFLICT DO NOTHING",
-                     column_list(), list_of_standard_errors(), places(columns().num_all));
+                     column_list(columns), list_of_standard_errors(columns),
+                     places(columns.num_all));
 }
 
-std::string select_sql(std::string_view clause) {
-  return fmt::format("SELECT {} FROM run_result {}", column_list(), clause);
+std::string select_sql(const ResultColumns& columns, std::string_view clause) {
+  return fmt::format("SELECT {} FROM run_result {}", column_list(columns), clause);
 }
 
 /// @param condition  Of the runs.
-std::string select_standard_errors_sql(std::string_view condition) {
+std::string select_standard_errors_sql(const ResultColumns& columns, std::string_view condition) {
   return fmt::format(
       "SELECT run_index{} FROM run_result INDEXED BY run_result_standard_errors "
       "WHERE ({}) AND {} ORDER BY run_index",
-      list_of_standard_errors(), has_standard_errors_sql(), condition);
+      list_of_standard_errors(columns), has_standard_errors_sql(columns.schema), condition);
 }
 
 /// Adds the bytes of a number to a digest, lowest first.
@@ -165,40 +137,38 @@ std::uint32_t read_choice(const Statement& row, int column, std::size_t count) {
       fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
 }
 
-Loss read_loss(const Statement& row, RunStatus status) {
+Loss read_loss(const Statement& row, const ResultColumns& at, RunStatus status) {
   if (status != RunStatus::lost) {
-    for (const int column : {columns().loss_cause, columns().loss_session}) {
+    for (const int column : {at.loss_cause, at.loss_session}) {
       if (!row.optional_count(column)) continue;
       row.refuse_as_damaged(
           fmt::format("{} of run {}, which is not lost", row.column_name(column), row.count(0)));
     }
     return {};
   }
-  const ResultSchema& schema = model().results();
-  return {.cause = read_choice(row, columns().loss_cause, schema.loss_causes.size()),
-          .session = read_choice(row, columns().loss_session, schema.loss_sessions.size())};
+  return {.cause = read_choice(row, at.loss_cause, at.schema.loss_causes.size()),
+          .session = read_choice(row, at.loss_session, at.schema.loss_sessions.size())};
 }
 
 // The file is damaged if a number has another type than the schema gives it, or is out of the range
 // of its field.
-RunResult read_result(const Statement& row) {
+RunResult read_result(const Statement& row, const ResultColumns& at) {
   RunResult result{.run = RunIndex{row.count(0)},
                    .status = read_status(row),
                    .num_draws = read_number(row, 2),
                    .num_rounds = read_number(row, 3)};
-  const Columns& at = columns();
   if (result.has_truth()) result.truth = read_values(row, at.truth, at.num_quantities);
   if (result.has_estimate()) result.estimate = read_values(row, at.estimate, at.num_quantities);
   // A run without a draw has no health.
   if (at.num_health > 0 && row.optional_real(at.health)) {
     result.health = read_magnitudes(row, at.health, at.num_health);
   }
-  result.loss = read_loss(row, result.status);
+  result.loss = read_loss(row, at, result.status);
   return result;
 }
 
 /// What format_correlations() wrote.
-std::vector<double> read_correlations(const Statement& row, int column) {
+std::vector<double> read_correlations(const Statement& row, int column, std::size_t count) {
   const std::string text = row.text(column);
   std::vector<double> values;
   const char* next = text.data();
@@ -210,28 +180,28 @@ std::vector<double> read_correlations(const Statement& row, int column) {
     next = after;
   }
   // As it was written, so that no other text has the same digest.
-  if (values.size() == columns().num_correlations && format_correlations(values) == text) {
-    return values;
-  }
+  if (values.size() == count && format_correlations(values) == text) return values;
   row.refuse_as_damaged(fmt::format("correlations of run {}", row.count(0)));
 }
 
 /// Of a row of select_standard_errors_sql().
-void read_standard_errors(const Statement& row, RunResult& result) {
-  const Columns& at = columns();
+void read_standard_errors(const Statement& row, const ResultColumns& at, RunResult& result) {
   result.standard_error = read_values(row, 1, at.num_standard_errors);
   result.fit = read_magnitudes(row, 1 + at.num_standard_errors, at.num_fit);
   if (at.num_correlations == 0) return;
-  result.correlations = read_correlations(row, 1 + at.num_standard_errors + at.num_fit);
+  result.correlations =
+      read_correlations(row, 1 + at.num_standard_errors + at.num_fit, at.num_correlations);
 }
 
 /// Those of results that are read in run order, from the same state of the file.
 class StandardErrorRows {
  public:
-  StandardErrorRows(const Database& database, std::optional<RunRange> runs) {
-    if (columns().num_standard_errors == 0) return;
+  /// @param at  Outlives the object.
+  StandardErrorRows(const Database& database, const ResultColumns& at, std::optional<RunRange> runs)
+      : columns_(at) {
+    if (at.num_standard_errors == 0) return;
     rows_ = database.prepare(
-        select_standard_errors_sql(runs ? "run_index >= ? AND run_index < ?" : "TRUE"));
+        select_standard_errors_sql(at, runs ? "run_index >= ? AND run_index < ?" : "TRUE"));
     if (runs) rows_->bind_all(runs->first.value, runs->end());
   }
 
@@ -240,7 +210,7 @@ class StandardErrorRows {
     if (!rows_) return;
     if (!at_) advance();
     while (*at_ < result.run) advance();
-    if (*at_ == result.run) read_standard_errors(*rows_, result);
+    if (*at_ == result.run) read_standard_errors(*rows_, columns_, result);
   }
 
  private:
@@ -249,25 +219,41 @@ class StandardErrorRows {
                         : RunIndex{std::numeric_limits<std::uint64_t>::max()};
   }
 
+  const ResultColumns& columns_;
   std::optional<Statement> rows_;
   std::optional<RunIndex> at_;  ///< Of the next row; beyond all runs after the last.
 };
 
 }  // namespace
 
-Statement select_errors(const Database& database, std::size_t quantity) {
+ResultColumns::ResultColumns(const ResultSchema& results)
+    : schema(results),
+      values(value_columns(results)),
+      num_quantities(static_cast<int>(results.quantities.size())),
+      num_standard_errors(static_cast<int>(proofmass::num_standard_errors(results))),
+      num_fit(static_cast<int>(results.fit.size())),
+      num_correlations(proofmass::num_correlations(results)),
+      num_health(static_cast<int>(results.health.size())),
+      truth(num_leading_columns),
+      estimate(truth + num_quantities),
+      health(estimate + num_quantities),
+      loss_cause(health + num_health),
+      loss_session(loss_cause + 1),
+      num_all(loss_session + 1 + num_standard_errors + num_fit + (num_correlations > 0 ? 1 : 0)) {}
+
+Statement select_errors(const Database& database, const Quantity& quantity) {
   return database.prepare(fmt::format(
       "SELECT error_{} FROM run_result WHERE run_index < ? AND status = {} ORDER BY run_index",
-      model().results().quantities[quantity].column(),
-      static_cast<std::int64_t>(RunStatus::completed)));
+      quantity.column(), static_cast<std::int64_t>(RunStatus::completed)));
 }
 
-ResultRows::ResultRows(const Database& database)
+ResultRows::ResultRows(const Database& database, const ResultSchema& results)
     : database_(database),
-      insert_(database.prepare(insert_sql())),
-      select_(database.prepare(select_sql("WHERE run_index = ?"))) {
-  if (columns().num_standard_errors == 0) return;
-  select_standard_errors_ = database.prepare(select_standard_errors_sql("run_index = ?"));
+      columns_(results),
+      insert_(database.prepare(insert_sql(columns_))),
+      select_(database.prepare(select_sql(columns_, "WHERE run_index = ?"))) {
+  if (columns_.num_standard_errors == 0) return;
+  select_standard_errors_ = database.prepare(select_standard_errors_sql(columns_, "run_index = ?"));
 }
 
 bool ResultRows::insert(const RunResult& result) {
@@ -276,7 +262,7 @@ bool ResultRows::insert(const RunResult& result) {
   insert_.bind(3, result.num_draws);
   insert_.bind(4, result.num_rounds);
   int position = num_leading_columns;
-  for (const ValueColumn& column : value_columns()) {
+  for (const ValueColumn& column : columns_.values) {
     // An error is computed when it is read.
     if (column.kind == ValueKind::error || is_of_standard_errors(column)) continue;
     insert_.bind(++position, column.value_in(result));
@@ -287,10 +273,10 @@ bool ResultRows::insert(const RunResult& result) {
   };
   insert_.bind(++position, choice(result.loss.cause));
   insert_.bind(++position, choice(result.loss.session));
-  for (const ValueColumn& column : value_columns()) {
+  for (const ValueColumn& column : columns_.values) {
     if (is_of_standard_errors(column)) insert_.bind(++position, column.value_in(result));
   }
-  if (columns().num_correlations > 0) {
+  if (columns_.num_correlations > 0) {
     const std::string correlations = format_correlations(result.correlations);
     insert_.bind(++position, result.correlations.empty()
                                  ? std::optional<std::string_view>()
@@ -305,12 +291,12 @@ RunResult ResultRows::read(RunIndex run) {
   if (!select_.step()) {
     database_.refuse_as_damaged(fmt::format("run_result lacks run {}", run.value));
   }
-  RunResult result = read_result(select_);
+  RunResult result = read_result(select_, columns_);
   select_.finish();
   if (!select_standard_errors_) return result;
   select_standard_errors_->bind_all(run.value);
   if (select_standard_errors_->step()) {
-    read_standard_errors(*select_standard_errors_, result);
+    read_standard_errors(*select_standard_errors_, columns_, result);
     select_standard_errors_->finish();
   }
   return result;
@@ -345,14 +331,14 @@ std::uint64_t digest(const RunResult& result) {
   return digest_with(digest, std::uint64_t{result.loss.session});
 }
 
-void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
+void check_delivery(const Delivery& delivery, const ResultSchema& results, std::uint64_t num_runs) {
   const RunResult& result = delivery.result;
   if (result.run.value >= num_runs) {
     throw StoreError(fmt::format("run_result.run_index = {} (must be below num_runs = {})",
                                  result.run.value, num_runs));
   }
   try {
-    require_in_range(result, model().results());
+    require_in_range(result, results);
   } catch (const Error& error) {
     throw StoreError(fmt::format("run_result.{}", error.what()));
   }
@@ -369,22 +355,27 @@ void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
 namespace proofmass::coordinator {
 
 struct ResultReader::Impl {
+  Impl(const detail::Database& file, const ResultSchema& results, std::optional<RunRange> runs)
+      : database(file),
+        columns(results),
+        row(file.prepare(detail::select_sql(
+            columns, runs ? "WHERE run_index >= ? AND run_index < ? ORDER BY run_index"
+                          : "ORDER BY run_index"))),
+        standard_errors(file, columns, runs) {
+    if (runs) row.bind_all(runs->first.value, runs->end());
+  }
+
   const detail::Database& database;
+  detail::ResultColumns columns;
   detail::Statement row;
   detail::StandardErrorRows standard_errors;
   std::optional<std::uint64_t> num_runs;  // Of the campaign; read with the first result.
   std::optional<RunIndex> last;
 };
 
-ResultReader::ResultReader(const detail::Database& database, std::optional<RunRange> runs)
-    : impl_(std::make_unique<Impl>(
-          database,
-          database.prepare(
-              detail::select_sql(runs ? "WHERE run_index >= ? AND run_index < ? ORDER BY run_index"
-                                      : "ORDER BY run_index")),
-          detail::StandardErrorRows(database, runs))) {
-  if (runs) impl_->row.bind_all(runs->first.value, runs->end());
-}
+ResultReader::ResultReader(const detail::Database& database, const ResultSchema& schema,
+                           std::optional<RunRange> runs)
+    : impl_(std::make_unique<Impl>(database, schema, runs)) {}
 
 ResultReader::~ResultReader() = default;
 ResultReader::ResultReader(ResultReader&&) noexcept = default;
@@ -397,7 +388,7 @@ std::optional<RunResult> ResultReader::next() {
   if (!impl_->num_runs) {
     impl_->num_runs = impl_->database.count("SELECT num_runs FROM campaign");
   }
-  RunResult result = detail::read_result(impl_->row);
+  RunResult result = detail::read_result(impl_->row, impl_->columns);
   impl_->standard_errors.add_to(result);
   if (impl_->last && !(*impl_->last < result.run)) {
     impl_->database.refuse_as_damaged(fmt::format("result of run {} comes after that of run {}",

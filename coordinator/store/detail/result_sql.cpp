@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "coordinator/store/detail/schema.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 
@@ -14,13 +15,12 @@ namespace {
 
 constexpr std::string_view next_column = ",\n  ";
 
-const std::vector<Quantity>& quantities() { return model().results().quantities; }
-
 /// What `text_of` yields for each parameter, one a line.
 template <typename TextOf>
-std::string for_each_parameter(std::string_view separator, const TextOf& text_of) {
+std::string for_each_parameter(const ResultSchema& schema, std::string_view separator,
+                               const TextOf& text_of) {
   std::string text;
-  for (const Quantity& quantity : quantities()) {
+  for (const Quantity& quantity : schema.quantities) {
     if (!text.empty()) text += separator;
     text += text_of(quantity);
   }
@@ -28,44 +28,45 @@ std::string for_each_parameter(std::string_view separator, const TextOf& text_of
 }
 
 /// Columns that are NULL where `is_absent` holds.
-std::string value_columns(std::string_view prefix, std::string_view is_absent) {
-  return for_each_parameter(next_column, [&](const Quantity& quantity) {
+std::string nullable_columns(const ResultSchema& schema, std::string_view prefix,
+                             std::string_view is_absent) {
+  return for_each_parameter(schema, next_column, [&](const Quantity& quantity) {
     const std::string name = fmt::format("{}_{}", prefix, quantity.column());
     return fmt::format("{0} REAL CHECK (({0} IS NULL) = ({1}))", name, is_absent);
   });
 }
 
-std::string error_columns() {
-  return for_each_parameter(next_column, [](const Quantity& quantity) {
+std::string error_columns(const ResultSchema& schema) {
+  return for_each_parameter(schema, next_column, [](const Quantity& quantity) {
     return fmt::format("error_{0} REAL AS (estimate_{0} - truth_{0})", quantity.column());
   });
 }
 
 /// The columns that the schema has from version 10.
-std::string added_columns() {
+std::string added_columns(const ResultSchema& schema) {
   std::string text;
   const auto add = [&](std::string_view prefix, const std::string& column) {
     text += fmt::format("ALTER TABLE run_result ADD COLUMN {}_{} REAL;\n", prefix, column);
   };
-  for (const Quantity& quantity : quantities()) {
+  for (const Quantity& quantity : schema.quantities) {
     if (quantity.has_standard_error) add("standard_error", quantity.column());
   }
-  for (const HealthQuantity& quantity : model().results().fit) add("fit", quantity.column());
+  for (const HealthQuantity& quantity : schema.fit) add("fit", quantity.column());
   if (text.empty()) return text;
-  if (num_correlations(model().results()) > 0) {
+  if (num_correlations(schema) > 0) {
     text += "ALTER TABLE run_result ADD COLUMN correlations TEXT;\n";
   }
   return text + fmt::format(
                     "CREATE INDEX run_result_standard_errors ON run_result (run_index)\n"
                     "WHERE {};\n",
-                    has_standard_errors_sql());
+                    has_standard_errors_sql(schema));
 }
 
 /// NULL where no quantity has one.
-std::string standard_error_of_parameter() {
+std::string standard_error_of_parameter(const ResultSchema& schema) {
   std::string text;
   int position = 0;
-  for (const Quantity& quantity : quantities()) {
+  for (const Quantity& quantity : schema.quantities) {
     ++position;
     if (!quantity.has_standard_error) continue;
     text += fmt::format("\n         WHEN {} THEN r.standard_error_{}", position, quantity.column());
@@ -74,25 +75,25 @@ std::string standard_error_of_parameter() {
 }
 
 /// Columns of r that begin with fit_, as they are called.
-std::string fit_of_row() {
+std::string fit_of_row(const ResultSchema& schema) {
   std::string text;
-  for (const HealthQuantity& quantity : model().results().fit) {
+  for (const HealthQuantity& quantity : schema.fit) {
     text += fmt::format(", r.fit_{0} AS {0}", quantity.column());
   }
   return text;
 }
 
-std::string health_columns() {
+std::string health_columns(const ResultSchema& schema) {
   std::string text;
-  for (const HealthQuantity& quantity : model().results().health) {
+  for (const HealthQuantity& quantity : schema.health) {
     text += fmt::format("health_{} REAL,\n  ", quantity.column());
   }
   return text;
 }
 
-std::string health_of_row() {
+std::string health_of_row(const ResultSchema& schema) {
   std::string text;
-  for (const HealthQuantity& quantity : model().results().health) {
+  for (const HealthQuantity& quantity : schema.health) {
     text += fmt::format("r.health_{0} AS {0},\n       ", quantity.column());
   }
   return text;
@@ -100,7 +101,7 @@ std::string health_of_row() {
 
 std::string data_tables() {
   std::string text;
-  for (const DataTableSchema& table : model().results().tables) {
+  for (const DataTableSchema& table : model().tables()) {
     text += fmt::format("-- {}\nCREATE TABLE {} (\n  position INTEGER PRIMARY KEY", table.comment,
                         table.table);
     for (const std::string_view column : table.columns) {
@@ -113,16 +114,16 @@ std::string data_tables() {
 
 std::string digested_tables() {
   std::string text;
-  for (const DataTableSchema& table : model().results().tables) {
+  for (const DataTableSchema& table : model().tables()) {
     text += fmt::format("{}{}", text.empty() ? "" : ", ", table.table);
   }
   return text.empty() ? "dispersion_value" : text + " and dispersion_value";
 }
 
-std::string value_of_parameter(std::string_view prefix) {
+std::string value_of_parameter(const ResultSchema& schema, std::string_view prefix) {
   int position = 0;
   return "CASE p.position" +
-         for_each_parameter("",
+         for_each_parameter(schema, "",
                             [&](const Quantity& quantity) {
                               return fmt::format("\n         WHEN {} THEN r.{}_{}", ++position,
                                                  prefix, quantity.column());
@@ -130,8 +131,8 @@ std::string value_of_parameter(std::string_view prefix) {
          " END";
 }
 
-std::string budget_total() {
-  return for_each_parameter("\n       + ", [](const Quantity& quantity) {
+std::string budget_total(const ResultSchema& schema) {
+  return for_each_parameter(schema, "\n       + ", [](const Quantity& quantity) {
     return fmt::format(
         "abs(error_{}) * (SELECT ifnull(sum(value), 0.0) FROM budget_coefficient"
         " WHERE parameter = '{}')",
@@ -140,10 +141,10 @@ std::string budget_total() {
 }
 
 /// Of the row r of run_result; what the schema has from version 9.
-std::string budget_total_at_level() {
-  if (model().results().budget_terms.empty()) return "NULL";
-  const std::string level = model().results().health.at(model().results().budget_level).column();
-  return for_each_parameter("\n       + ", [&](const Quantity& quantity) {
+std::string budget_total_at_level(const ResultSchema& schema) {
+  if (schema.budget_terms.empty()) return "NULL";
+  const std::string level = schema.health.at(schema.budget_level).column();
+  return for_each_parameter(schema, "\n       + ", [&](const Quantity& quantity) {
     return fmt::format(
         "abs(r.error_{0}) * (SELECT ifnull(sum(value), 0.0) FROM budget_coefficient"
         " WHERE parameter = '{1}' AND assumed_level IS NULL)\n"
@@ -174,29 +175,28 @@ std::vector<std::string_view> status_names() {
   return names;
 }
 
-std::map<std::string_view, std::string> texts() {
-  const ResultSchema& schema = model().results();
+std::map<std::string_view, std::string> texts(const ResultSchema& schema) {
   return {
       {"data_tables", data_tables()},
       {"digested_tables", digested_tables()},
-      {"example_quantity", std::string(example_quantity(schema).name)},
-      {"truth_columns", value_columns("truth", "status = 4")},
-      {"estimate_columns", value_columns("estimate", "status > 2")},
-      {"error_columns", error_columns()},
+      {"example_quantity", example_quantity(schema).name},
+      {"truth_columns", nullable_columns(schema, "truth", "status = 4")},
+      {"estimate_columns", nullable_columns(schema, "estimate", "status > 2")},
+      {"error_columns", error_columns(schema)},
       {"standard_error_columns", ""},  // In version 8 no model had any.
-      {"added_columns", added_columns()},
-      {"standard_error_of_parameter", standard_error_of_parameter()},
-      {"fit_values", fit_of_row()},
-      {"health_columns", health_columns()},
-      {"health_values", health_of_row()},
+      {"added_columns", added_columns(schema)},
+      {"standard_error_of_parameter", standard_error_of_parameter(schema)},
+      {"fit_values", fit_of_row(schema)},
+      {"health_columns", health_columns(schema)},
+      {"health_values", health_of_row(schema)},
       {"status_name", name_of_choice("status", status_names())},
       {"loss_cause_name", name_of_choice("loss_cause", schema.loss_causes)},
       {"loss_session_name", name_of_choice("loss_session", schema.loss_sessions)},
-      {"truth_of_parameter", value_of_parameter("truth")},
-      {"estimate_of_parameter", value_of_parameter("estimate")},
-      {"error_of_parameter", value_of_parameter("error")},
-      {"budget_total", budget_total()},
-      {"budget_total_at_level", budget_total_at_level()},
+      {"truth_of_parameter", value_of_parameter(schema, "truth")},
+      {"estimate_of_parameter", value_of_parameter(schema, "estimate")},
+      {"error_of_parameter", value_of_parameter(schema, "error")},
+      {"budget_total", budget_total(schema)},
+      {"budget_total_at_level", budget_total_at_level(schema)},
       {"num_causes", std::to_string(schema.loss_causes.size())},
       {"cause_names", fmt::format("{}", fmt::join(schema.loss_causes, ", "))},
       {"num_sessions", std::to_string(schema.loss_sessions.size())},
@@ -206,21 +206,21 @@ std::map<std::string_view, std::string> texts() {
 
 }  // namespace
 
-std::string has_standard_errors_sql() {
+std::string has_standard_errors_sql(const ResultSchema& schema) {
   std::string text;
   const auto add = [&](std::string_view prefix, const std::string& column) {
     text += fmt::format("{}{}_{} IS NOT NULL", text.empty() ? "" : "\n   OR ", prefix, column);
   };
-  for (const Quantity& quantity : quantities()) {
+  for (const Quantity& quantity : schema.quantities) {
     if (quantity.has_standard_error) add("standard_error", quantity.column());
   }
-  for (const HealthQuantity& quantity : model().results().fit) add("fit", quantity.column());
-  if (num_correlations(model().results()) > 0) text += "\n   OR correlations IS NOT NULL";
+  for (const HealthQuantity& quantity : schema.fit) add("fit", quantity.column());
+  if (num_correlations(schema) > 0) text += "\n   OR correlations IS NOT NULL";
   return text;
 }
 
-std::string with_quantities(std::string_view sql) {
-  const std::map<std::string_view, std::string> replacements = texts();
+std::string with_quantities(std::string_view sql, const ResultSchema& schema) {
+  const std::map<std::string_view, std::string> replacements = texts(schema);
   std::string text;
   while (true) {
     const std::size_t begin = std::min(sql.find('{'), sql.size());

@@ -34,18 +34,23 @@ SchemaObjects schema_objects(const Database& database) {
   return objects;
 }
 
-/// What a file has that was brought to a version, for each from oldest_schema_version.
-const std::vector<SchemaObjects>& known_schemas() {
-  static const std::vector<SchemaObjects> schemas = [] {
-    Database fresh("new campaign", Access::memory);
-    std::vector<SchemaObjects> all;
-    for (const std::string& migration : migrations()) {
-      fresh.execute(migration);
-      all.push_back(schema_objects(fresh));
-    }
-    return all;
-  }();
-  return schemas;
+/// What a file has that was brought to a version, for each from oldest_schema_version. Making it
+/// takes some milliseconds, so that a thread keeps those of the last campaign: others of a
+/// directory mostly have the same.
+const std::vector<SchemaObjects>& known_schemas(const ResultSchema& results) {
+  thread_local std::vector<std::string> known_migrations;
+  thread_local std::vector<SchemaObjects> known;
+  std::vector<std::string> wanted = migrations(results);
+  if (wanted == known_migrations) return known;
+  Database fresh("new campaign", Access::memory);
+  std::vector<SchemaObjects> all;
+  for (const std::string& migration : wanted) {
+    fresh.execute(migration);
+    all.push_back(schema_objects(fresh));
+  }
+  known = std::move(all);
+  known_migrations = std::move(wanted);
+  return known;
 }
 
 /// Place of a version's step among migrations().
@@ -78,8 +83,8 @@ constexpr std::array<std::string_view, 9> large_tables{
 
 bool is_large(const std::string& table) {
   return std::ranges::find(large_tables, table) != large_tables.end() ||
-         std::ranges::find(model().results().tables, table, &DataTableSchema::table) !=
-             model().results().tables.end();
+         std::ranges::find(model().tables(), table, &DataTableSchema::table) !=
+             model().tables().end();
 }
 
 /// Names of the tables, those of SQLite's own among them.
@@ -107,22 +112,34 @@ void check_small_tables(const Database& database) {
   }
 }
 
+// Nothing of a file may be evaluated before its definition has been compared. That of the table
+// `campaign` does not depend on what the results are.
+ResultSchema stored_results(const Database& database, std::int64_t version) {
+  constexpr std::string_view table = "table campaign";
+  ResultSchema of_example = example_results();
+  const SchemaObjects objects = schema_objects(database);
+  const auto found = objects.find(std::string(table));
+  const SchemaObjects& expected = known_schemas(of_example).at(step_to(version));
+  if (found == objects.end() || found->second != expected.at(found->first)) return of_example;
+  Statement row = database.prepare("SELECT definition, model_version FROM campaign");
+  return row.step() ? model().results_of(row.text(0), row.text(1)) : of_example;
+}
+
 }  // namespace
 
-const std::vector<std::string>& migrations() {
-  static const std::vector<std::string> steps = [] {
-    std::vector<std::string> all;
-    for (const std::string_view file : schema_files()) all.push_back(with_quantities(file));
-    return all;
-  }();
+std::vector<std::string> migrations(const ResultSchema& results) {
+  std::vector<std::string> steps;
+  for (const std::string_view file : schema_files()) {
+    steps.push_back(with_quantities(file, results));
+  }
   return steps;
 }
 
 std::int64_t schema_version() {
-  return oldest_schema_version + static_cast<std::int64_t>(migrations().size()) - 1;
+  return oldest_schema_version + static_cast<std::int64_t>(schema_files().size()) - 1;
 }
 
-void check_kind(Database& database) {
+ResultSchema check_kind(Database& database) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
     database.refuse(fmt::format("is not a Proofmass campaign: its application_id is {}, not {}", id,
@@ -131,14 +148,18 @@ void check_kind(Database& database) {
   // A coordinator that brings the file up to date changes version and schema together.
   const ReadTransaction one_state(database);
   const StepLimit limit(database, steps_of_schema_max);
-  check_schema(database, version_of(database));
+  const std::int64_t version = version_of(database);
+  ResultSchema results = stored_results(database, version);
+  check_schema(database, version, results);
+  return results;
 }
 
-void check_campaign_file(Database& database) {
-  check_kind(database);
+ResultSchema check_campaign_file(Database& database) {
+  ResultSchema results = check_kind(database);
   check_small_tables(database);
   const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
   if (num_campaigns != 1) database.refuse_as_damaged(fmt::format("campaigns = {}", num_campaigns));
+  return results;
 }
 
 RowCounts check_all_pages(const Database& database) {
@@ -175,8 +196,8 @@ bool is_older(const Database& database) {
   return database.integer("PRAGMA user_version") < schema_version();
 }
 
-void check_schema(const Database& database, std::int64_t version) {
-  SchemaObjects expected = known_schemas().at(step_to(version));
+void check_schema(const Database& database, std::int64_t version, const ResultSchema& results) {
+  SchemaObjects expected = known_schemas(results).at(step_to(version));
   for (const auto& [name, sql] : schema_objects(database)) {
     const auto found = expected.find(name);
     if (found == expected.end()) database.refuse("has what is no part of a campaign: " + name);
@@ -201,22 +222,23 @@ std::string plain_definition(std::string sql) {
   return sql;
 }
 
-void migrate(Database& database) {
+void migrate(Database& database, const ResultSchema& results) {
   PROOFMASS_EXPECT(database.in_transaction());
+  const std::vector<std::string> steps = migrations(results);
   const std::int64_t before = database.integer("PRAGMA user_version");  // 0 of a new file.
   for (std::int64_t version = std::max(before + 1, oldest_schema_version);
        version <= schema_version(); ++version) {
-    database.execute(migrations()[step_to(version)]);
+    database.execute(steps[step_to(version)]);
     PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version);
     wire::kill_point(wire::KillPoint::while_migrating);
   }
 }
 
-void migrate_privately(Database& database) {
+void migrate_privately(Database& database, const ResultSchema& results) {
   database.go_on_with_private_copy();
   database.distrust_content();
   Transaction transaction(database);
-  migrate(database);
+  migrate(database, results);
   transaction.commit();
   database.execute("PRAGMA query_only = ON");  // What would be written is lost.
 }

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -85,13 +84,14 @@ bool is_worse(const RankedRun& left, const RankedRun& right) {
 
 }  // namespace
 
-void replace_statistics(Database& database, const CampaignStatistics& statistics) {
+void replace_statistics(Database& database, const ResultSchema& results,
+                        const CampaignStatistics& statistics) {
   database.execute("DELETE FROM statistic");
   if (statistics.num_estimated == 0) return;
   StatisticRow row(database.prepare(
       fmt::format("INSERT INTO statistic VALUES ({})", places(num_statistic_columns))));
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    row.put(model().results().quantities[i].name);
+    row.put(results.quantities[i].name);
     row.put(statistics.num_estimated);
     row.put(statistics.accuracy[i]);
     row.insert();
@@ -134,12 +134,12 @@ std::optional<Summary> read_summary(const Database& database) {
                  .computed_utc = select.text(7)};
 }
 
-void replace_warnings(Database& database, std::span<const RunWarning> warnings) {
+void replace_warnings(Database& database, const ResultSchema& results,
+                      std::span<const RunWarning> warnings) {
   database.execute("DELETE FROM run_warning");
   Statement insert = database.prepare("INSERT INTO run_warning VALUES (?, ?, ?, ?)");
   for (const auto& [run, warning] : warnings) {
-    insert.run(run.value, warning.effect, model().results().quantities[warning.quantity].name,
-               warning.part);
+    insert.run(run.value, warning.effect, results.quantities[warning.quantity].name, warning.part);
   }
 }
 
@@ -171,11 +171,11 @@ WorstRuns::Change WorstRuns::offer(const RankedRun& offered) {
   return change;
 }
 
-WorstRunTable read_worst_runs(const Database& database) {
+WorstRunTable read_worst_runs(const Database& database, const ResultSchema& results) {
   Statement select =
       database.prepare("SELECT magnitude, run_index FROM worst_run WHERE parameter = ?");
   WorstRunTable table;
-  for (const Quantity& quantity : model().results().quantities) {
+  for (const Quantity& quantity : results.quantities) {
     WorstRuns& worst = table.emplace_back();
     select.bind_all(quantity.name);
     while (select.step()) {
@@ -185,10 +185,10 @@ WorstRunTable read_worst_runs(const Database& database) {
   return table;
 }
 
-std::vector<double> read_objectives(const Database& database) {
+std::vector<double> read_objectives(const Database& database, const ResultSchema& results) {
   Statement select = database.prepare("SELECT objective FROM parameter WHERE parameter = ?");
   std::vector<double> objectives;
-  for (const Quantity& quantity : model().results().quantities) {
+  for (const Quantity& quantity : results.quantities) {
     select.bind_all(quantity.name);
     if (!select.step()) database.refuse("is damaged: it lacks a parameter");
     objectives.push_back(select.optional_real(0).value_or(std::numeric_limits<double>::infinity()));
@@ -207,9 +207,10 @@ std::uint64_t exceeded_objectives(const RunResult& result, std::span<const doubl
   return exceeded;
 }
 
-LargestErrorRows::LargestErrorRows(const Database& database)
-    : objectives_(read_objectives(database)),
-      worst_(read_worst_runs(database)),
+LargestErrorRows::LargestErrorRows(const Database& database, const ResultSchema& results)
+    : schema_(results),
+      objectives_(read_objectives(database, results)),
+      worst_(read_worst_runs(database, results)),
       insert_overrun_(database.prepare("INSERT INTO overrun VALUES (?, ?)")),
       insert_worst_(database.prepare("INSERT INTO worst_run VALUES (?, ?, ?)")),
       delete_worst_(
@@ -221,7 +222,7 @@ void LargestErrorRows::add(const RunResult& result) {
   if (exceeded != 0) insert_overrun_.run(result.run.value, exceeded);
   for (std::size_t i = 0; i < worst_.size(); ++i) {
     const double magnitude = std::abs(result.error(i));
-    const std::string_view name = model().results().quantities[i].name;
+    const std::string& name = schema_.quantities[i].name;
     const WorstRuns::Change change = worst_[i].offer({.magnitude = magnitude, .run = result.run});
     if (change.dropped) delete_worst_.run(name, change.dropped->value);
     if (change.is_taken) insert_worst_.run(name, result.run.value, magnitude);

@@ -15,7 +15,8 @@
 namespace proofmass::coordinator::detail {
 
 /// Replaces the rows of `statistic`; leaves none if no run has an estimate.
-void replace_statistics(Database& database, const CampaignStatistics& statistics);
+void replace_statistics(Database& database, const ResultSchema& results,
+                        const CampaignStatistics& statistics);
 
 /// Replaces the row of `summary`.
 void replace_summary(const Database& database, const CampaignStatistics& statistics,
@@ -23,7 +24,8 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
 [[nodiscard]] std::optional<Summary> read_summary(const Database& database);
 
 /// Replaces the rows of `run_warning`.
-void replace_warnings(Database& database, std::span<const RunWarning> warnings);
+void replace_warnings(Database& database, const ResultSchema& results,
+                      std::span<const RunWarning> warnings);
 
 /// Replaces the rows of `budget_entry`; those after estimation are absent while no run has an
 /// estimate. Leaves none without a budget.
@@ -64,10 +66,11 @@ class WorstRuns {
 using WorstRunTable = std::vector<WorstRuns>;
 
 /// The rows of `worst_run`.
-[[nodiscard]] WorstRunTable read_worst_runs(const Database& database);
+[[nodiscard]] WorstRunTable read_worst_runs(const Database& database, const ResultSchema& results);
 
 /// Largest acceptable |error| of each parameter, SI; infinite if there is none.
-[[nodiscard]] std::vector<double> read_objectives(const Database& database);
+[[nodiscard]] std::vector<double> read_objectives(const Database& database,
+                                                  const ResultSchema& results);
 
 /// Which parameters have an |error| above their objective: bit i for the one with index i.
 [[nodiscard]] std::uint64_t exceeded_objectives(const RunResult& result,
@@ -77,12 +80,14 @@ using WorstRunTable = std::vector<WorstRuns>;
 /// thrown away with a transaction that is rolled back.
 class LargestErrorRows {
  public:
-  explicit LargestErrorRows(const Database& database);
+  /// @param results  Of the campaign; outlives the object.
+  LargestErrorRows(const Database& database, const ResultSchema& results);
 
   /// @pre The result was stored just now, for the first time.
   void add(const RunResult& result);
 
  private:
+  const ResultSchema& schema_;
   std::vector<double> objectives_;
   WorstRunTable worst_;
   Statement insert_overrun_;

@@ -14,7 +14,7 @@
 
 namespace proofmass {
 
-/// A calibration campaign of MICROSCOPE: the scenario that all runs share, and the laws by which
+/// A campaign of MICROSCOPE, which calibrates and may test the equivalence principle: the scenario that all runs share, and the laws by which
 /// the instrument of each run is drawn. `microscope_model.cpp` defines what derives from other
 /// modules.
 class MicroscopeCampaign final : public Campaign {
@@ -41,6 +41,7 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] std::vector<DefinitionItem> items() const override;
   [[nodiscard]] std::vector<DefinitionDifference> differences_from(
       const Campaign& other) const override;
+  [[nodiscard]] ResultSchema results() const override;
   [[nodiscard]] std::vector<double> objectives() const override;
   [[nodiscard]] std::int64_t num_rounds_max() const override;
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override;

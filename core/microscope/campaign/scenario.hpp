@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <string_view>
 #include <vector>
@@ -32,9 +33,13 @@ struct Scenario {
   AcceptanceConfig acceptance;    ///< Bounds outside which an instrument is drawn again.
   BudgetConfig budget;            ///< Levels behind the error budget; the simulation uses none.
   ParameterArray objectives;      ///< SI, > 0; [Hardy2013] tab:perfo-numerical by default.
+  TestArray test_objectives;      ///< SI, > 0; of campaigns that test.
   std::vector<Session> sessions;  ///< In the order in which they are simulated and recorded.
 
   Scenario();  ///< The nominal scenario.
+
+  /// True if a session tests the equivalence principle.
+  [[nodiscard]] bool has_tests() const { return std::ranges::any_of(sessions, is_test); }
 
   /// Checks each number against its range, and what has to hold between several: the loops against
   /// the sample rate, the sessions' lines against the Nyquist frequency, the sessions against the
@@ -44,13 +49,15 @@ struct Scenario {
 };
 
 /// Calls visit(FieldInfo, value) for every number and choice of the scenario except its sessions,
-/// in file order. `Config` is Scenario or const Scenario; the value is a (const) reference to
+/// in file order; for those of a test only if the scenario has_tests(). `Config` is Scenario or const Scenario; the value is a (const) reference to
 /// double, std::int64_t or one of the enumerations above.
 template <typename Config, typename Visitor>
 void for_each_field(Config& scenario, Visitor&& visit);
 
 /// `objective.a_c12_rad`: table and key of a parameter's objective in a campaign file.
 [[nodiscard]] std::string_view objective_path(std::size_t parameter);
+/// Of a test parameter's: `objective.eotvos_parameter`.
+[[nodiscard]] std::string_view test_objective_path(std::size_t parameter);
 
 }  // namespace proofmass
 

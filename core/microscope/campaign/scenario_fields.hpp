@@ -155,6 +155,10 @@ void visit_tables(Config& scenario, Visitor& visit) {
     visit(FieldInfo{objective_path(i), "Largest acceptable |error|.", range::positive},
           scenario.objectives[i]);
   }
+  for (std::size_t i = 0; scenario.has_tests() && i < num_test_parameters; ++i) {
+    visit(FieldInfo{test_objective_path(i), "Largest acceptable |error|.", range::positive},
+          scenario.test_objectives[i]);
+  }
   auto& budget = scenario.budget;
   visit(FieldInfo{"budget.test_spin_rate_rad_s", "2π f_spin of the test, about Y; 0 is inertial.",
                   range::between(-0.05, 0.05)},

@@ -28,7 +28,7 @@ constexpr double centre_offset_max_m = 1e-3;           // Of the centre of mass,
 constexpr double coupling_max_rad = 1e-4;              // η.
 
 /// The parameter that a session of each target helps to find; the two slopes of K2c have one.
-constexpr std::array<Parameter, num_session_targets - 1> found_parameters{Parameter::a_c11_delta_x,
+constexpr std::array<Parameter, index(SessionTarget::no_target)> found_parameters{Parameter::a_c11_delta_x,
                                                                           Parameter::a_c11_delta_z,
                                                                           Parameter::a_c11_delta_y,
                                                                           Parameter::a_c12,
@@ -143,6 +143,7 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
       has_noise_(scenario.noise.scale > 0.0) {
   if (has_noise_) white_density_ *= square(scenario.noise.scale);
   for (const Session& session : scenario.sessions) {
+    if (is_test(session)) continue;
     duration_s_ += fit_duration_s(scenario, session);
     for (const Excitation* const motion : mass_excitations(session)) {
       if (motion == nullptr) continue;

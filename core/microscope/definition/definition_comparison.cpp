@@ -24,7 +24,8 @@ class Comparison {
 
   std::vector<DefinitionDifference> run() {
     compare_sampling();
-    compare_entries("", fields_of(first_), fields_of(second_));
+    const bool have_tests = first_.scenario.has_tests() && second_.scenario.has_tests();
+    compare_entries("", fields_of(first_, have_tests), fields_of(second_, have_tests));
     compare_sessions();
     compare_environment();
     compare_dispersions();
@@ -47,7 +48,8 @@ class Comparison {
   }
 
   // More runs extend a campaign; the values of data files are compared, not their names.
-  static std::vector<Entry> fields_of(const MicroscopeCampaign& campaign) {
+  // What one of them alone can have is left to the comparison of sessions.
+  static std::vector<Entry> fields_of(const MicroscopeCampaign& campaign, bool with_tests) {
     std::vector<Entry> entries = detail::scenario_entries(campaign);
     std::erase_if(entries, [](const Entry& entry) {
       static constexpr std::array<std::string_view, 5> left_out{
@@ -55,6 +57,10 @@ class Comparison {
           "environment.file"};
       return std::ranges::find(left_out, entry.path) != left_out.end();
     });
+    for (std::size_t i = 0; !with_tests && i < num_test_parameters; ++i) {
+      std::erase_if(entries,
+                    [&](const Entry& entry) { return entry.path == test_objective_path(i); });
+    }
     for (Entry& entry : entries) {
       constexpr std::string_view table = "campaign.";
       if (entry.path.starts_with(table)) entry.path.erase(0, table.size());

@@ -214,6 +214,12 @@ std::string excitation_text(const Excitation& excitation) {
   return inline_table(excitation_entries(excitation));
 }
 
+bool is_left_out(const MicroscopeCampaign& campaign, const DrawGroup& group) {
+  if (group.name != eotvos_parameter_group) return false;
+  static const DispersionSet nominal = nominal_dispersions();
+  return campaign.dispersions[group.first] == nominal[group.first];
+}
+
 std::vector<Entry> dispersion_entries(const Dispersion& dispersion) {
   Dispersion fields = dispersion;
   std::vector<Entry> entries{choice_entry("law", dispersion.law)};
@@ -253,9 +259,12 @@ std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign)
              detail::excitation_entries(sessions[i].excitations[j]));
     }
   }
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    append(items, fmt::format("dispersion.{}.", drawn_names()[i]),
-           detail::dispersion_entries(campaign.dispersions[i]));
+  for (const DrawGroup& group : draw_groups()) {
+    if (detail::is_left_out(campaign, group)) continue;
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      append(items, fmt::format("dispersion.{}.", drawn_names()[i]),
+             detail::dispersion_entries(campaign.dispersions[i]));
+    }
   }
   return items;
 }

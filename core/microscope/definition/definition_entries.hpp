@@ -29,6 +29,10 @@ struct Entry {
 /// `{ kind = "drag_free", axis = "x", ... }`.
 [[nodiscard]] std::string excitation_text(const Excitation& excitation);
 
+/// True if the group's laws are the nominal ones and texts leave them out: those that came after
+/// the first release, so that the text of a campaign remains the one that it was stored with.
+[[nodiscard]] bool is_left_out(const MicroscopeCampaign& campaign, const DrawGroup& group);
+
 /// The law and its own keys.
 [[nodiscard]] std::vector<Entry> dispersion_entries(const Dispersion& dispersion);
 

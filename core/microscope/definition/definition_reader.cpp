@@ -369,8 +369,8 @@ MicroscopeCampaign read_definition(Document& document) {
   campaign.seed = static_cast<std::uint64_t>(seed);
   campaign.num_runs = static_cast<std::uint64_t>(num_runs);
   document.read("environment.file", campaign.environment_file);
+  campaign.scenario.sessions = read_sessions(document);  // Some fields are those of tests.
   read_scenario(document, campaign.scenario);
-  campaign.scenario.sessions = read_sessions(document);
   campaign.dispersions = read_dispersions(document);
   return campaign;
 }

@@ -126,7 +126,8 @@ class CommentedWriter {
         "# of the excitation; i, j and k need not be whole, and j is a list where the session has\n"
         "# several excitations. Those of fit_lines give the estimate, those of known_lines are "
         "fitted\n"
-        "# beside them. Every target needs a session; several share it. Further keys:\n"
+        "# beside them. Every target needs a session; several share it. A session with the target\n"
+        "# \"ep_test\" has no lines and tests the equivalence principle. Further keys:\n"
         "# spin_rate_rad_s = 0 (2π f_spin, of the frame that the attitude loop holds, about Y) "
         "and\n"
         "# drag_free = \"common\" (\"sensor_1\", \"sensor_2\").\n";
@@ -137,6 +138,8 @@ class CommentedWriter {
         if (entry.path == "fit_lines" && !session.excitations.empty()) {
           text_ += excitations_text(session.excitations);
         }
+        const bool is_line = entry.path == "fit_lines" || entry.path == "known_lines";
+        if (is_test(session) && is_line) continue;
         if (!is_left_out(entry, plain)) text_ += assignment(entry);
       }
     }
@@ -160,7 +163,9 @@ class CommentedWriter {
         "# of other quantities) or correlated (mean, standard_deviation; with: earlier normal\n"
         "# quantities; correlations, or covariances: with each). A table such as\n"
         "# [dispersion.offcentring_m.x] changes the law of one element.\n";
-    for (const DrawGroup& group : draw_groups()) write_group(group);
+    for (const DrawGroup& group : draw_groups()) {
+      if (!detail::is_left_out(campaign_, group)) write_group(group);
+    }
   }
 
   void write_group(const DrawGroup& group) {
@@ -244,6 +249,7 @@ std::string canonical_definition(const MicroscopeCampaign& campaign) {
     text += excitations_text(session.excitations);
   }
   for (const DrawGroup& group : draw_groups()) {
+    if (detail::is_left_out(campaign, group)) continue;
     text += fmt::format("[dispersion.{}]\n", group.name);
     for (std::size_t i = group.first; i < group.first + group.count; ++i) {
       text +=

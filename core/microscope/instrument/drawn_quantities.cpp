@@ -27,6 +27,8 @@ std::span<const std::string_view> element_names(const DrawGroup& group) {
   static constexpr std::array<std::string_view, 6> axis_pairs{"xy", "xz", "yx", "yz", "zx", "zy"};
   static constexpr std::array<std::string_view, 6> heads{"head_1_x", "head_1_y", "head_1_z",
                                                          "head_2_x", "head_2_y", "head_2_z"};
+  static constexpr std::array<std::string_view, 1> pair{"masses_2_1"};
+  if (group.count == pair.size()) return pair;
   if (group.count == axes.size()) return axes;
   if (group.name == "thruster_coupling_rad") return axis_pairs;
   if (group.name == "star_tracker_bias_rad") return heads;
@@ -64,6 +66,8 @@ const std::array<DrawGroup, num_draw_groups>& draw_groups() {
        51, 3},
       {"star_tracker_bias_rad", "Bias of each star tracker head about each axis, rad (10 arcsec).",
        star_tracker_bias, 54, 6},
+      {eotvos_parameter_group, "δ of mass 2 against mass 1; test sessions estimate it.", 1e-12, 60,
+       1},
   }};
   return groups;
 }
@@ -82,6 +86,7 @@ DispersionSet nominal_dispersions() {
       dispersions[i].maximum = group.bound;
     }
   }
+  dispersions[index_of_eotvos_parameter] = {.law = Law::fixed, .file = {}, .column = {}};
   return dispersions;
 }
 

@@ -17,13 +17,18 @@ namespace proofmass {
 struct DrawGroup {
   std::string_view name;     ///< `scale_factor_error`.
   std::string_view comment;  ///< One line: meaning and unit.
-  double bound;              ///< Nominal law: uniform on ±bound.
+  double bound;              ///< Nominal law: uniform on ±bound; of eotvos_parameter fixed at 0.
   std::size_t first;         ///< Index of its first element among all.
   std::size_t count;
 };
 
-inline constexpr std::size_t num_draw_groups = 12;
-inline constexpr std::size_t num_drawn = 60;
+inline constexpr std::size_t num_draw_groups = 13;
+inline constexpr std::size_t num_drawn = 61;
+
+/// The violation of the equivalence principle, which a campaign has on purpose or not at all: texts
+/// of campaigns leave its law out where it is the nominal one.
+inline constexpr std::string_view eotvos_parameter_group = "eotvos_parameter";
+inline constexpr std::size_t index_of_eotvos_parameter = num_drawn - 1;
 
 /// The groups in file order; together they cover all drawn quantities once.
 [[nodiscard]] const std::array<DrawGroup, num_draw_groups>& draw_groups();
@@ -36,7 +41,8 @@ inline constexpr std::size_t num_drawn = 60;
 using DrawnValues = std::array<double, num_drawn>;
 using DispersionSet = std::array<Dispersion, num_drawn>;
 
-/// Uniform laws inside the construction bounds of MICROSCOPE.
+/// Uniform laws inside the construction bounds of MICROSCOPE, and no violation of the equivalence
+/// principle.
 [[nodiscard]] DispersionSet nominal_dispersions();
 
 /// Indices of the quantities with law `table`, ascending.

@@ -95,6 +95,7 @@ Instrument make_instrument(const DrawnValues& values) {
           row == column ? 1.0 + thrust[row] : thrust_coupling.scalar();
     }
   }
+  instrument.eotvos_parameter = GroupReader(values, eotvos_parameter_group).scalar();
   return instrument;
 }
 

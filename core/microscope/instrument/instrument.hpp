@@ -35,6 +35,8 @@ struct Instrument {
   Eigen::Vector3d angular_bias_S_rad_s2;  ///< Of the measured angular acceleration.
   Eigen::Matrix3d thrust_matrix;          ///< [M_DF]: acceleration in S for a command in S.
   std::array<Eigen::Vector3d, 2> star_tracker_bias_S_rad;  ///< Of each head, a rotation vector.
+  /// δ = m_g2/m_I2 − m_g1/m_I1 ([Hardy2013] section 3.2): gravitational over inertial mass.
+  double eotvos_parameter = 0.0;
 };
 
 /// The instrument of a draw, whether or not it lies inside the acceptance bounds.

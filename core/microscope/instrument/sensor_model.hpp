@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/math/inline.hpp"
@@ -78,6 +79,18 @@ PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
     acceleration_S += T(second.acceleration_m_s2) * sensor.second_direction_S;
   }
   return at_rest_S + T(2.0) * cross(satellite.omega_IS_S, velocity_S) + acceleration_S;
+}
+
+/// What a violation of the equivalence principle adds to Γ_App,k in S, m/s²: ½ δ g(O_sat) for
+/// sensor 1 and the opposite for sensor 2, so that Γ_App,d holds ½ δ g ([Hardy2013] section 3.2).
+///
+/// @param eotvos_parameter  δ.
+/// @param gravity_m_s2      |g| at O_sat; g = −|g| û.
+template <typename T>
+PROOFMASS_INLINE Vector3<T> violation_acceleration(std::size_t k, const T& eotvos_parameter,
+                                                   double gravity_m_s2,
+                                                   const Vector3<T>& radial_S) {
+  return (T(k == 0 ? -0.5 : 0.5) * T(gravity_m_s2) * eotvos_parameter) * radial_S;
 }
 
 /// Γ_mes,k in K without noise, m/s² ([Hardy2013] eq:measurement):

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/math/elementary.hpp"
+
 namespace proofmass {
 
 KeplerOrbit::KeplerOrbit(const OrbitConfig& config)
@@ -18,6 +20,12 @@ OrbitPoint KeplerOrbit::at(double time_s) const {
     step(newton);
   }
   return last_step(newton);
+}
+
+double KeplerOrbit::semi_latus_rectum_m() const {
+  constexpr double earth_m3_s2 = 3.986004418e14;  // μ of the Earth, IERS Conventions (2010).
+  const double cube = earth_m3_s2 / (mean_motion_rad_s_ * mean_motion_rad_s_);  // a³.
+  return minor_ratio_ * minor_ratio_ * exponential(logarithm(cube) / 3.0);
 }
 
 }  // namespace proofmass

@@ -43,6 +43,9 @@ class KeplerOrbit {
   }
 
   [[nodiscard]] double period_s() const { return period_s_; }
+  /// p = a (1 − e²), m, of an orbit about the Earth: r = p/(1 + e cos ν).
+  [[nodiscard]] double semi_latus_rectum_m() const;
+  [[nodiscard]] double eccentricity() const { return eccentricity_; }
   /// n = 2π/period, rad/s; n² = μ/a³.
   [[nodiscard]] double mean_motion_rad_s() const { return mean_motion_rad_s_; }
 

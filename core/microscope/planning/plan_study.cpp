@@ -405,6 +405,12 @@ std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign) {
   if (campaign.scenario.noise.scale == 0.0) {
     throw ConfigError("noise.scale", "0", "must be > 0: without noise estimates have no errors");
   }
+  const std::vector<Session>& sessions = campaign.scenario.sessions;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    if (!is_test(sessions[i])) continue;
+    throw ConfigError(fmt::format("session[{}].target", i), "ep_test",
+                      "a plan is of calibration sessions: leave this one out");
+  }
   return std::make_unique<JointStudy>(campaign);
 }
 

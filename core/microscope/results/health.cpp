@@ -5,7 +5,7 @@
 namespace proofmass {
 
 const std::array<HealthValue, num_health_values>& health_values() {
-  static constexpr std::array<HealthValue, num_health_values> values{{
+  static const std::array<HealthValue, num_health_values> values{{
       {&LoopHealth::acceleration_m_s2, {"acceleration", "_m_s2", "m/s²"}},
       {&LoopHealth::attitude_rad, {"attitude", "_rad", "rad"}},
       {&LoopHealth::residual_m_s2, {"residual", "_m_s2", "m/s²"}},

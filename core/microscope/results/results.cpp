@@ -1,6 +1,5 @@
 #include "core/microscope/results/results.hpp"
 
-#include "core/microscope/environment/environment.hpp"
 #include "core/microscope/results/health.hpp"
 #include "core/microscope/session/session.hpp"
 
@@ -47,11 +46,19 @@ ResultSchema make_schema() {
           .loss_causes = loss_causes(),
           .loss_sessions = {targets.begin(), targets.end()},
           .num_draws_max = num_draws_max,
-          .tables = {environment_table_schema()},
           .published_source = "Hardy et al. 2013"};
 }
 
 }  // namespace
+
+const std::array<Quantity, num_test_parameters>& test_quantities() {
+  static const std::array<Quantity, num_test_parameters> quantities{{
+      {"eotvos_parameter", "", "δ", "1", 1e-15, "1e-15", 1e-15, {}, true},
+      {"test_a_c11_delta_x", "_m", "a_c11·Δx, test", "m", 1e-9, "nm", 0.1e-6, {}, true},
+      {"test_a_c11_delta_z", "_m", "a_c11·Δz, test", "m", 1e-9, "nm", 0.1e-6, {}, true},
+  }};
+  return quantities;
+}
 
 const ResultSchema& microscope_results() {
   static const ResultSchema schema = make_schema();

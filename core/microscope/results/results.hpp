@@ -36,6 +36,23 @@ using ParameterArray = std::array<double, num_parameters>;
   return static_cast<std::size_t>(parameter);
 }
 
+/// What the sessions that test the equivalence principle find: in the results of campaigns that have
+/// such sessions these quantities follow the ten.
+enum class TestParameter {
+  eotvos_parameter,  ///< δ = m_g2/m_I2 − m_g1/m_I1, 1.
+  a_c11_delta_x,     ///< a_c11·Δx by the test's own line at 2 f_EP, m.
+  a_c11_delta_z,     ///< a_c11·Δz by that line, m.
+};
+
+inline constexpr std::size_t num_test_parameters = 3;
+
+/// One value for each, indexed by `index(parameter)`.
+using TestArray = std::array<double, num_test_parameters>;
+
+[[nodiscard]] constexpr std::size_t index(TestParameter parameter) {
+  return static_cast<std::size_t>(parameter);
+}
+
 /// Most draws of one run; with the nominal laws three of four are accepted. A run that needs more
 /// ends as RunStatus::no_draw.
 inline constexpr std::uint32_t num_draws_max = 1000;
@@ -44,5 +61,8 @@ inline constexpr std::uint32_t num_draws_max = 1000;
 /// of a LoopHealth, the causes of a Loss, and the targets of sessions as the places where a run may
 /// be lost.
 [[nodiscard]] const ResultSchema& microscope_results();
+
+/// The quantities of a test, in enumeration order, each with a standard error.
+[[nodiscard]] const std::array<Quantity, num_test_parameters>& test_quantities();
 
 }  // namespace proofmass

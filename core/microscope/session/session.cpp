@@ -66,6 +66,8 @@ constexpr std::array<TargetInfo, num_session_targets> targets{{
      DragFreeSource::sensor_1, Signal::product, Product::sensor_2_squared, -2.0, SignalSet::common},
     {no_target, "no_target", ExcitationRule::any, no_stimulus, any_drag_free, Signal::product,
      no_product, 0.0, SignalSet::common},
+    {ep_test, "ep_test", quiet, no_stimulus, any_drag_free, Signal::product, no_product, 0.0,
+     SignalSet::health},
 }};
 
 constexpr bool are_in_order() {

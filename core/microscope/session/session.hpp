@@ -10,9 +10,11 @@
 #include <string_view>
 #include <vector>
 
+#include "core/microscope/session/test_signals.hpp"
+
 namespace proofmass {
 
-// A calibration session as data: what is excited, which lines are fitted, what the ground records
+// A session as data: what is excited, which lines are fitted, what the ground records
 // and what the session is there to find. README.md explains the terms.
 
 /// Settings that are the same for all sessions of a run: `[simulation]` of a campaign file.
@@ -137,6 +139,8 @@ struct SessionPhasors {
   std::vector<LinePhasors> lines{};  ///< Of RecordNeeds::lines.
   /// Means over the record of the signals that every line has, if RecordNeeds::lines has any.
   std::array<double, num_line_bases> means{};
+  /// Of a session that tests the equivalence principle; empty for others.
+  std::vector<double> test_products{};
 };
 
 // Targets.
@@ -156,11 +160,12 @@ enum class SessionTarget : std::uint8_t {
   k2_sensor_1 = 10,  ///< K21/K11², mass 1 moving, drag-free on mass 2.
   k2_sensor_2 = 11,  ///< K22/K12², mass 2 moving, drag-free on mass 1.
   no_target = 12,    ///< None: for estimation methods that do not go by targets.
+  ep_test = 13,      ///< The Eötvös parameter; no calibration, see is_test().
 };
 
-inline constexpr std::size_t num_session_targets = 12;
+inline constexpr std::size_t num_session_targets = 13;
 
-/// 0 to 11.
+/// 0 to 12.
 [[nodiscard]] constexpr std::size_t index(SessionTarget target) {
   return static_cast<std::size_t>(target) - 1;
 }
@@ -187,7 +192,7 @@ struct TargetInfo {
   ExcitationRule excitations;
   Stimulus stimulus;                        ///< Of ExcitationRule::stimulus.
   std::optional<DragFreeSource> drag_free;  ///< What the drag-free loop has to null; none: any.
-  Signal regressor;                         ///< What Γ_mes,dx is fitted against, unless no_target.
+  Signal regressor;  ///< What Γ_mes,dx is fitted against, unless no_target or ep_test.
   Product product;                          ///< What Signal::product is in the session.
   double scale;                             ///< The target is this times the slope of that fit.
   SignalSet signals;                        ///< What the correction of Γ_mes,dx needs.
@@ -210,7 +215,7 @@ struct LineMultiple {
   bool operator==(const LineMultiple&) const = default;
 };
 
-/// One calibration sequence of a whole number of orbits; it starts at perigee.
+/// A sequence of a whole number of orbits that calibrates, or tests; it starts at perigee.
 struct Session {
   std::string name;  ///< Letters, digits, `_`; unique. Part of the name of its random streams.
   SessionTarget target = SessionTarget::a_c11_delta_x;
@@ -222,11 +227,17 @@ struct Session {
   /// At most num_excitations_max. The first is the target's. Two that move test masses do so in
   /// opposition, along Y and along Z.
   std::vector<Excitation> excitations;
-  std::vector<LineMultiple> fit_lines;    ///< Lines whose phasors give the estimate: one or two.
+  /// Lines whose phasors give the estimate: one or two, or none in a test.
+  std::vector<LineMultiple> fit_lines;
   std::vector<LineMultiple> known_lines;  ///< Other lines, fitted together with those.
 
   bool operator==(const Session&) const = default;
 };
+
+/// True for a session that tests the equivalence principle and calibrates nothing.
+[[nodiscard]] inline bool is_test(const Session& session) {
+  return session.target == SessionTarget::ep_test;
+}
 
 /// Frequency of a line of the session, Hz, without its sign; f_orb = 1/orbit_period_s.
 [[nodiscard]] double line_frequency_hz(const Session& session, const LineMultiple& line,

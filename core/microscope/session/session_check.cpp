@@ -40,7 +40,7 @@ class SessionCheck {
     check_number("spin_rate_rad_s", session_.spin_rate_rad_s, range::between(-0.05, 0.05));
     check_target();
     check_excitations();
-    check_lines();
+    is_test(session_) ? check_test() : check_lines();
   }
 
  private:
@@ -81,6 +81,7 @@ class SessionCheck {
   void check_stimulus(const Excitation& excitation, const Stimulus& needed) const;
   void check_excitation(std::size_t i) const;
   void check_lines() const;
+  void check_test() const;
   void check_multiple(const std::string& key, const LineMultiple& line) const;
   void check_frequency(const std::string& key, const LineMultiple& line) const;
 
@@ -167,6 +168,22 @@ void SessionCheck::check_lines() const {
   };
   check_list("fit_lines", session_.fit_lines);
   check_list("known_lines", session_.known_lines);
+}
+
+void SessionCheck::check_test() const {
+  const auto refuse_lines = [&](std::string_view key, const std::vector<LineMultiple>& lines) {
+    if (lines.empty()) return;
+    refuse(key, fmt::format("{} lines", lines.size()),
+           "target ep_test has lines of its own, f_EP and 2 f_EP: leave this out");
+  };
+  refuse_lines("fit_lines", session_.fit_lines);
+  refuse_lines("known_lines", session_.known_lines);
+  // A frame that turns with the Earth's direction sees a constant, which a bias is, too.
+  const double resolution_hz = (1.0 - 1e-9) / (session_.num_orbits * orbit_period_s_);
+  if (test_frequency_hz(session_, orbit_period_s_) >= resolution_hz) return;
+  refuse("spin_rate_rad_s", fmt::format("{}", session_.spin_rate_rad_s),
+         fmt::format("must leave f_EP = |f_orb + f_spin| at 1/({} orbits) or more",
+                     session_.num_orbits));
 }
 
 void SessionCheck::check_multiple(const std::string& key, const LineMultiple& line) const {

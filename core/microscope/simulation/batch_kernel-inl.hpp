@@ -94,8 +94,7 @@ HWY_INLINE void scatter_health(const Group& group, OutcomesOfLanes outcomes) {
   }
 }
 
-HWY_INLINE void scatter(const Group& group, std::size_t num_line_readers,
-                        OutcomesOfLanes outcomes) {
+HWY_INLINE void scatter(const Group& group, const SessionSetup& setup, OutcomesOfLanes outcomes) {
   constexpr std::size_t num_outputs = 2 * num_fit_lines_max;
   for (std::size_t s = 0; s < num_signals; ++s) {
     for (std::size_t i = 0; i < num_outputs; ++i) {
@@ -103,6 +102,7 @@ HWY_INLINE void scatter(const Group& group, std::size_t num_line_readers,
                      [&](SessionOutcome& outcome) -> double& { return outcome.sums[s][i]; });
     }
   }
+  const std::size_t num_line_readers = setup.line_readers.size();
   for (std::size_t at = 0; at < num_line_readers * num_line_signals * num_outputs; ++at) {
     const std::size_t i = at % num_outputs, s = at / num_outputs % num_line_signals;
     const std::size_t r = at / num_outputs / num_line_signals;
@@ -113,6 +113,10 @@ HWY_INLINE void scatter(const Group& group, std::size_t num_line_readers,
   for (std::size_t s = 0; s < num_line_bases; ++s) {
     scatter_number(group.further.plain[s], outcomes,
                    [s](SessionOutcome& outcome) -> double& { return outcome.further.plain[s]; });
+  }
+  for (std::size_t at = 0; setup.test != nullptr && at < num_test_products; ++at) {
+    scatter_number(group.test.products[at], outcomes,
+                   [at](SessionOutcome& outcome) -> double& { return outcome.test_products[at]; });
   }
   scatter_health(group, outcomes);
 }
@@ -132,9 +136,13 @@ void PROOFMASS_NAME(record_batch_,
   };
   const std::size_t num_used = (session.num_runs + num_lanes - 1) / num_lanes;
   const auto used = std::span(groups).first(num_used);
+  for (std::size_t g = 0; g < num_used; ++g) {
+    groups[g].eotvos_parameter =
+        gather([&](std::size_t lane) { return session.eotvos_parameters[g * num_lanes + lane]; });
+  }
   record_session(signals, session.setup, used, session.weights_buffer, progress, NoObserver{});
   for (std::size_t g = 0; g < num_used; ++g) {
-    scatter(groups[g], session.setup.line_readers.size(), lanes_of(outcomes, g * num_lanes));
+    scatter(groups[g], session.setup, lanes_of(outcomes, g * num_lanes));
   }
 }
 

@@ -10,7 +10,8 @@
 
 namespace proofmass {
 
-/// The fit of a session's record: of Session::fit_lines, with the known lines beside them.
+/// The fit of a session's record: of Session::fit_lines, with the known lines beside them; in a
+/// test of f_EP, with 2 f_EP beside it.
 [[nodiscard]] LineFit line_fit(const Scenario& scenario, const Session& session);
 
 /// Fits of a session's record in which one or two of the known lines are those whose phasors are

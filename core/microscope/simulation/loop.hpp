@@ -41,6 +41,19 @@ struct Observation {
 /// sample on in which a sensor is found beyond its range, its measurements end there.
 enum class Watch : std::uint8_t { no, yes };
 
+/// Both masses fall alike.
+struct NoViolation {
+  static constexpr bool is_active = false;
+};
+
+/// One may fall faster: arguments of violation_acceleration().
+template <typename T>
+struct Violation {
+  static constexpr bool is_active = true;
+  T eotvos_parameter{};
+  double gravity_m_s2 = 0.0;
+};
+
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
 /// section 5.1).
 ///
@@ -117,21 +130,27 @@ struct Loop {
   ///
   /// @param shared  Of this sample; what all runs have in common, or each lane its own.
   /// @param noise   Of this sample; its scale is in it already.
+  /// @param violation  NoViolation, or a Violation in a session that tests.
   /// @tparam masses  `at_rest` only in a session that moves no test mass.
   /// @returns What instrument and estimator report at this sample.
-  template <TestMasses masses = TestMasses::moving, typename Shared>
+  template <TestMasses masses = TestMasses::moving, typename Shared, typename Fall = NoViolation>
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
                                           const SharedSampleOf<Shared>& shared,
-                                          const SampleNoise<T>& noise, Watch watch = Watch::yes) {
+                                          const SampleNoise<T>& noise, Watch watch = Watch::yes,
+                                          const Fall& violation = {}) {
     const SatelliteMotion<T> satellite = motion(constants, shared, noise);
 
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
-      const Vector3<T> kinematic_S = kinematic_acceleration<masses>(
+      Vector3<T> kinematic_S = kinematic_acceleration<masses>(
           sensor, satellite, shared.mass_motion, shared.second_motion);
+      if constexpr (Fall::is_active) {
+        kinematic_S += violation_acceleration(k, violation.eotvos_parameter, violation.gravity_m_s2,
+                                              satellite.radial_S);
+      }
       observation.kinematic_S_x[k] = kinematic_S.x;
       observation.measured_K[k] = measured_acceleration(sensor, kinematic_S) + noise.sensor_K[k];
     }

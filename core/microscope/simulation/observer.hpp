@@ -10,6 +10,7 @@
 #include "core/microscope/simulation/loop.hpp"
 #include "core/microscope/simulation/sample_noise.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
+#include "core/microscope/simulation/test_record.hpp"
 
 namespace proofmass {
 
@@ -26,6 +27,7 @@ struct ObservedSample {
   const Loop<double>& loop;
   const LoopConstants<double>& constants;
   const SampleNoise<double>& noise;  ///< Of this sample.
+  Violation<double> violation;       ///< 0 in a session that does not test.
 };
 
 /// Called with every sample of a run, in the order of sessions and times.
@@ -60,7 +62,9 @@ struct SessionObserver {
   double sample_period_s;
   const LoopConstants<double>& constants;
   const ObservedNoise& noise;
-  Loop<double> loop{};  ///< Before the sample.
+  double eotvos_parameter = 0.0;
+  const TestSetup* test = nullptr;  ///< Null in a session that does not test.
+  Loop<double> loop{};              ///< Before the sample.
 
   /// Tells it the loop that a sample is about to advance.
   void begin_sample(const Loop<double>& before) { loop = before; }
@@ -75,7 +79,10 @@ struct SessionObserver {
              .signals = signals,
              .loop = loop,
              .constants = constants,
-             .noise = noise.last()});
+             .noise = noise.last(),
+             .violation = test == nullptr
+                              ? Violation<double>{}
+                              : Violation<double>{eotvos_parameter, test->gravity_m_s2(shared)}});
     ++next;
   }
 };

@@ -48,9 +48,11 @@ double ground(const Sample& sample) {
 /// Γ_App,k + p_k of sensor k − 1: Observation keeps only the X component.
 template <std::size_t k>
 Vector kinematic(const Sample& sample) {
-  return kinematic_acceleration(sample.constants.sensors[k],
-                                sample.loop.motion(sample.constants, sample.shared, sample.noise),
-                                sample.shared.mass_motion, sample.shared.second_motion);
+  const auto motion = sample.loop.motion(sample.constants, sample.shared, sample.noise);
+  return kinematic_acceleration(sample.constants.sensors[k], motion, sample.shared.mass_motion,
+                                sample.shared.second_motion) +
+         violation_acceleration(k, sample.violation.eotvos_parameter, sample.violation.gravity_m_s2,
+                                motion.radial_S);
 }
 
 constexpr std::array measured_rows{

@@ -11,6 +11,7 @@
 
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/estimation/ep_test/ep_test.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
 #include "core/microscope/simulation/gpu/device_simulation.hpp"
@@ -52,9 +53,42 @@ struct Lane {
   std::size_t index = 0;  ///< Of its record.
 };
 
-bool are_in_range(const ParameterArray& values) { return std::ranges::all_of(values, is_in_range); }
+bool are_in_range(std::span<const double> values) {
+  return std::ranges::all_of(values, is_in_range);
+}
+
+/// What a run yields of its calibration and, if its scenario has one, of its test.
+struct Yield {
+  std::vector<double> values;
+  std::vector<double> standard_errors;  ///< Of the quantities that have one.
+  std::vector<double> correlations;     ///< As in RunResult.
+};
+
+/// Correlations (0, 1), (0, 2) ... of quantities of which `covariance(i, j)` is known.
+template <typename Correlation>
+std::vector<double> pairs(std::size_t num_quantities, const Correlation& correlation) {
+  std::vector<double> all;
+  for (std::size_t i = 0; i < num_quantities; ++i) {
+    for (std::size_t j = i + 1; j < num_quantities; ++j) {
+      // To a millionth: a database keeps them as text.
+      all.push_back(std::round(1e6 * correlation(i, j)) / 1e6 + 0.0);
+    }
+  }
+  return all;
+}
 
 }  // namespace
+
+std::vector<double> run_truth(const Scenario& scenario, const ParameterArray& truth,
+                              double eotvos_parameter) {
+  std::vector<double> values(truth.begin(), truth.end());
+  if (!scenario.has_tests()) return values;
+  values.push_back(eotvos_parameter);
+  for (const Parameter delta : {Parameter::a_c11_delta_x, Parameter::a_c11_delta_z}) {
+    values.push_back(truth[index(delta)]);
+  }
+  return values;
+}
 
 struct RunPlan::Impl : RunParts {
   using RunParts::RunParts;
@@ -70,18 +104,22 @@ struct RunPlan::Impl : RunParts {
     SessionNoise session_noise(noise, campaign.seed, record.run, session.name);
     if (observer == nullptr) {
       LaneGroup<double, SessionNoise> alone{.constants = constants, .noise = session_noise};
+      alone.eotvos_parameter = instrument.eotvos_parameter;
       record_session_alone(i, signals, alone, NoObserver{}, progress, record);
       return;
     }
     LaneGroup<double, ObservedNoise> alone{.constants = constants,
                                            .noise = ObservedNoise(std::move(session_noise))};
+    alone.eotvos_parameter = instrument.eotvos_parameter;
     const double period_s = scenario.simulation.sample_period_s;
     const SessionObserver session_observer{.observe = *observer,
                                            .session = i,
                                            .next = -signals.num_settling(),
                                            .sample_period_s = period_s,
                                            .constants = alone.constants,
-                                           .noise = alone.noise};
+                                           .noise = alone.noise,
+                                           .eotvos_parameter = instrument.eotvos_parameter,
+                                           .test = is_test(session) ? &tests[i] : nullptr};
     record_session_alone(i, signals, alone, session_observer, progress, record);
   }
 
@@ -92,7 +130,10 @@ struct RunPlan::Impl : RunParts {
     Readers readers(*this, i);
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
-    keep(i, {alone.sums, session_health(alone.loop, alone.monitor), alone.further}, record);
+    keep(i,
+         {alone.sums, session_health(alone.loop, alone.monitor), alone.further,
+          alone.test.products},
+         record);
   }
 
   /// A session of a batch, with all that it is computed from.
@@ -118,6 +159,7 @@ struct RunPlan::Impl : RunParts {
         const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
         batch.runs[l] = lane.run;
         batch.constants[l] = make_loop_constants(lane.instrument, impl.campaign.scenario, session);
+        batch.eotvos_parameters[l] = lane.instrument.eotvos_parameter;
         batch.noise_states[l] = stationary_states(impl.noise, impl.campaign.seed, lane.run, starts);
       }
     }
@@ -164,12 +206,49 @@ struct RunPlan::Impl : RunParts {
     for (std::size_t k = 0; k < order.size(); ++k) keep_all(order[k], lanes, outcomes[k], records);
   }
 
+  [[nodiscard]] EstimationInput estimation_input() const {
+    const Scenario& scenario = campaign.scenario;
+    return {.sessions = scenario.sessions,
+            .config = scenario.estimation,
+            .objectives = scenario.objectives,
+            .noise = scenario.noise,
+            .laws = laws,
+            .orbit_period_s = scenario.orbit.period_s,
+            .sample_period_s = scenario.simulation.sample_period_s};
+  }
+
+  [[nodiscard]] Yield yield_of(const RunRecord& record, const Estimation& found) const {
+    Yield yield;
+    yield.values.assign(found.values.begin(), found.values.end());
+    if (method.has_standard_errors) {
+      yield.standard_errors.assign(found.standard_errors.begin(), found.standard_errors.end());
+    }
+    if (!campaign.scenario.has_tests()) {
+      yield.correlations = pairs(yield.standard_errors.size(), [&](std::size_t i, std::size_t j) {
+        return found.correlations[i][j];
+      });
+      return yield;
+    }
+    const TestEstimation test = estimate_ep_test(record.phasors, estimation_input(), found);
+    yield.values.insert(yield.values.end(), test.values.begin(), test.values.end());
+    yield.standard_errors.insert(yield.standard_errors.end(), test.standard_errors.begin(),
+                                 test.standard_errors.end());
+    // Those of the test alone, or with the calibration's before them.
+    const std::size_t first = method.has_standard_errors ? 0 : num_parameters;
+    yield.correlations = pairs(yield.standard_errors.size(), [&](std::size_t i, std::size_t j) {
+      return i + first < num_parameters && j + first < num_parameters
+                 ? found.correlations[i][j]
+                 : test.correlations[j + first - num_parameters][i + first];
+    });
+    return yield;
+  }
+
   /// Whether sessions may be computed side by side: the loops settle for a whole number of noise
-  /// blocks, and no further lines are recorded.
+  /// blocks, no further lines are recorded, and none is a test.
   [[nodiscard]] bool may_be_mixed() const {
     const Scenario& scenario = campaign.scenario;
     const SessionSignals signals(scenario, scenario.sessions[0], orbit, environment);
-    return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 &&
+    return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 && !scenario.has_tests() &&
            std::ranges::all_of(groups, [](const auto& further) { return further.empty(); });
   }
 };
@@ -280,15 +359,7 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
 }
 
 Estimation RunPlan::estimation(const RunRecord& record) const {
-  const Scenario& scenario = impl_->campaign.scenario;
-  return impl_->method.estimate(record.phasors,
-                                {.sessions = scenario.sessions,
-                                 .config = scenario.estimation,
-                                 .objectives = scenario.objectives,
-                                 .noise = scenario.noise,
-                                 .laws = impl_->laws,
-                                 .orbit_period_s = scenario.orbit.period_s,
-                                 .sample_period_s = scenario.simulation.sample_period_s});
+  return impl_->method.estimate(record.phasors, impl_->estimation_input());
 }
 
 RunResult RunPlan::estimate(const RunRecord& record) const {
@@ -298,7 +369,7 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
     result.status = RunStatus::no_draw;
     return result;
   }
-  result.truth.assign(record.truth.begin(), record.truth.end());
+  result.truth = run_truth(scenario, record.truth, record.eotvos_parameter);
   const Estimation found = estimation(record);
   result.num_rounds = found.num_rounds;
   const bool has_errors = impl_->method.has_standard_errors;
@@ -316,24 +387,20 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
                    .session = static_cast<std::uint32_t>(finding.loss.session)};
     return result;
   }
-  if (!are_in_range(found.values) || (has_errors && !are_errors_usable)) {
+  const Yield yield = impl_->yield_of(record, found);
+  if (!are_in_range(yield.values) || !are_in_range(yield.standard_errors)) {
     result.status = RunStatus::not_finite;
     return result;
   }
   result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
-  result.estimate.assign(found.values.begin(), found.values.end());
+  result.estimate = yield.values;
+  result.standard_error = yield.standard_errors;
+  result.correlations = yield.correlations;
   if (has_errors) {
-    result.standard_error.assign(found.standard_errors.begin(), found.standard_errors.end());
     result.fit = {0.0, 0.0};
     for (const SessionFit& session : found.session_fits) {
       result.fit[0] += session.chi_squared;
       result.fit[1] += session.degrees_of_freedom;
-    }
-    for (std::size_t i = 0; i < num_parameters; ++i) {
-      for (std::size_t j = i + 1; j < num_parameters; ++j) {
-        // To a millionth: a database keeps them as text.
-        result.correlations.push_back(std::round(1e6 * found.correlations[i][j]) / 1e6 + 0.0);
-      }
     }
   }
   return result;

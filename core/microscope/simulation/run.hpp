@@ -31,9 +31,17 @@ struct RunRecord {
   std::uint32_t num_draws = 0;  ///< Draws taken until one was accepted.
   bool has_draw = false;        ///< False if none was; then the rest means nothing.
   ParameterArray truth{};       ///< true_parameters() of the draw, SI.
+  double eotvos_parameter = 0.0;  ///< δ of the draw.
   RunPhasors phasors{};         ///< With the lines and signals that the method needs.
   HealthRecord health{};        ///< For judge_health().
 };
+
+/// True value of each quantity of the results: of the ten parameters, and of those of a test if the
+/// scenario has one.
+/// @param truth             true_parameters(), SI.
+/// @param eotvos_parameter  δ.
+[[nodiscard]] std::vector<double> run_truth(const Scenario& scenario, const ParameterArray& truth,
+                                            double eotvos_parameter);
 
 /// Everything that the runs of a campaign share: filters, weights, orbit, environment. Made once,
 /// used for any run, by any number of threads.

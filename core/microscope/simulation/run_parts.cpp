@@ -55,6 +55,9 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
   for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
     const Session& session = campaign.scenario.sessions[i];
     weights.emplace_back(line_fit(campaign.scenario, session));
+    tests.push_back({.semi_latus_rectum_m = orbit.semi_latus_rectum_m(),
+                     .eccentricity = orbit.eccentricity(),
+                     .num_blocks = weights.back().num_samples() / test_block_size});
     const RecordNeeds& asked = needs.emplace_back(method.needs(session));
     groups.push_back(line_groups(campaign.scenario, session, asked));
     PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
@@ -86,7 +89,8 @@ SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
           .product = target_info(session.target).product,
           .signals = needs[i].signals,
           .line_readers = readers.further,
-          .residual_reader = readers.residual ? &*readers.residual : nullptr};
+          .residual_reader = readers.residual ? &*readers.residual : nullptr,
+          .test = is_test(session) ? &tests[i] : nullptr};
 }
 
 RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {
@@ -98,6 +102,7 @@ RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {
   if (draw.instrument) {
     record.truth =
         true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+    record.eotvos_parameter = draw.instrument->eotvos_parameter;
   }
   return record;
 }
@@ -108,6 +113,9 @@ void RunParts::keep(std::size_t i, const SessionOutcome& outcome, RunRecord& rec
   keep_fit_lines(outcome.sums, needs[i].signals, phasors);
   if (!groups[i].empty()) {
     keep_further(outcome.further, groups[i], weights[i].num_samples(), phasors);
+  }
+  if (is_test(campaign.scenario.sessions[i])) {
+    phasors.test_products.assign(outcome.test_products.begin(), outcome.test_products.end());
   }
   record.health[i] = outcome.health;
   record.health[i].is_quiet = is_quiet(i);

@@ -66,6 +66,7 @@ struct RunParts {
   std::vector<std::vector<LineGroup>> groups;                ///< Of each session's further lines.
   std::vector<std::vector<LineWeights>> group_weights;       ///< Of those groups.
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
+  std::vector<TestSetup> tests;  ///< Of each session; of use where it is a test.
 
  private:
   /// True if the loops of a session without excitation are those of one before, which tells enough.

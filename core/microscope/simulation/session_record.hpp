@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "core/math/inline.hpp"
@@ -12,6 +13,7 @@
 #include "core/microscope/simulation/observer.hpp"
 #include "core/microscope/simulation/run_health.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
+#include "core/microscope/simulation/test_record.hpp"
 #include "core/signal/line_weights.hpp"
 
 namespace proofmass {
@@ -46,6 +48,22 @@ PROOFMASS_INLINE T product_signal(Product kind, const T& common_x, const T& sens
   return T(0.0);
 }
 
+/// Angles of the estimated attitude, rad, without the part that is commanded: the ground knows it
+/// and takes it out of the on-board estimate, which followed the star tracker with it.
+template <typename T, typename Shared>
+PROOFMASS_INLINE Vector3<T> ground_angle_RS_S(const Observation<T>& observation,
+                                              const SharedSampleOf<Shared>& shared) {
+  return observation.attitude.angle_RS_S - broadcast<T>(shared.commanded.angle_RS_S);
+}
+
+/// û in the estimated attitude.
+/// @param angle_RS_S  ground_angle_RS_S().
+template <typename T, typename Shared>
+PROOFMASS_INLINE Vector3<T> ground_radial_S(const Vector3<T>& angle_RS_S,
+                                            const SharedSampleOf<Shared>& shared) {
+  return to_target(from_error_angles(angle_RS_S), broadcast<T>(shared.radial_R));
+}
+
 /// The signals of one sample, in the order of `Signal`. They are what the ground can compute: from
 /// measurements, the estimated attitude, the orbit and the session's commands, not from the truth.
 ///
@@ -63,15 +81,11 @@ PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>&
   const T differential_x = half * (m1.x - m2.x);
   const Vector3<T> common = half * (m1 + m2);
 
-  // The ground knows what was commanded and takes it out of the on-board estimate, which followed
-  // the star tracker with the command in it.
-  const Vector3<T> angle_RS_S =
-      observation.attitude.angle_RS_S - broadcast<T>(shared.commanded.angle_RS_S);
+  const Vector3<T> angle_RS_S = ground_angle_RS_S(observation, shared);
   const Vector3<T> omega_IS_S = observation.attitude.omega_RS_S -
                                 broadcast<T>(shared.commanded.omega_RS_S) +
                                 broadcast<T>(shared.omega_IR_R);
-  const Vector3<T> radial_S =
-      to_target(from_error_angles(angle_RS_S), broadcast<T>(shared.radial_R));
+  const Vector3<T> radial_S = ground_radial_S(angle_RS_S, shared);
   const auto [g] = gradient_matrix(shared.gradient_s2, radial_S, omega_IS_S,
                                    observation.measured_omega_dot_IS_S);
 
@@ -99,6 +113,7 @@ struct SessionSetup {
   std::span<LineReader> line_readers;
   /// Weights of the line at f_EP; null in a session that is not monitored.
   WeightReader* residual_reader = nullptr;
+  const TestSetup* test = nullptr;  ///< Null in a session that does not test.
 };
 
 /// Weights of a block of samples.
@@ -235,6 +250,8 @@ struct LaneGroup {
   SignalSums<T> sums{};
   LoopMonitor<T> monitor{};
   FurtherSums<T> further{};
+  T eotvos_parameter{};  ///< Acts in test sessions alone.
+  TestSums<T> test{};
 };
 
 /// What a session leaves of a run.
@@ -242,6 +259,7 @@ struct SessionOutcome {
   SignalSums<double> sums{};
   SessionHealth health;
   FurtherSums<double> further{};
+  TestProducts test_products{};  ///< Of a test session.
 };
 
 /// Whether LoopMonitor is filled.
@@ -257,6 +275,7 @@ struct SampleKind {
   bool has_product = true;  ///< Of any kind but Product::none.
   Monitoring monitoring = Monitoring::off;
   RecordedLines lines = RecordedLines::own;
+  bool is_test = false;  ///< Masses may fall apart, and the products of a test are summed.
 };
 
 /// The sample loops that are compiled, for processors and GPUs. Each session of the paper's
@@ -288,6 +307,17 @@ inline constexpr std::size_t general_kind = sample_kinds.size() - 1;
   return general_kind;
 }
 
+/// By how much the masses of a group fall apart in a session of a kind.
+template <SampleKind kind, typename T>
+PROOFMASS_INLINE auto violation_of(const T& eotvos_parameter, const SessionSetup& setup,
+                                   const SharedSample& shared) {
+  if constexpr (kind.is_test) {
+    return Violation<T>{eotvos_parameter, setup.test->gravity_m_s2(shared)};
+  } else {
+    return NoViolation{};
+  }
+}
+
 /// Advances all groups by some samples.
 /// @tparam kind     Covers what `setup` asks for.
 /// @param weights   Of these samples; none while the loops settle, when nothing is summed.
@@ -301,11 +331,12 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   const SignalSet recorded = kind.signals == SignalSet::all ? setup.signals : SignalSet::common;
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
-    for (auto& [constants, noise, loop, sums, monitor, further] : groups) {
+    for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, test] : groups) {
       if constexpr (Observer::is_active) observer.begin_sample(loop);
       const auto observation =
           loop.template advance<kind.masses>(constants, setup.drag_free, setup.attitude, shared,
-                                             noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
+                                             noise.next(), k % 4 == 0 ? Watch::yes : Watch::no,
+                                             violation_of<kind>(eotvos_parameter, setup, shared));
       if constexpr (Observer::is_active) {
         observer(shared, observation, ground_signals(observation, shared, setup.product));
       }
@@ -314,6 +345,14 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
       add_sample(values, weights.lines + k * num_outputs, num_outputs, product, recorded, sums);
       if constexpr (kind.lines == RecordedLines::further) {
         add_further(values, observation, shared, setup, weights.further, k, further);
+      }
+      if constexpr (kind.is_test) {
+        using T = std::remove_cvref_t<decltype(eotvos_parameter)>;
+        const auto radial_S = ground_radial_S(ground_angle_RS_S(observation, shared), shared);
+        const auto gravity_x = T(-setup.test->gravity_m_s2(shared)) * radial_S.x;
+        test.add(test_signals(values, gravity_x), k % test_block_size, *setup.test);
+      }
+      if constexpr (kind.is_test || kind.lines == RecordedLines::further) {
         if (weights.residual == nullptr) continue;
       }
       if constexpr (kind.monitoring == Monitoring::on) {
@@ -327,10 +366,18 @@ template <typename Signals, typename Group, typename Observer>
 using AdvanceGroups = void (*)(Signals&, const SessionSetup&, std::span<Group>, std::size_t,
                                const BlockWeights&, Observer&);
 
-/// The compiled loop for a session. Where further lines are recorded, two loops serve all sessions.
+static_assert(LineWeights::block_size % test_block_size == 0);
+
+/// The compiled loop for a session. Where further lines are recorded, two loops serve all sessions,
+/// and one serves those that test.
 template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
+  if (setup.test != nullptr) {
+    constexpr SampleKind kind{at_rest, SignalSet::all, false, Monitoring::on, RecordedLines::own,
+                              true};
+    return advance_groups<kind, Signals, Group, Observer>;
+  }
   if (!setup.line_readers.empty()) {
     constexpr SampleKind kind{moving_twice, SignalSet::all, true, Monitoring::on,
                               RecordedLines::further};

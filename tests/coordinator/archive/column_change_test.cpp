@@ -2,7 +2,7 @@
 
 #include "coordinator/report/summarise.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/model_rules.hpp"
+#include "core/result_rules.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -108,7 +108,7 @@ class ColumnChange : public test::VerificationTest {
     for (const RunResult& result : results_) {
       errors.push_back(std::abs(result.error(index(Parameter::k2c))));
     }
-    return check_stop_rule(parse_stop_rule("mean(k2c) within 90%"), errors);
+    return check_stop_rule(test::parse_stop_rule("mean(k2c) within 90%"), errors);
   }
 
   /// Other values of a column of this type, as SQL.

@@ -18,11 +18,13 @@ struct Side {
   MicroscopeCampaign campaign;
   std::string model_version = "model";
   std::string build = "build";
+  std::vector<Quantity> quantities = test::schema().quantities;
   std::vector<RunResult> results = {};
 };
 
 ComparedCampaign compared(const Side& side) {
   return {.campaign = side.campaign.clone(),
+          .quantities = side.quantities,
           .model_version = side.model_version,
           .build = side.build,
           .open_results = [results = side.results] {
@@ -69,6 +71,7 @@ std::vector<ComparedMember> both(const CampaignComparison& comparison) {
   first.file = "a.db";
   second.file = "b.db";
   second.comparison = comparison;
+  first.quantities = second.quantities = test::schema().quantities;
   first.objectives = second.objectives =
       std::vector<double>(num_parameters, std::numeric_limits<double>::infinity());
   first.statistics.num_estimated = comparison.num_first;

@@ -151,11 +151,12 @@ TEST(ResultDifferences, AreOfBitsThatMeanSomething) {
   const RunResult stored = test::result_of(3, RunStatus::not_finite);
   RunResult computed = stored;
   computed.estimate = {99.0};  // Without a meaning.
-  EXPECT_THAT(differences_of(stored, computed), IsEmpty());
+  EXPECT_THAT(differences_of(stored, computed, test::schema()), IsEmpty());
   computed.truth[0] = 0.5;
   computed.num_draws = 7;
   computed.num_rounds = 9;
-  const std::vector<ResultDifference> differences = differences_of(stored, computed);
+  const std::vector<ResultDifference> differences =
+      differences_of(stored, computed, test::schema());
   ASSERT_EQ(differences.size(), 3U);
   EXPECT_EQ(differences[0].column, "num_draws");
   EXPECT_EQ(differences[1].column, "num_rounds");
@@ -171,7 +172,8 @@ TEST(ResultDifferences, OfAnotherStatusAreThatAlone) {
   const RunResult stored = test::result_of(3);
   RunResult computed = test::result_of(3, RunStatus::no_draw);
   computed.num_draws = 1000;
-  const std::vector<ResultDifference> differences = differences_of(stored, computed);
+  const std::vector<ResultDifference> differences =
+      differences_of(stored, computed, test::schema());
   ASSERT_EQ(differences.size(), 1U);
   EXPECT_EQ(differences[0].column, "status");
   EXPECT_EQ(differences[0].stored, "completed");

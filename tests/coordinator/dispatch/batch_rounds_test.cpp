@@ -11,6 +11,7 @@
 #include "core/runs.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/support/messages.hpp"
+#include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
@@ -222,8 +223,7 @@ class PlayedFleet final : public Outbox {
     std::map<wire::Attempt, std::vector<wire::ComputedRun>> messages;
     for (const HeldRun& held : batch.runs) {
       wire::ComputedRun computed;
-      computed.result.run = held.run;
-      computed.result.num_draws = 1;
+      computed.result = test::zero_result({.run = held.run, .num_draws = 1});
       computed.elapsed_s = batch.ends - batch.begins;
       computed.is_by_card = is_by_card;
       messages[held.attempt].push_back(computed);

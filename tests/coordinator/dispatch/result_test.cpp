@@ -134,6 +134,18 @@ TEST_F(ResultTest, OfACampaignThatHasEndedIsForgottenUntilItIsServedAgain) {
   outbox.forget();
 }
 
+// Everything behind the dispatch takes a value for each quantity of the campaign for granted.
+TEST_F(ResultTest, OfOtherQuantitiesThanTheCampaignsIsRefused) {
+  wire::ComputedRun other = computed(0);
+  other.result.estimate.push_back(0.0);
+  on_results(state, first, one, {1}, {other}, now, outbox);
+  const auto reject = outbox.take_sent<proto::Reject>(first);
+  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_MALFORMED);
+  EXPECT_EQ(reject.text(), "run 0: estimate = 11 entries (must be 10 if completed)");
+  EXPECT_TRUE(outbox.stored().empty());
+  outbox.forget();
+}
+
 TEST_F(ResultTest, WithoutAnEstimateIsCounted) {
   on_results(state, first, one, {1},
              {computed(0, RunStatus::no_draw), computed(1, RunStatus::not_converged),
@@ -154,7 +166,7 @@ TEST_F(ResultTest, LastOneEndsTheCampaignAndWorkersForgetIt) {
   (void)outbox.take_sent<proto::ResultAck>(first);
   EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
   EXPECT_EQ(outbox.take_events(),
-            Strings{"campaign_finished runs=10 given_up=0 duplicates=0 compared=0"});
+            Strings{"campaign_finished runs=10 given_up=0 duplicates=0 compared=0 mismatches=0"});
 }
 
 TEST_F(ResultTest, ThatCannotBeStoredStopsTheLendingUntilItIs) {

@@ -15,7 +15,7 @@ std::string digest_of_runs(Correction correction, std::uint64_t num_runs) {
   campaign.seed = 1;
   campaign.scenario.estimation.correction = correction;
   const RunPlan plan(campaign);
-  Digest digest;
+  Digest digest(campaign.results());
   for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
     std::vector<RunRequest> requests;
     const std::uint64_t end = std::min<std::uint64_t>(num_runs, first + batch_lanes);

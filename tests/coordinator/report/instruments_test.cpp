@@ -23,7 +23,7 @@ const std::vector<double>& objectives() {
 
 /// Instruments of two runs: one with both, two with a lost one, and one that is not finished.
 InstrumentStatistics with_missing_runs() {
-  RunningInstruments running(objectives(), 2);
+  RunningInstruments running(test::schema(), objectives(), 2);
   running.add(test::result_off_by(0, -1.0));
   running.add(test::result_off_by(1, 1.0));
   running.add(test::result_off_by(2, 0.5));
@@ -63,29 +63,29 @@ TEST(Instruments, LeaveAnInstrumentWithARunWithoutAnEstimateOutOfVariances) {
     EXPECT_FALSE(of.magnitude_interval);
     EXPECT_NEAR(of.standard_errors->within_ratio.value(), 2.0, 1e-12);
   }
-  const std::string text = terminal_text(variance_table(statistics), {});
+  const std::string text = terminal_text(variance_table(test::schema(), statistics), {});
   EXPECT_THAT(text, HasSubstr("3 instruments with 2 realisations of the noise each; 1 more"));
   EXPECT_THAT(text, HasSubstr("left out: 2 instruments with a run that has no estimate\n"));
   EXPECT_THAT(text, HasSubstr("noise: there is no interval from fewer than 10 instruments\n"));
 }
 
 TEST(Instruments, SayThatNoneIsComplete) {
-  RunningInstruments running(objectives(), 3);
+  RunningInstruments running(test::schema(), objectives(), 3);
   running.add(test::result_off_by(0, 1.0));
   const InstrumentStatistics statistics = running.statistics();
-  EXPECT_THAT(terminal_text(variance_table(statistics), {}),
+  EXPECT_THAT(terminal_text(variance_table(test::schema(), statistics), {}),
               HasSubstr("none of which all 3 realisations are finished\n"));
-  EXPECT_TRUE(instrument_table(statistics).rows.empty());
-  EXPECT_TRUE(variance_table({}).rows.empty());
+  EXPECT_TRUE(instrument_table(test::schema(), statistics).rows.empty());
+  EXPECT_TRUE(variance_table(test::schema(), {}).rows.empty());
 }
 
 TEST(Instruments, SayHowOftenTheWorstOnesMeetAllObjectives) {
   const auto text_of = [](const std::vector<double>& pulls) {
-    RunningInstruments running(objectives(), 2);
+    RunningInstruments running(test::schema(), objectives(), 2);
     for (std::size_t run = 0; run < pulls.size(); ++run) {
       running.add(test::result_off_by(run, pulls[run]));
     }
-    return terminal_text(instrument_table(running.statistics()), {});
+    return terminal_text(instrument_table(test::schema(), running.statistics()), {});
   };
   constexpr double beyond = 11.0;
   EXPECT_THAT(text_of({0.0, 0.0, 1.0, 1.0}),
@@ -97,7 +97,7 @@ TEST(Instruments, SayHowOftenTheWorstOnesMeetAllObjectives) {
 }
 
 TEST(Instruments, HaveTablesThatFitATerminal) {
-  RunningInstruments running(objectives(), 2);
+  RunningInstruments running(test::schema(), objectives(), 2);
   for (std::uint64_t run = 0; run < 40; ++run) {
     const auto instrument = static_cast<double>(run / 2 % 7);
     running.add(
@@ -105,8 +105,8 @@ TEST(Instruments, HaveTablesThatFitATerminal) {
   }
   const InstrumentStatistics statistics = running.statistics();
   EXPECT_TRUE(statistics.quantities.front().error.within_share_interval);
-  std::istringstream lines(terminal_text(variance_table(statistics), {}) +
-                           terminal_text(instrument_table(statistics), {}));
+  std::istringstream lines(terminal_text(variance_table(test::schema(), statistics), {}) +
+                           terminal_text(instrument_table(test::schema(), statistics), {}));
   for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
 }
 

@@ -41,7 +41,7 @@ std::optional<RunResult> run_number(std::uint64_t run) {
 }
 
 ReplicateStatistics replicates_of(std::uint64_t num_runs) {
-  RunningReplicates running(test::campaign_of(1).objectives(), of_four);
+  RunningReplicates running(test::schema(), test::campaign_of(1).objectives(), of_four);
   for (std::uint64_t run = 0; run < num_runs; ++run) {
     if (const std::optional<RunResult> result = run_number(run)) running.add(*result);
   }
@@ -73,18 +73,18 @@ TEST(Replicates, LeaveOutTheOneThatIsNotFinishedYet) {
   EXPECT_EQ(statistics.num_replicates, 7U);
   EXPECT_THAT(statistics.incomplete, ElementsAre(4U, 8U));
   EXPECT_FALSE(statistics.quantities.front().bias.interval);
-  EXPECT_THAT(terminal_text(replicate_table(statistics)),
+  EXPECT_THAT(terminal_text(replicate_table(test::schema(), statistics)),
               AllOf(HasSubstr("7 complete replicates of 4 runs (campaign.design = \"sobol\")"),
                     HasSubstr("left out, as a run is not finished yet: replicate 4, 8"),
                     HasSubstr("an interval needs 8 replicates")));
-  EXPECT_THAT(replicate_table(replicates_of(3)).rows, IsEmpty());
-  EXPECT_THAT(replicate_table(replicates_of(0)).rows, IsEmpty());
+  EXPECT_THAT(replicate_table(test::schema(), replicates_of(3)).rows, IsEmpty());
+  EXPECT_THAT(replicate_table(test::schema(), replicates_of(0)).rows, IsEmpty());
 }
 
 // 40 replicates; the count of runs beyond is always 1, or alternates between 0 and 2.
 TEST(Replicates, StateNoIntervalOfSharesThatHardlyDiffer) {
   for (const bool alternates : {false, true}) {
-    RunningReplicates running(test::campaign_of(1).objectives(), of_four);
+    RunningReplicates running(test::schema(), test::campaign_of(1).objectives(), of_four);
     for (std::uint64_t run = 0; run < 160; ++run) {
       const std::uint64_t num_beyond = alternates ? run / 4 % 2 * 2 : 1;
       running.add(run_off_by(run, run % 4 < num_beyond ? 2.0 : 0.5));
@@ -97,7 +97,7 @@ TEST(Replicates, StateNoIntervalOfSharesThatHardlyDiffer) {
 }
 
 TEST(Replicates, CountRunsWithoutAnEstimateAsBeyondEveryObjective) {
-  RunningReplicates running(test::campaign_of(1).objectives(), of_four);
+  RunningReplicates running(test::schema(), test::campaign_of(1).objectives(), of_four);
   for (std::uint64_t run = 0; run < 4; ++run) {
     RunResult result = run_off_by(run, 0.25 * static_cast<double>(run));
     if (run == 2) result.status = RunStatus::not_converged;
@@ -126,7 +126,7 @@ RunResult covered_in_part(std::uint64_t run) {
 
 // 40 replicates: 14 shares of 1, 13 of ¾ and 13 of ½. Student's law with 39 degrees: 2.02269.
 TEST(Replicates, MakeTheIntervalOfWhatStandardErrorsCover) {
-  RunningReplicates running(test::campaign_of(1).objectives(), of_four);
+  RunningReplicates running(test::schema(), test::campaign_of(1).objectives(), of_four);
   for (std::uint64_t run = 0; run < 160; ++run) {
     running.add(covered_in_part(run));
   }
@@ -189,7 +189,7 @@ TEST_F(ReadGroups, GiveTheTableOfStandardErrorsItsInterval) {
   ASSERT_TRUE(of.within);
   EXPECT_EQ(of.within->lower, covered->interval->lower);
   EXPECT_EQ(of.within->upper, covered->interval->upper);
-  EXPECT_THAT(terminal_text(standard_error_table(results.standard_errors)),
+  EXPECT_THAT(terminal_text(standard_error_table(test::schema(), results.standard_errors)),
               AllOf(HasSubstr("from, to: 95 % interval from replicates\n"), Not(HasSubstr("±"))));
 }
 

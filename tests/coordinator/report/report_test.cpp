@@ -27,20 +27,21 @@ MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) 
 // Tables as lines of a terminal.
 
 std::string accuracy_text(const Campaign& campaign, const CampaignStatistics& statistics) {
-  return terminal_text(accuracy_table(campaign.objectives(), statistics));
+  return terminal_text(accuracy_table(test::schema(), campaign.objectives(), statistics));
 }
 
 std::string interval_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  return terminal_text(interval_table(statistics, num_given_up));
+  return terminal_text(interval_table(test::schema(), statistics, num_given_up));
 }
 
 std::string error_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  return terminal_text(error_table(statistics, num_given_up, Interpretation::mixed));
+  return terminal_text(
+      error_table(test::schema(), statistics, num_given_up, Interpretation::mixed));
 }
 
 std::string budget_text(const Campaign& campaign, const CampaignStatistics& statistics,
                         const std::optional<RunTotals>& totals) {
-  return terminal_text(budget_table(campaign.error_budget(), statistics, totals));
+  return terminal_text(budget_table(test::schema(), campaign.error_budget(), statistics, totals));
 }
 
 /// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
@@ -81,7 +82,7 @@ TEST(AccuracyTable, NamesTheWorstRunAndMarksWhatIsBeyondItsObjective) {
   AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c13)];
   accuracy.num_beyond_objective = 3;
   accuracy.worst_run = {57};
-  const Table table = accuracy_table(MicroscopeCampaign{}.objectives(), statistics);
+  const Table table = accuracy_table(test::schema(), MicroscopeCampaign{}.objectives(), statistics);
   const Row& row = table.rows[index(Parameter::a_c13)];
   EXPECT_EQ(row[1].in_document(), "10⁻⁴ rad");
   EXPECT_EQ(row[3].value, 11e-4);
@@ -113,9 +114,9 @@ TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
 TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   CampaignStatistics statistics = paper_statistics(40);
   leave_out_intervals(statistics);
-  EXPECT_TRUE(interval_table(statistics, 0).rows.empty());
-  const std::string text =
-      terminal_text(error_table(statistics, 0, Interpretation::mixed, "4 runs share one draw"));
+  EXPECT_TRUE(interval_table(test::schema(), statistics, 0).rows.empty());
+  const std::string text = terminal_text(
+      error_table(test::schema(), statistics, 0, Interpretation::mixed, "4 runs share one draw"));
   EXPECT_THAT(text, HasSubstr("no intervals over runs: 4 runs share one draw\n"
                               "all objectives together: 40 of 40 runs\n"));
   EXPECT_THAT(text, ::testing::Not(HasSubstr("from")));
@@ -261,7 +262,10 @@ TEST_F(StoredReport, IsStoredAgainAfterMoreRuns) {
 std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t num_beyond) {
   RequirementAnswer answer;
   answer.stated.requirement = text;
-  answer.requirement = parse_requirement(text);
+  answer.requirement = test::parse_requirement(text);
+  if (!answer.is_joint()) {
+    answer.subject = requirement_subject(test::schema(), answer.requirement.parameter);
+  }
   answer.check = check_requirement(answer.requirement,
                                    {.num_runs = num_runs, .num_exceedances = num_beyond}, num_runs);
   if (answer.check.bound_order > 0) {

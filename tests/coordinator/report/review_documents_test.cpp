@@ -251,7 +251,7 @@ std::vector<RequirementAnswer> answers_to(const std::vector<StatedRequirement>& 
                                           const std::vector<RunResult>& results,
                                           std::uint64_t num_given_up = 0,
                                           std::optional<std::uint64_t> num_fixed = {}) {
-  VerificationMatrix matrix(stated, ones(), num_given_up, num_fixed);
+  VerificationMatrix matrix(test::schema(), stated, ones(), num_given_up, num_fixed);
   for (const RunResult& result : results) matrix.add(result);
   for (std::size_t i = 0; i < num_parameters; ++i) {
     std::vector<double> magnitudes;
@@ -287,23 +287,26 @@ TEST(MatrixRequirements, AreTheObjectivesIfThereAreNone) {
   std::vector<double> objectives = ones();
   objectives[a_c12] = std::numeric_limits<double>::infinity();
   objectives[0] = 1.0 / 3.0;
-  const std::vector<StatedRequirement> requirements = matrix_requirements({}, objectives);
+  const std::vector<StatedRequirement> requirements =
+      matrix_requirements(test::schema(), {}, objectives);
   ASSERT_EQ(requirements.size(), num_parameters);  // One less, and all together.
   EXPECT_EQ(requirements[0].requirement, "a_c11_delta_x < 0.3333333333333333 for 95% with 90%");
-  EXPECT_EQ(parse_requirement(requirements[0].requirement, quantity_names(model().results())).limit,
-            objectives[0]);
+  EXPECT_EQ(test::parse_requirement(requirements[0].requirement).limit, objectives[0]);
   EXPECT_EQ(requirements.back().requirement, "all objectives for 95% with 90%");
 }
 
 TEST(MatrixRequirements, EndWithAllObjectivesTogether) {
   const std::vector<double> objectives = ones();
   const auto two = matrix_requirements(
-      {stated("all objectives for 99% with 95%"), stated("k2c < 1 for 9% with 9%")}, objectives);
+      test::schema(), {stated("all objectives for 99% with 95%"), stated("k2c < 1 for 9% with 9%")},
+      objectives);
   ASSERT_EQ(two.size(), 2U);
   EXPECT_EQ(two[1].requirement, "all objectives for 99% with 95%");
-  EXPECT_EQ(matrix_requirements({stated("k2c < 1 for 9% with 9%")}, objectives).size(), 2U);
+  EXPECT_EQ(
+      matrix_requirements(test::schema(), {stated("k2c < 1 for 9% with 9%")}, objectives).size(),
+      2U);
   const std::vector<double> none(num_parameters, std::numeric_limits<double>::infinity());
-  EXPECT_TRUE(matrix_requirements({}, none).empty());
+  EXPECT_TRUE(matrix_requirements(test::schema(), {}, none).empty());
 }
 
 // Of 100 runs 2 may exceed 0.95 with 0.9 if their number was fixed, else 0; the bound goes with it.

@@ -23,7 +23,7 @@ using ::testing::Not;
 const std::vector<double> pulls{-3.0, -1.0, 0.5, 1.5, 2.0};
 
 StandardErrorStatistics of_five_runs() {
-  RunningStandardErrors running;
+  RunningStandardErrors running(test::schema());
   for (std::size_t run = 0; run < pulls.size(); ++run)
     running.add(test::result_off_by(run, pulls[run]));
   running.add(test::result_of(5));                            // Without standard errors.
@@ -55,12 +55,12 @@ TEST(StandardErrors, AreHeldAgainstTheErrors) {
 // 3 of 5 by Clopper and Pearson: 14.7 % to 94.7 %.
 TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
   const StandardErrorStatistics statistics = of_five_runs();
-  const std::string text = terminal_text(standard_error_table(statistics), {});
+  const std::string text = terminal_text(standard_error_table(test::schema(), statistics), {});
   EXPECT_THAT(text, AllOf(HasSubstr("Standard errors σ of the estimates of 5 runs"),
                           HasSubstr("chi_squared 32, degrees_of_freedom 32")));
   EXPECT_THAT(
       text, ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 +1.40 .* +60.0 +14.7 +94.7"));
-  const std::string svg = svg_of(*pull_overview(statistics), SvgUse::embedded);
+  const std::string svg = svg_of(*pull_overview(test::schema(), statistics), SvgUse::embedded);
   EXPECT_EQ(test::malformed_part(svg), "");
   EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law")));
 }
@@ -68,16 +68,16 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
 TEST(StandardErrors, HaveNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   StandardErrorStatistics statistics = of_five_runs();
   leave_out_intervals(statistics);
-  const std::string text = terminal_text(standard_error_table(statistics), {});
+  const std::string text = terminal_text(standard_error_table(test::schema(), statistics), {});
   EXPECT_THAT(text, ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 .* +60.0\n"));
   EXPECT_THAT(text, AllOf(Not(HasSubstr("±")), Not(HasSubstr("interval"))));
 }
 
 TEST(StandardErrors, AreNowhereWithoutAny) {
-  RunningStandardErrors running;
+  RunningStandardErrors running(test::schema());
   running.add(test::result_of(0));
-  EXPECT_TRUE(standard_error_table(running.statistics()).rows.empty());
-  EXPECT_FALSE(pull_overview(running.statistics()));
+  EXPECT_TRUE(standard_error_table(test::schema(), running.statistics()).rows.empty());
+  EXPECT_FALSE(pull_overview(test::schema(), running.statistics()));
 }
 
 using StandardErrorsTest = test::ReviewTest;
@@ -96,7 +96,7 @@ TEST_F(StandardErrorsTest, AreInEveryReport) {
   EXPECT_THAT(report_text(store, test::campaign_of(5)), HasSubstr(caption));
   EXPECT_THAT(review_html(review), AllOf(HasSubstr(caption), HasSubstr("id=\"pulls-title\"")));
   EXPECT_THAT(review_markdown(review), HasSubstr(caption));
-  LiveResults live(campaign);
+  LiveResults live(campaign, test::schema());
   for (const Delivery& delivery : deliveries) live.add(delivery.result);
   EXPECT_THAT(live.html(), HasSubstr(caption));
   EXPECT_THAT(report_json(store, test::campaign_of(5), {}, {}),

@@ -196,17 +196,18 @@ RunResult second_result() {
 }
 
 TEST(Digest, OfNothingIsThatOfNoBytes) {
-  EXPECT_EQ(Digest().finish(), (ResultDigests{.results = digest_of_nothing, .health = ""}));
+  EXPECT_EQ(Digest(test::schema()).finish(),
+            (ResultDigests{.results = digest_of_nothing, .health = ""}));
 }
 
 TEST(Digest, IsThatOfTheDocumentedBytes) {
-  Digest digest;
+  Digest digest(test::schema());
   digest.add(first_result());
   EXPECT_EQ(digest.finish().results, digest_of_first);
 }
 
 TEST(Digest, LeavesOutWhatMeansNothing) {
-  Digest digest;
+  Digest digest(test::schema());
   digest.add(first_result());
   digest.add(second_result());
   EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = ""}));
@@ -217,7 +218,7 @@ TEST(Digest, OfHealthIsThatOfTheDocumentedBytesAndStandsAlone) {
   first.health = test::values_of({1e-7, 2e-5, -0.0, 0.25, 3e-4});
   first.loss.session = 9;  // Means nothing: the run is not lost.
 
-  Digest digest;
+  Digest digest(test::schema());
   digest.add(first);
   digest.add(second_result());
   EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = health_of_first}));
@@ -225,7 +226,7 @@ TEST(Digest, OfHealthIsThatOfTheDocumentedBytesAndStandsAlone) {
   RunResult lost = test::zero_result({.run = {9}, .status = RunStatus::lost});
   lost.health = test::values_of({1e-5, 2e-5, 1e-12, 0.25, 3e-4});
   lost.loss = test::loss_of(LossCause::saturation, SessionTarget::a_d11_prime);
-  Digest with_lost;
+  Digest with_lost(test::schema());
   with_lost.add(first);
   with_lost.add(lost);
   EXPECT_EQ(with_lost.finish().health, health_with_lost);
@@ -377,7 +378,7 @@ TEST(MagnitudeBins, ShowTenPercent) {
 class LiveResultsTest : public test::ReviewTest {
  protected:
   static LiveResults results_in(const Store& store) {
-    LiveResults results(test::campaign_of(1));
+    LiveResults results(test::campaign_of(1), test::schema());
     store.for_each_result([&](const RunResult& result) { results.add(result); });
     return results;
   }
@@ -391,7 +392,8 @@ TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
                           Not(HasSubstr("<html"))));
   const Review review = review_of(store, 150);
-  for (const Row& row : accuracy_table(review.objectives, review.results.statistics).rows) {
+  for (const Row& row :
+       accuracy_table(review.schema, review.objectives, review.results.statistics).rows) {
     for (const Cell& cell : row) {
       EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
     }
@@ -400,7 +402,7 @@ TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
 }
 
 TEST(LiveResults, AreEmptyAtFirst) {
-  const LiveResults results(test::campaign_of(1));
+  const LiveResults results(test::campaign_of(1), test::schema());
   EXPECT_EQ(test::malformed_part(results.html()), "");
   EXPECT_THAT(results.html(), HasSubstr("no data"));
 }

@@ -22,7 +22,7 @@ TEST_F(ResultColumns, AreThoseOfTheTable) {
   }
   create(4).commit(deliveries);
   const detail::Database database(file(), detail::Access::read_only);
-  for (const ValueColumn& column : value_columns()) {
+  for (const ValueColumn& column : value_columns(test::schema())) {
     detail::Statement row = database.prepare("SELECT " + column.name + " IS NULL, " + column.name +
                                              ", status FROM run_result ORDER BY run_index");
     for (std::uint64_t run = 0; row.step(); ++run) {
@@ -106,16 +106,16 @@ TEST_F(ResultColumns, HaveNoHalfOfTheStandardErrors) {
 }
 
 TEST(ValueColumns, HaveTheUnitOfTheirParameter) {
-  EXPECT_EQ(value_columns()[3].name, "truth_a_c12_rad");
-  EXPECT_EQ(value_columns()[3].own_name, "a_c12_rad");
-  EXPECT_EQ(value_columns()[3].unit, "rad");
-  EXPECT_EQ(value_columns()[29].name, "error_k2c_s2_m");
-  EXPECT_EQ(value_columns()[29].unit, "s²/m");
-  EXPECT_EQ(value_columns()[33].name, "standard_error_a_c12_rad");
-  EXPECT_EQ(value_columns()[33].unit, "rad");
-  EXPECT_EQ(value_columns()[40].name, "fit_chi_squared");
-  EXPECT_EQ(value_columns()[43].name, "health_attitude_rad");
-  EXPECT_EQ(value_columns()[43].unit, "rad");
+  EXPECT_EQ(value_columns(test::schema())[3].name, "truth_a_c12_rad");
+  EXPECT_EQ(value_columns(test::schema())[3].own_name, "a_c12_rad");
+  EXPECT_EQ(value_columns(test::schema())[3].unit, "rad");
+  EXPECT_EQ(value_columns(test::schema())[29].name, "error_k2c_s2_m");
+  EXPECT_EQ(value_columns(test::schema())[29].unit, "s²/m");
+  EXPECT_EQ(value_columns(test::schema())[33].name, "standard_error_a_c12_rad");
+  EXPECT_EQ(value_columns(test::schema())[33].unit, "rad");
+  EXPECT_EQ(value_columns(test::schema())[40].name, "fit_chi_squared");
+  EXPECT_EQ(value_columns(test::schema())[43].name, "health_attitude_rad");
+  EXPECT_EQ(value_columns(test::schema())[43].unit, "rad");
 }
 
 TEST(SameBits, AreMoreThanEqualValuesAndKnowNoSignOfZero) {

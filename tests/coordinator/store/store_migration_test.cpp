@@ -30,7 +30,7 @@ using ::testing::Not;
 /// A file of the older version with runs 0 and 1 by `näh`, run 4 by `worker-2`, and a note.
 void make_older(const std::filesystem::path& path) {
   Database old(path, Access::create);
-  old.execute(detail::migrations()[0]);
+  old.execute(detail::migrations(test::schema())[0]);
   old.execute(
       "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
       " VALUES (7, 'old', '42', 5, 'text', 'hardy2013-3', 'b')");

@@ -58,11 +58,64 @@ TEST(RunResult, HasTheCountsThatItsStatusAllows) {
   EXPECT_EQ(broken(RunStatus::no_draw, 1000, 0), "");
 }
 
+/// The first rule about sizes that a result of two quantities, one with a standard error, breaks.
+std::string broken_size(const std::function<void(RunResult&)>& change) {
+  const ResultSchema schema{
+      .quantities = {{.name = "gain", .has_standard_error = true}, {.name = "offset"}},
+      .health = {{.name = "peak"}},
+      .loss_causes = {"saturation"},
+      .loss_sessions = {"first", "second"},
+      .fit = {{.name = "chi_squared"}}};
+  RunResult result{.run = {0},
+                   .truth = {1.0, 2.0},
+                   .estimate = {1.5, 2.5},
+                   .standard_error = {0.5},
+                   .fit = {3.0},
+                   .health = {4.0}};
+  change(result);
+  const std::vector<std::string> rules = broken_size_rules(result, schema);
+  return rules.empty() ? "" : rules.front();
+}
+
+TEST(RunResult, HasListsAsLongAsItsStatusAndTheSchemaMakeThem) {
+  EXPECT_EQ(broken_size([](RunResult&) {}), "");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.truth.pop_back(); }),
+            "truth = 1 entries (must be 2 if completed)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.estimate.push_back(0.0); }),
+            "estimate = 3 entries (must be 2 if completed)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.standard_error.push_back(1.0); }),
+            "standard_error = 2 entries (must be 1 if completed)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.fit.clear(); }),
+            "fit = 0 entries (must be 1 if completed)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.correlations = {0.5}; }),
+            "correlation = 1 entries (must be 0 if completed)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.health.push_back(1.0); }),
+            "health = 2 entries (must be 1 if completed)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.status = RunStatus::not_finite; }),
+            "estimate = 2 entries (must be 0 if not_finite)");
+}
+
+TEST(RunResult, HasALossThatTheSchemaNamesIfItIsLost) {
+  const auto lose = [](std::uint32_t cause, std::uint32_t session) {
+    return broken_size([=](RunResult& result) {
+      result = {.run = {0}, .status = RunStatus::lost, .truth = {1.0, 2.0}};
+      result.loss = {.cause = cause, .session = session};
+    });
+  };
+  EXPECT_EQ(lose(1, 2), "");
+  EXPECT_EQ(lose(0, 1), "loss_cause = 0 (must be in [1, 1] if lost)");
+  EXPECT_EQ(lose(1, 3), "loss_session = 3 (must be in [1, 2] if lost)");
+  EXPECT_EQ(broken_size([](RunResult& result) { result.loss.cause = 1; }),
+            "loss_cause = 1 (must be in [0, 0] if completed)");
+}
+
 TEST(ResultSchema, HasTheQuantityInTheMiddleAsAnExample) {
   for (const std::size_t num_quantities : {1U, 2U, 3U, 10U}) {
     ResultSchema schema;
-    schema.quantities.resize(num_quantities);
-    EXPECT_EQ(&example_quantity(schema), &schema.quantities[(num_quantities - 1) / 2]);
+    for (std::size_t i = 0; i < num_quantities; ++i) {
+      schema.quantities.push_back({.name = std::string(i + 1, 'a')});
+    }
+    EXPECT_EQ(example_quantity(schema).name, schema.quantities[(num_quantities - 1) / 2].name);
   }
 }
 

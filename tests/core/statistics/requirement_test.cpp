@@ -37,11 +37,11 @@ RequirementCheck fixed_check(const Requirement& requirement, const std::vector<d
 }
 
 std::string refusal(std::string_view text) {
-  return test::message_of<ConfigError>([&] { (void)parse_requirement(text); });
+  return test::message_of<ConfigError>([&] { (void)test::parse_requirement(text); });
 }
 
 TEST(ParseRequirement, TakesBlanksAsTheyCome) {
-  const Requirement requirement = parse_requirement("  k2d<1000 for 99.9 %  with 90% ");
+  const Requirement requirement = test::parse_requirement("  k2d<1000 for 99.9 %  with 90% ");
   EXPECT_EQ(requirement.parameter, index(Parameter::k2d));
   EXPECT_EQ(requirement.limit, 1000.0);
   EXPECT_DOUBLE_EQ(requirement.tolerance.coverage, 0.999);
@@ -280,16 +280,17 @@ TEST(Tolerance, RefusesFractionsOutsideTheirRange) {
 }
 
 std::string refusal_of_rule(std::string_view text) {
-  return test::message_of<ConfigError>([&] { (void)parse_stop_rule(text); });
+  return test::message_of<ConfigError>([&] { (void)test::parse_stop_rule(text); });
 }
 
 TEST(ParseStopRule, ReadsEveryStatistic) {
-  const StopRule spread = parse_stop_rule("std(a_c13) within 5%");
+  const StopRule spread = test::parse_stop_rule("std(a_c13) within 5%");
   EXPECT_EQ(spread.statistic, StopRule::Statistic::standard_deviation);
   EXPECT_EQ(spread.parameter, index(Parameter::a_c13));
   EXPECT_EQ(spread.relative_half_width, 0.05);
-  EXPECT_EQ(parse_stop_rule(" mean ( k2d )within 0.5 %").statistic, StopRule::Statistic::mean);
-  const StopRule percentile = parse_stop_rule("p95(k2c) within 10%");
+  EXPECT_EQ(test::parse_stop_rule(" mean ( k2d )within 0.5 %").statistic,
+            StopRule::Statistic::mean);
+  const StopRule percentile = test::parse_stop_rule("p95(k2c) within 10%");
   EXPECT_EQ(percentile.statistic, StopRule::Statistic::percentile);
   EXPECT_EQ(percentile.level, 0.95);
 }
@@ -307,13 +308,13 @@ TEST(ParseStopRule, RefusesAnotherForm) {
 }
 
 TEST(ParseStopRule, ReadsARequirement) {
-  const StopRule rule = parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided ");
+  const StopRule rule = test::parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided ");
   EXPECT_EQ(rule.statistic, StopRule::Statistic::verdict);
   EXPECT_EQ(rule.requirement.parameter, index(Parameter::a_c12));
   EXPECT_EQ(rule.requirement.limit, 9e-4);
-  const StopRule joint = parse_stop_rule("all objectives for 95% with 90% decided");
+  const StopRule joint = test::parse_stop_rule("all objectives for 95% with 90% decided");
   EXPECT_EQ(joint.requirement.subject, Requirement::Subject::all_objectives);
-  const StopRule success = parse_stop_rule("all objectives within 2%");
+  const StopRule success = test::parse_stop_rule("all objectives within 2%");
   EXPECT_EQ(success.statistic, StopRule::Statistic::success);
   EXPECT_EQ(success.relative_half_width, 0.02);
 }
@@ -346,7 +347,7 @@ TEST(NextStopCheck, DependsOnlyOnTheListOfCounts) {
 
 // The 95 % interval of a deviation of normal values has half width 1.96/√(2n): 4.3 % with n = 1024.
 TEST(CheckStopRule, IsReachedWhenTheIntervalIsNarrow) {
-  StopRule rule = parse_stop_rule("std(a_c13) within 5%");
+  StopRule rule = test::parse_stop_rule("std(a_c13) within 5%");
   const std::vector<double> errors = test::normal_column(1024, {.seed = 61});
   const StopCheck check = check_stop_rule(rule, errors);
   EXPECT_TRUE(check.is_reached);
@@ -360,17 +361,18 @@ TEST(CheckStopRule, IsReachedWhenTheIntervalIsNarrow) {
 
 TEST(CheckStopRule, TakesTheIntervalOfItsStatistic) {
   const std::vector<double> errors = test::half_normal_column(400, {.seed = 62});
-  const StopCheck mean = check_stop_rule(parse_stop_rule("mean(k2c) within 9%"), errors);
+  const StopCheck mean = check_stop_rule(test::parse_stop_rule("mean(k2c) within 9%"), errors);
   EXPECT_EQ(mean.estimate, moments(errors).mean);
   EXPECT_EQ(mean.interval->upper, mean_interval(moments(errors), 0.95)->upper);
-  const StopCheck percentile_check = check_stop_rule(parse_stop_rule("p90(k2c) within 9%"), errors);
+  const StopCheck percentile_check =
+      check_stop_rule(test::parse_stop_rule("p90(k2c) within 9%"), errors);
   EXPECT_EQ(percentile_check.estimate, percentile(sorted(errors), 0.9));
   EXPECT_EQ(percentile_check.interval->upper,
             percentile_interval(sorted(errors), 0.9, 0.95)->upper);
 }
 
 TEST(CheckStopRule, IsNotReachedWithoutAnInterval) {
-  const StopRule rule = parse_stop_rule("p99(k2c) within 50%");
+  const StopRule rule = test::parse_stop_rule("p99(k2c) within 50%");
   const StopCheck check = check_stop_rule(rule, test::half_normal_column(100, {.seed = 63}));
   EXPECT_FALSE(check.is_reached);
   EXPECT_FALSE(check.relative_half_width.has_value());
@@ -381,7 +383,7 @@ TEST(CheckStopRule, IsNotReachedWithoutAnInterval) {
 TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
   std::vector<double> errors(66, 0.0);
   errors.resize(128, 1.0);
-  const StopCheck check = check_stop_rule(parse_stop_rule("p50(k2c) within 50%"), errors);
+  const StopCheck check = check_stop_rule(test::parse_stop_rule("p50(k2c) within 50%"), errors);
   EXPECT_EQ(check.estimate, 0.0);
   ASSERT_TRUE(check.interval.has_value());
   EXPECT_GT(check.interval->upper, 0.0);
@@ -392,17 +394,19 @@ TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
 // 97 of 100: 91.48 to 99.38 % (scipy.stats.beta.ppf), half of which is 4.07 % of 97 %.
 TEST(CheckStopRule, KnowsHowOftenAllObjectivesHold) {
   const ExceedanceCount count{.num_runs = 100, .num_exceedances = 3};
-  const StopCheck check = check_stop_rule(parse_stop_rule("all objectives within 4%"), count, {});
+  const StopCheck check =
+      check_stop_rule(test::parse_stop_rule("all objectives within 4%"), count, {});
   EXPECT_EQ(check.estimate, 0.97);
   EXPECT_NEAR(check.interval->lower, 0.91482394702572, 1e-13);
   EXPECT_NEAR(check.interval->upper, 0.9937700284616936, 1e-13);
   EXPECT_NEAR(*check.relative_half_width, 0.0407, 1e-4);
   EXPECT_FALSE(check.is_reached);
-  EXPECT_TRUE(check_stop_rule(parse_stop_rule("all objectives within 4.1%"), count, {}).is_reached);
+  EXPECT_TRUE(
+      check_stop_rule(test::parse_stop_rule("all objectives within 4.1%"), count, {}).is_reached);
 }
 
 TEST(CheckStopRule, IsReachedWhenARequirementIsDecided) {
-  const StopRule rule = parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided");
+  const StopRule rule = test::parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided");
   EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{}, {}).is_reached);
   EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{.num_runs = 256}, {}).is_reached);
   const StopCheck met = check_stop_rule(rule, ExceedanceCount{.num_runs = 384}, {});
@@ -416,7 +420,7 @@ TEST(CheckStopRule, IsReachedWhenARequirementIsDecided) {
 }
 
 TEST(CheckStopRule, TakesAnExactZeroForKnown) {
-  const StopRule rule = parse_stop_rule("std(k2c) within 5%");
+  const StopRule rule = test::parse_stop_rule("std(k2c) within 5%");
   EXPECT_TRUE(check_stop_rule(rule, std::vector<double>(128, 0.0)).is_reached);
 }
 

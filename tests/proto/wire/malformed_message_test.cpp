@@ -28,7 +28,11 @@ const proto::Hello good_hello = [] {
 const auto good_lease = make_lease({1}, {{0}, 2}, {1}, {1.0, 2.0});
 const auto good_welcome = make_welcome({1}, 1.0);
 const auto good_part = make_part({1}, 2, 5, 1, "abc");
-const auto good_batch = make_result_batch({1}, {1}, {{.result = zero_result({})}});
+const auto good_batch = [] {
+  RunResult result = zero_result({});
+  result.health = {1.0, 2.0, 3.0};
+  return make_result_batch({1}, {1}, {{.result = result}});
+}();
 const std::vector<RunRange> good_runs{{{0}, 1}};
 const auto good_give_back = make_give_back(LossReason::drained, {make_held({1}, {1}, good_runs)});
 const auto good_heartbeat =
@@ -319,51 +323,41 @@ TEST(MalformedResultBatch, HasAttemptAndResults) {
             "results = 0 entries (must be in [1, 4096])");
 }
 
-TEST(MalformedComputedRun, HasAllStandardErrorsWithTheirFitOrNone) {
+TEST(MalformedComputedRun, HasAFitAndCorrelationsOfStandardErrorsInRange) {
   const auto with = [](int num_errors, double chi_squared) {
     return [=](auto& run) {
       for (int i = 0; i < num_errors; ++i) run.add_standard_error(1.0);
       run.add_fit(chi_squared);
-      run.add_fit(3.0);
-      for (int i = 0; i < 45; ++i) run.add_correlation(-1.0);
+      run.add_correlation(-1.0);
     };
   };
   EXPECT_EQ(refusal_of_run(with(10, 1.0)), "accepted");
   EXPECT_EQ(refusal_of_run([&](auto& run) {
               with(10, 1.0)(run);
-              run.set_correlation(7, 1.5);
+              run.set_correlation(0, 1.5);
             }),
             "correlation = 1.5 (must be in [-1, 1])");
-  EXPECT_EQ(refusal_of_run([&](auto& run) {
-              with(10, 1.0)(run);
-              run.add_correlation(0.0);
-            }),
-            "correlation = 46 entries (must be 45 with this status)");
-  EXPECT_EQ(refusal_of_run(with(9, 1.0)),
-            "standard_error = 9 entries (must be 10 with this status)");
-  EXPECT_EQ(refusal_of_run(with(10, -1.0)), "fit.chi_squared = -1 (must be in [0, 1e+90])");
-  EXPECT_EQ(refusal_of_run(with(0, 1.0)), "fit = 2 entries (must be 0 with this status)");
+  EXPECT_EQ(refusal_of_run(with(10, -1.0)), "fit = -1 (must be in [0, 1e+90])");
+  EXPECT_EQ(refusal_of_run(with(0, 1.0)), "fit = 1 entries (must be 0 with this status)");
 }
 
 TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_health(); }),
-            "health = 0 entries (must be 5 with this status)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_health(1, nan); }),
-            "health.attitude_rad = nan (must be in [0, 1e+90])");
+            "health = nan (must be in [0, 1e+90])");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_health(2, -1.0); }),
-            "health.residual_m_s2 = -1 (must be in [0, 1e+90])");
+            "health = -1 (must be in [0, 1e+90])");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_loss_cause(2); }),
             "loss_cause = 2 (must be in [0, 0])");
   const auto lose = [](auto& run) {
     run.set_status(proto::RUN_STATUS_LOST);
     run.clear_estimate();
   };
-  EXPECT_EQ(refusal_of_run(lose), "loss_cause = 0 (must be in [1, 5])");
+  EXPECT_EQ(refusal_of_run(lose), "loss_cause = 0 (must be in [1, 255])");
   EXPECT_EQ(refusal_of_run([&](auto& run) {
               lose(run);
               run.set_loss_cause(1);
             }),
-            "loss_session = 0 (must be in [1, 12])");
+            "loss_session = 0 (must be in [1, 255])");
 }
 
 TEST(MalformedComputedRun, HasAStatusAndARunIndex) {
@@ -374,8 +368,6 @@ TEST(MalformedComputedRun, HasAStatusAndARunIndex) {
 }
 
 TEST(MalformedComputedRun, HasTheNumbersThatItsStatusGives) {
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_truth(); }),
-            "truth = 0 entries (must be 10 with this status)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_status(proto::RUN_STATUS_NO_DRAW); }),
             "truth = 10 entries (must be 0 with this status)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_status(proto::RUN_STATUS_NOT_FINITE); }),

@@ -7,6 +7,8 @@
 // Over whole periods of the drive the cosine and the sine are orthogonal, so that of N samples
 //
 //     P = (2/N) Σ y cos ωt,    Q = (2/N) Σ y sin ωt,    each with the variance 2σ²/N.
+//
+// Campaigns with an objective of the amplitude √(P² + Q²) have that as a third quantity.
 
 #include <fmt/format.h>
 
@@ -45,6 +47,7 @@ struct Oscillator {
   double range_m_s2 = 1e-6;              ///< A larger reading loses the run.
   double num_periods = 1000;
   double in_phase_objective_m_s2 = 1e-10;
+  double amplitude_objective_m_s2 = 0.0;  ///< 0: the amplitude is no quantity.
 };
 
 struct Field {
@@ -52,7 +55,7 @@ struct Field {
   double Oscillator::*value;
 };
 
-const std::array<Field, 10> fields{{
+const std::array<Field, 11> fields{{
     {{"oscillator.damping_ratio", "ζ", range::positive}, &Oscillator::damping_ratio},
     {{"oscillator.drive_m_s2", "F", range::between(0.0, 1e6)}, &Oscillator::drive_m_s2},
     {{"oscillator.drive_hz", "ω/2π", range::between(1e-6, 1e6)}, &Oscillator::drive_hz},
@@ -64,6 +67,7 @@ const std::array<Field, 10> fields{{
     {{"sensor.range_m_s2", "", range::positive}, &Oscillator::range_m_s2},
     {{"sensor.periods", "N/16", range::between(1.0, 1e6)}, &Oscillator::num_periods},
     {{"objective.in_phase_m_s2", "", range::positive}, &Oscillator::in_phase_objective_m_s2},
+    {{"objective.amplitude_m_s2", "", range::not_negative}, &Oscillator::amplitude_objective_m_s2},
 }};
 
 Dispersion around(double centre, double half_width) {
@@ -96,6 +100,7 @@ class OscillatorCampaign final : public Campaign {
                                       {"campaign.seed", static_cast<std::int64_t>(seed)},
                                       {"campaign.runs", static_cast<std::int64_t>(num_runs)}};
     for (const Field& field : fields) {
+      if (field.value == &Oscillator::amplitude_objective_m_s2 && !has_amplitude()) continue;
       items.push_back({std::string(field.info.path), oscillator.*field.value});
     }
     return items;
@@ -104,16 +109,24 @@ class OscillatorCampaign final : public Campaign {
       const Campaign& other) const override {
     const std::vector<DefinitionItem> mine = items(), others = other.items();
     std::vector<DefinitionDifference> differences;
-    for (std::size_t i = 0; i < mine.size(); ++i) {
-      if (mine[i].value == others[i].value || mine[i].key == "campaign.runs") continue;
-      const bool is_identity = mine[i].key.starts_with("campaign.");
-      differences.push_back({mine[i].key.substr(is_identity ? 9 : 0), value_text(mine[i].value),
-                             value_text(others[i].value)});
+    for (std::size_t i = 0; i < std::max(mine.size(), others.size()); ++i) {
+      const std::string& key = i < mine.size() ? mine[i].key : others[i].key;
+      const DefinitionValue value = i < mine.size() ? mine[i].value : 0.0;
+      const DefinitionValue other_value = i < others.size() ? others[i].value : 0.0;
+      if (value == other_value || key == "campaign.runs") continue;
+      const bool is_identity = key.starts_with("campaign.");
+      differences.push_back(
+          {key.substr(is_identity ? 9 : 0), value_text(value), value_text(other_value)});
     }
     return differences;
   }
+  [[nodiscard]] bool has_amplitude() const { return oscillator.amplitude_objective_m_s2 > 0.0; }
+  [[nodiscard]] ResultSchema results() const override;
   [[nodiscard]] std::vector<double> objectives() const override {
-    return {oscillator.in_phase_objective_m_s2, std::numeric_limits<double>::infinity()};
+    std::vector<double> objectives{oscillator.in_phase_objective_m_s2,
+                                   std::numeric_limits<double>::infinity()};
+    if (has_amplitude()) objectives.push_back(oscillator.amplitude_objective_m_s2);
+    return objectives;
   }
   [[nodiscard]] std::int64_t num_rounds_max() const override { return 1; }
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override { return {}; }
@@ -130,7 +143,16 @@ class OscillatorCampaign final : public Campaign {
     const double amplitude = -scale * oscillator.drive_m_s2 / (stiff * stiff + loss * loss);
     return {.num_draws = 1,
             .values = {natural_hz, scale},
-            .truth = {amplitude * stiff, amplitude * loss}};
+            .truth = with_amplitude(amplitude * stiff, amplitude * loss)};
+  }
+
+  /// The values of all quantities.
+  [[nodiscard]] std::vector<double> with_amplitude(double in_phase, double quadrature) const {
+    std::vector<double> values{in_phase, quadrature};
+    if (has_amplitude()) {
+      values.push_back(std::sqrt(in_phase * in_phase + quadrature * quadrature));
+    }
+    return values;
   }
 
   /// All of the campaign as TOML, in the one form that campaign_of() takes.
@@ -231,7 +253,7 @@ class OscillatorPlan final : public Plan {
       return result;
     }
     result.num_rounds = 1;
-    result.estimate = {weight * in_phase, weight * quadrature};
+    result.estimate = campaign_.with_amplitude(weight * in_phase, weight * quadrature);
     result.standard_error = {sigma * std::sqrt(weight)};
     return result;
   }
@@ -242,6 +264,33 @@ class OscillatorPlan final : public Plan {
 
 std::unique_ptr<const Plan> OscillatorCampaign::prepare() const {
   return std::make_unique<const OscillatorPlan>(*this);
+}
+
+ResultSchema OscillatorCampaign::results() const {
+  ResultSchema schema{.quantities = {{"in_phase", "_m_s2", "P", "m/s²", 1e-9, "nm/s²",
+                                      std::numeric_limits<double>::infinity(),
+                                      PublishedAccuracy{3e-11, 1e-11, 1e-11}},
+                                     {.name = "quadrature",
+                                      .unit_suffix = "_m_s2",
+                                      .symbol = "Q",
+                                      .unit = "m/s²",
+                                      .display_scale = 1e-9,
+                                      .display_unit = "nm/s²",
+                                      .has_standard_error = true}},
+                      .health = {{"peak_reading", "_m_s2", "m/s²"}},
+                      .loss_causes = {"out_of_range"},
+                      .loss_sessions = {"steady_state"},
+                      .num_draws_max = 1,
+                      .published_source = "made up for tests"};
+  if (has_amplitude()) {
+    schema.quantities.push_back({.name = "amplitude",
+                                 .unit_suffix = "_m_s2",
+                                 .symbol = "√(P² + Q²)",
+                                 .unit = "m/s²",
+                                 .display_scale = 1e-9,
+                                 .display_unit = "nm/s²"});
+  }
+  return schema;
 }
 
 std::unique_ptr<OscillatorCampaign> read(Document& document) {
@@ -273,26 +322,16 @@ class OscillatorModel final : public Model {
     return "Measures how well a driven oscillator is known from a noisy reading.";
   }
 
-  [[nodiscard]] const ResultSchema& results() const override {
-    static const ResultSchema schema{
-        .quantities = {{"in_phase", "_m_s2", "P", "m/s²", 1e-9, "nm/s²",
-                        std::numeric_limits<double>::infinity(),
-                        PublishedAccuracy{3e-11, 1e-11, 1e-11}},
-                       {.name = "quadrature",
-                        .unit_suffix = "_m_s2",
-                        .symbol = "Q",
-                        .unit = "m/s²",
-                        .display_scale = 1e-9,
-                        .display_unit = "nm/s²",
-                        .has_standard_error = true}},
-        .health = {{"peak_reading", "_m_s2", "m/s²"}},
-        .loss_causes = {"out_of_range"},
-        .loss_sessions = {"steady_state"},
-        .num_draws_max = 1,
-        .tables = {},
-        .published_source = "made up for tests"};
-    return schema;
+  [[nodiscard]] ResultSchema results_of(std::string_view definition,
+                                        std::string_view /*version*/) const override {
+    try {
+      Document document("definition", definition, {});
+      return read(document)->results();
+    } catch (const DefinitionError&) {
+      return OscillatorCampaign().results();
+    }
   }
+  [[nodiscard]] std::span<const DataTableSchema> tables() const override { return {}; }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_quantities; }
   [[nodiscard]] std::string_view step_name() const override { return "periods"; }
   [[nodiscard]] std::size_t batch_size() const override { return 4; }

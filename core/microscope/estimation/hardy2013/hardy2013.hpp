@@ -12,7 +12,7 @@ namespace proofmass {
 /// more than estimation.convergence of its objective.
 ///
 /// A target that several sessions serve is their joint least-squares fit, each session weighted by
-/// its length. Sessions without a target are not used.
+/// its length. Sessions without a target, and tests, are not used.
 ///
 /// What is subtracted depends on estimation.correction:
 /// - `first_order`: every term of eq:Gamma-mesdx that is linear in one estimated parameter;

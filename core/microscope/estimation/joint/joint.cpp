@@ -242,7 +242,7 @@ class JointFit {
     return equations;
   }
 
-  /// What is known beside the lines: the priors, and the mean of the first session's Γ_mes,dx.
+  /// What is known beside the lines: the priors, and the mean of the first calibration's Γ_mes,dx.
   [[nodiscard]] NormalEquations beside(const UnknownArray& unknowns) const {
     NormalEquations equations;
     NuisanceVector residual;
@@ -252,14 +252,17 @@ class JointFit {
     }
     equations.matrix.bottomRightCorner<num_nuisances, num_nuisances>() = priors_.information;
     equations.vector.tail<num_nuisances>() = priors_.information * residual;
-    const Dual constant = differential_constant(records_[0].means, unknowns);
+    const auto calibration = std::ranges::find_if_not(input_.sessions, is_test);
+    const auto& means =
+        records_[static_cast<std::size_t>(calibration - input_.sessions.begin())].means;
+    const Dual constant = differential_constant(means, unknowns);
     NormalVector slope;
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_.unit[i];
     }
     equations.add(
         slope,
-        records_[0].means[index(Signal::differential_x)] - read_out_bias_m_s2_ - constant.value,
+        means[index(Signal::differential_x)] - read_out_bias_m_s2_ - constant.value,
         1.0 / read_out_variance_);
     return equations;
   }
@@ -419,6 +422,7 @@ void add_products(const std::vector<Excitation>& excitations, RecordNeeds& needs
 
 RecordNeeds joint_needs(const Session& session) {
   RecordNeeds needs{.signals = SignalSet::health};
+  if (is_test(session)) return needs;
   const std::vector<Excitation>& excitations = session.excitations;
   needs.lines.push_back({{.orbital = 2.0}, LineSignals::gradients});
   for (std::size_t i = 0; i < excitations.size(); ++i) {
@@ -508,7 +512,7 @@ std::string_view what_determines(Parameter parameter) {
 
 void check_joint(const std::vector<Session>& sessions) {
   for (std::size_t i = 0; i < sessions.size(); ++i) {
-    if (sessions[i].spin_rate_rad_s == 0.0) continue;
+    if (sessions[i].spin_rate_rad_s == 0.0 || is_test(sessions[i])) continue;
     throw ConfigError(fmt::format("session[{}].spin_rate_rad_s", i),
                       fmt::format("{}", sessions[i].spin_rate_rad_s),
                       "estimation.method = \"joint\" needs 0");

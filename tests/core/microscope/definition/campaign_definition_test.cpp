@@ -59,6 +59,7 @@ class RandomCampaigns {
     campaign.seed = random_() >> 1;
     campaign.num_runs = 1 + random_() % 5;
     add_environment(campaign);
+    if (random_() % 2 == 0) add_test(campaign);
     for (std::size_t i = 0; i < num_drawn; ++i) change_law(campaign, i);
     change_fields(campaign);
     for (Session& session : campaign.scenario.sessions) change_session(campaign, session);
@@ -146,6 +147,13 @@ class RandomCampaigns {
     campaign.dispersions[i] = law;
   }
 
+  static void add_test(MicroscopeCampaign& campaign) {
+    Session session;
+    session.name = "test";
+    session.target = SessionTarget::ep_test;
+    campaign.scenario.sessions.push_back(session);
+  }
+
   void add_environment(MicroscopeCampaign& campaign) {
     if (random_() % 2 == 0) return;
     campaign.scenario.environment.kind = EnvironmentKind::file;
@@ -179,6 +187,36 @@ TEST(CampaignOf, IsTheCampaignToTheLastBit) {
 }
 
 // Definitions of the model hardy2013-3 and before had limits that no run is held to any more.
+// Programs that know no test stored such campaigns, and workers compare texts to the byte.
+TEST(CanonicalDefinition, OfACampaignThatDoesNotTestHasNothingOfTests) {
+  MicroscopeCampaign campaign;
+  const std::string without = canonical_definition(campaign);
+  EXPECT_THAT(without, Not(HasSubstr("eotvos_parameter")));
+  EXPECT_THAT(without, Not(HasSubstr("test_a_c11")));
+  EXPECT_THAT(commented_campaign(campaign), Not(HasSubstr("eotvos_parameter")));
+  campaign.scenario.sessions.front().target = SessionTarget::ep_test;
+  EXPECT_THAT(canonical_definition(campaign), HasSubstr("eotvos_parameter = 1e-15\n"));
+  campaign.dispersions[index_of_eotvos_parameter].value = 1e-14;
+  EXPECT_THAT(canonical_definition(campaign),
+              HasSubstr("[dispersion.eotvos_parameter]\n"
+                        "masses_2_1 = { law = \"fixed\", value = 1e-14 }\n"));
+}
+
+TEST(ParseCampaign, RefusesObjectivesOfATestWithoutOne) {
+  const std::string text = "[campaign]\nname = \"c\"\n[objective]\neotvos_parameter = 1e-15\n";
+  EXPECT_THROW((void)parse_campaign("c.toml", text, {}, {}), DefinitionError);
+}
+
+// The objectives of a test are those of one campaign alone: its sessions are the difference.
+TEST(CompareDefinitions, OfWhichOneTestsNamesTheSessions) {
+  MicroscopeCampaign second;
+  second.scenario.sessions.push_back(second.scenario.sessions.front());
+  second.scenario.sessions.back().target = SessionTarget::ep_test;
+  const auto differences = compare_definitions(MicroscopeCampaign{}, second);
+  ASSERT_EQ(differences.size(), 1u);
+  EXPECT_EQ(differences[0].field, "session");
+}
+
 TEST(CampaignOf, ReadsDefinitionsWithTheFormerLimitsOfHealth) {
   const MicroscopeCampaign campaign = hardy2013_campaign();
   Definition definition = campaign.definition(TableColumns::included);

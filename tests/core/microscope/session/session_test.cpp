@@ -47,6 +47,45 @@ TEST(Hardy2013Sessions, ShakeAndLockAsThePaperSays) {
   EXPECT_TRUE(session_with(sessions, SessionTarget::a_c11_delta_x).excitations.empty());
 }
 
+Session session_that_tests() {
+  Session session;
+  session.name = "ep";
+  session.target = SessionTarget::ep_test;
+  return session;
+}
+
+TEST(ValidateSessions, TakesTestsInAnyPointingWithoutLines) {
+  const double f_orb_rad_s = 2.0 * std::numbers::pi / orbit_period_s;
+  for (const double turns : {0.0, 4.5, -17.5}) {
+    EXPECT_EQ(refusal_after([&](Sessions& sessions) {
+                sessions.push_back(session_that_tests());
+                sessions.back().spin_rate_rad_s = turns * f_orb_rad_s;
+                sessions.back().drag_free = DragFreeSource::sensor_2;
+              }),
+              "");
+  }
+}
+
+TEST(ValidateSessions, RefusesLinesAndExcitationsOfTests) {
+  const auto refusal = [](const auto& change) {
+    return refusal_after([&](Sessions& sessions) {
+      sessions.push_back(session_that_tests());
+      change(sessions.back());
+    });
+  };
+  EXPECT_EQ(refusal([](Session& s) { s.fit_lines = {{1, 0}}; }),
+            "session[11].fit_lines = 1 lines (target ep_test has lines of its own, f_EP and "
+            "2 f_EP: leave this out)");
+  EXPECT_THAT(refusal([](Session& s) { s.known_lines = {{1, 0}}; }), HasSubstr("known_lines"));
+  EXPECT_THAT(refusal([](Session& s) { s.excitations = hardy2013_sessions()[2].excitations; }),
+              HasSubstr("target ep_test needs none"));
+  // The frame turns with the Earth's direction.
+  EXPECT_THAT(refusal([](Session& s) {
+                s.spin_rate_rad_s = -2.0 * std::numbers::pi / orbit_period_s;
+              }),
+              HasSubstr("must leave f_EP = |f_orb + f_spin| at 1/(10 orbits) or more"));
+}
+
 TEST(LineFrequency, AddsMultiplesOfOrbitAndExcitation) {
   const Sessions sessions = hardy2013_sessions();
   EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[0], {2, 0}, orbit_period_s), 2.0 / 5950.0);

@@ -1,0 +1,245 @@
+#include "core/microscope/estimation/ep_test/ep_test.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "core/error.hpp"
+#include "core/math/elementary.hpp"
+#include "core/signal/noise_shape.hpp"
+
+namespace proofmass {
+namespace {
+
+using enum TestSignal;
+
+constexpr auto num_averaged = static_cast<Eigen::Index>(num_averaged_signals);
+constexpr auto num_fitted = static_cast<Eigen::Index>(num_test_parameters);
+constexpr auto num_calibrated = static_cast<Eigen::Index>(num_parameters);
+constexpr auto num_powers = static_cast<Eigen::Index>(num_test_signals - num_averaged_signals);
+
+/// Sums of products of the averaged signals, without the cubic polynomials in time.
+using Products = Eigen::Matrix<double, num_averaged, num_averaged>;
+/// Factors of the averaged signals in a sum of them.
+using Factors = Eigen::Matrix<double, num_averaged, 1>;
+using Fitted = Eigen::Matrix<double, num_fitted, 1>;
+using FittedMatrix = Eigen::Matrix<double, num_fitted, num_fitted>;
+
+Eigen::Index row(TestSignal signal) { return static_cast<Eigen::Index>(index(signal)); }
+
+/// What each parameter of the test multiplies, in the order of TestParameter; half of it.
+constexpr std::array<TestSignal, num_test_parameters> regressors{gravity_x, gradient_xx,
+                                                                 gradient_xz};
+
+/// A session that tests.
+struct TestRecord {
+  Products products;
+  double common_mean = 0.0;        ///< Γ_mes,cx, m/s².
+  double differential_mean = 0.0;  ///< Γ_mes,dx, m/s².
+  Eigen::Vector3d mean_gradient;   ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
+  Fitted density;                  ///< At the line of each regressor, (m/s²)²/Hz.
+};
+
+TestRecord test_record(const SessionPhasors& record, const Session& session,
+                       const EstimationInput& input) {
+  constexpr auto size = static_cast<Eigen::Index>(num_test_signals);
+  PROOFMASS_EXPECT(record.test_products.size() == num_test_products);
+  Eigen::Matrix<double, size, size> all;
+  std::size_t at = 0;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = i; j < size; ++j) all(i, j) = all(j, i) = record.test_products[at++];
+  }
+  const Eigen::Matrix<double, num_powers, num_powers> powers =
+      all.bottomRightCorner<num_powers, num_powers>();
+  const Eigen::Matrix<double, num_averaged, num_powers> mixed =
+      all.topRightCorner<num_averaged, num_powers>();
+  TestRecord of;
+  of.products = all.topLeftCorner<num_averaged, num_averaged>() -
+                mixed * powers.llt().solve(mixed.transpose());
+  const double count = powers(0, 0);
+  const auto mean = [&](TestSignal signal) { return mixed(row(signal), 0) / count; };
+  of.common_mean = mean(common_x);
+  of.differential_mean = mean(differential_x);
+  of.mean_gradient << mean(gradient_xx), mean(gradient_xy), mean(gradient_xz);
+  const double f = test_frequency_hz(session, input.orbit_period_s);
+  const auto density = [&](double frequency_hz) {
+    return window_noise_psd(input.noise.linear_x, frequency_hz, input.sample_period_s);
+  };
+  of.density << density(f), density(2.0 * f), density(2.0 * f);
+  return of;
+}
+
+/// What is left of Γ_mes,dx when all that the calibration knows is taken away, as a sum of signals.
+Factors corrected(const TestRecord& record, const ParameterArray& calibration) {
+  const auto known = [&](Parameter parameter) { return calibration[index(parameter)]; };
+  Factors factors = Factors::Zero();
+  factors[row(differential_x)] = 1.0;
+  const auto subtract = [&](TestSignal signal, double factor) { factors[row(signal)] -= factor; };
+  subtract(common_x, known(Parameter::a_d11_prime));
+  subtract(common_y, known(Parameter::a_d12));
+  subtract(common_z, known(Parameter::a_d13));
+  const double x = 0.5 * known(Parameter::a_c11_delta_x);
+  const double y = 0.5 * known(Parameter::a_c11_delta_y);
+  const double z = 0.5 * known(Parameter::a_c11_delta_z);
+  subtract(gradient_xy, y);
+  subtract(gradient_yx, known(Parameter::a_c12) * x);
+  subtract(gradient_yy, known(Parameter::a_c12) * y);
+  subtract(gradient_yz, known(Parameter::a_c12) * z);
+  subtract(gradient_zx, known(Parameter::a_c13) * x);
+  subtract(gradient_zy, known(Parameter::a_c13) * y);
+  subtract(gradient_zz, known(Parameter::a_c13) * z);
+  // Squares about the means: a_d11' holds what the means make, but for that of the gradient.
+  const double known_mean =
+      record.differential_mean - record.mean_gradient.dot(Eigen::Vector3d(x, y, z));
+  const double k2d = known(Parameter::k2d), twice_k2c = 2.0 * known(Parameter::k2c);
+  subtract(common_squared, k2d);
+  subtract(common_x, -2.0 * k2d * record.common_mean);
+  subtract(common_product, twice_k2c);
+  subtract(common_x, -twice_k2c * known_mean);
+  subtract(differential_x, -twice_k2c * record.common_mean);
+  return factors;
+}
+
+/// The regressors' rows of the products.
+Eigen::Matrix<double, num_fitted, num_averaged> fitted_rows(const TestRecord& record) {
+  Eigen::Matrix<double, num_fitted, num_averaged> rows;
+  for (Eigen::Index i = 0; i < num_fitted; ++i) {
+    rows.row(i) = record.products.row(row(regressors[static_cast<std::size_t>(i)]));
+  }
+  return rows;
+}
+
+FittedMatrix fitted_block(const TestRecord& record) {
+  const auto rows = fitted_rows(record);
+  FittedMatrix block;
+  for (Eigen::Index i = 0; i < num_fitted; ++i) {
+    block.col(i) = rows.col(row(regressors[static_cast<std::size_t>(i)]));
+  }
+  return block;
+}
+
+/// Covariance of the calibration's estimates; 0 if it has no standard errors.
+Eigen::Matrix<double, num_calibrated, num_calibrated> covariance_of(const Estimation& calibration) {
+  Eigen::Matrix<double, num_calibrated, num_calibrated> covariance;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    for (std::size_t j = 0; j < num_parameters; ++j) {
+      covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          calibration.correlations[i][j] * calibration.standard_errors[i] *
+          calibration.standard_errors[j];
+    }
+  }
+  return covariance;
+}
+
+/// The fit of all tests of a run.
+class TestFit {
+ public:
+  TestFit(const RunPhasors& records, const EstimationInput& input)
+      : window_s_(static_cast<double>(test_block_size) * input.sample_period_s),
+        scale_(input.noise.scale > 0.0 ? input.noise.scale : 1.0) {
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      if (!is_test(input.sessions[i])) continue;
+      tests_.push_back(test_record(records[i], input.sessions[i], input));
+    }
+    PROOFMASS_EXPECT(!tests_.empty());
+    FittedMatrix normal = FittedMatrix::Zero();
+    for (const TestRecord& test : tests_) normal += weight(test) * fitted_block(test);
+    inverse_ = normal.llt().solve(FittedMatrix::Identity());
+  }
+
+  [[nodiscard]] Fitted values(const ParameterArray& calibration) const {
+    Fitted sum = Fitted::Zero();
+    for (const TestRecord& test : tests_) {
+      sum += weight(test) * (fitted_rows(test) * corrected(test, calibration));
+    }
+    return 2.0 * (inverse_ * sum);
+  }
+
+  /// By noise.
+  [[nodiscard]] FittedMatrix covariance() const {
+    FittedMatrix sum = FittedMatrix::Zero();
+    for (const TestRecord& test : tests_) {
+      const Fitted root = (0.5 / window_s_ * test.density).cwiseSqrt();
+      sum +=
+          weight(test) * weight(test) * root.asDiagonal() * fitted_block(test) * root.asDiagonal();
+    }
+    return 4.0 * scale_ * scale_ * inverse_ * sum * inverse_;
+  }
+
+  /// Derivatives of values() by the calibration's estimates: the fit is linear in each of them.
+  [[nodiscard]] Eigen::Matrix<double, num_fitted, num_calibrated> jacobian(
+      const ParameterArray& calibration, const ParameterArray& steps) const {
+    Eigen::Matrix<double, num_fitted, num_calibrated> derivatives;
+    const Fitted at = values(calibration);
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      ParameterArray moved = calibration;
+      moved[i] += steps[i];
+      derivatives.col(static_cast<Eigen::Index>(i)) = (values(moved) - at) / steps[i];
+    }
+    return derivatives;
+  }
+
+ private:
+  /// Sessions count by their noise at f_EP.
+  static double weight(const TestRecord& test) { return 1.0 / test.density[0]; }
+
+  double window_s_;  ///< From one window to the next.
+  double scale_;
+  std::vector<TestRecord> tests_;
+  FittedMatrix inverse_;
+};
+
+}  // namespace
+
+double window_noise_psd(const SensorNoise& sensor, double frequency_hz, double sample_period_s) {
+  constexpr auto num_samples = static_cast<double>(test_block_size);
+  // Two blocks' means, one after the other, and the mean of two samples: slopes in steps.
+  const auto gain = [&](double f) {
+    const double turns = 0.5 * f * sample_period_s;
+    const double mean =
+        sincos_turns(num_samples * turns).sine / (num_samples * sincos_turns(turns).sine);
+    return mean * mean * sincos_turns(turns).cosine;
+  };
+  const double rate_hz = 1.0 / (num_samples * sample_period_s);
+  double sum = 0.0;
+  constexpr int num_folds = static_cast<int>(test_block_size) / 2;
+  for (int k = -num_folds; k < num_folds; ++k) {
+    const double f = std::abs(frequency_hz + k * rate_hz);
+    sum += 0.5 * nominal_psd(sensor, f) * gain(f) * gain(f);
+  }
+  return sum;
+}
+
+TestEstimation estimate_ep_test(const RunPhasors& records, const EstimationInput& input,
+                                const Estimation& calibration) {
+  PROOFMASS_EXPECT(records.size() == input.sessions.size());
+  const TestFit fit(records, input);
+  const Fitted values = fit.values(calibration.values);
+  const auto jacobian = fit.jacobian(calibration.values, input.objectives);
+  const auto of_calibration = covariance_of(calibration);
+  Eigen::Matrix<double, num_fitted, num_calibrated + num_fitted> covariance;
+  covariance << jacobian * of_calibration,
+      fit.covariance() + jacobian * of_calibration * jacobian.transpose();
+
+  TestEstimation result;
+  for (std::size_t i = 0; i < num_test_parameters; ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    result.values[i] = values[at];
+    result.standard_errors[i] = std::sqrt(covariance(at, num_calibrated + at));
+  }
+  for (std::size_t i = 0; i < num_test_parameters; ++i) {
+    for (std::size_t j = 0; j < num_parameters + num_test_parameters; ++j) {
+      const double other = j < num_parameters ? calibration.standard_errors[j]
+                                              : result.standard_errors[j - num_parameters];
+      if (other == 0.0) continue;
+      result.correlations[i][j] =
+          covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
+          (result.standard_errors[i] * other);
+    }
+  }
+  return result;
+}
+
+}  // namespace proofmass

@@ -1,0 +1,329 @@
+// The test of the equivalence principle against what it has to find in closed form, and whether its
+// standard errors are honest.
+
+#include "core/microscope/estimation/ep_test/ep_test.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "core/math/instruction_set.hpp"
+#include "core/microscope/campaign/budget.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "core/signal/noise_shape.hpp"
+
+namespace proofmass {
+namespace {
+
+constexpr double orbit_s = 5950.0;
+constexpr double f_orb_rad_s = 2.0 * std::numbers::pi / orbit_s;
+
+Session test_session(std::string name, int num_orbits, double spin_in_orbits = 0.0) {
+  Session session;
+  session.name = std::move(name);
+  session.target = SessionTarget::ep_test;
+  session.num_orbits = num_orbits;
+  session.spin_rate_rad_s = spin_in_orbits * f_orb_rad_s;
+  return session;
+}
+
+/// Records tests alone, for an estimate with whatever is taken for the calibration.
+constexpr EstimationMethodInfo no_calibration{
+    .name = "none",
+    .needs = [](const Session&) { return RecordNeeds{.signals = SignalSet::health}; },
+    .check = [](const std::vector<Session>&) {},
+    .estimate = [](const RunPhasors&, const EstimationInput&) { return Estimation{}; },
+};
+
+/// Without noise and errors of the instrument.
+MicroscopeCampaign quiet_campaign(std::vector<Session> sessions) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.sessions = std::move(sessions);
+  campaign.scenario.noise.scale = 0.0;
+  for (Dispersion& law : campaign.dispersions) {
+    law = {.law = Law::fixed, .file = {}, .column = {}};
+  }
+  return campaign;
+}
+
+void fix(MicroscopeCampaign& campaign, std::string_view quantity, double value) {
+  const auto at = std::ranges::find(drawn_names(), quantity) - drawn_names().begin();
+  campaign.dispersions.at(static_cast<std::size_t>(at)).value = value;
+}
+
+TestEstimation estimate(const MicroscopeCampaign& campaign, const RunRecord& record,
+                        const ParameterArray& calibration = {}) {
+  const Scenario& scenario = campaign.scenario;
+  const DrawnMoments laws;
+  return estimate_ep_test(record.phasors,
+                          {.sessions = scenario.sessions,
+                           .config = scenario.estimation,
+                           .objectives = scenario.objectives,
+                           .noise = scenario.noise,
+                           .laws = laws,
+                           .orbit_period_s = scenario.orbit.period_s,
+                           .sample_period_s = scenario.simulation.sample_period_s},
+                          Estimation{.values = calibration});
+}
+
+TestEstimation estimate(const MicroscopeCampaign& campaign) {
+  return estimate(campaign, RunPlan(campaign, no_calibration).record(RunIndex{0}, {}));
+}
+
+/// On a circular orbit, where g_x has no line but f_EP, and gradients none but 2 f_EP.
+MicroscopeCampaign circular_campaign() {
+  MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2)});
+  campaign.scenario.orbit.eccentricity = 0.0;
+  return campaign;
+}
+
+/// In phase with g_x, amplitude over amplitude, both without their means: of a measurement that
+/// `value` takes from each sample of the record.
+template <typename Value>
+double in_phase(const MicroscopeCampaign& campaign, const Value& value) {
+  double n = 0.0, g = 0.0, v = 0.0, gg = 0.0, gv = 0.0;
+  const double axis_m = std::cbrt(3.986004418e14 / (f_orb_rad_s * f_orb_rad_s));
+  const auto add = [&](const ObservedSample& sample) {
+    if (sample.index < 0) return;
+    const double radius_m =
+        axis_m * std::cbrt(f_orb_rad_s * f_orb_rad_s / sample.shared.gradient_s2);
+    const double gravity = -sample.shared.gradient_s2 * radius_m * sample.shared.radial_R.x;
+    const double of = value(sample);
+    n += 1.0;
+    g += gravity;
+    v += of;
+    gg += gravity * gravity;
+    gv += gravity * of;
+  };
+  (void)RunPlan(campaign, no_calibration).observe(RunIndex{0}, {}, add);
+  return (gv - g * v / n) / (gg - g * g / n);
+}
+
+double common_x(const ObservedSample& sample) { return sample.signals[index(Signal::common_x)]; }
+double common_y(const ObservedSample& sample) { return sample.signals[index(Signal::common_y)]; }
+
+constexpr std::size_t delta = index(TestParameter::eotvos_parameter);
+constexpr std::size_t delta_x = index(TestParameter::a_c11_delta_x);
+constexpr std::size_t delta_z = index(TestParameter::a_c11_delta_z);
+
+TEST(EpTest, FindsAViolationInEveryPointing) {
+  for (const double spin : {0.0, 4.5, -4.5, 17.5, -17.5}) {
+    MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
+    fix(campaign, "eotvos_parameter.masses_2_1", 1e-14);
+    const TestEstimation found = estimate(campaign);
+    EXPECT_NEAR(found.values[delta], 1e-14, 1e-17) << spin;
+    EXPECT_NEAR(found.values[delta_x], 0.0, 1e-11) << spin;
+    EXPECT_NEAR(found.values[delta_z], 0.0, 1e-11) << spin;
+  }
+}
+
+TEST(EpTest, FindsOffcentringsInEveryPointing) {
+  for (const double spin : {0.0, 4.5, -17.5}) {
+    MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
+    fix(campaign, "offcentring_m.x", 20e-6);
+    fix(campaign, "offcentring_m.z", -10e-6);
+    const TestEstimation found = estimate(campaign);
+    EXPECT_NEAR(found.values[delta], 0.0, 1e-17) << spin;
+    EXPECT_NEAR(found.values[delta_x], 20e-6, 1e-11) << spin;
+    EXPECT_NEAR(found.values[delta_z], -10e-6, 1e-11) << spin;
+  }
+}
+
+TEST(EpTest, JoinsSessionsAndRemovesTheBiasOfEach) {
+  Session locked = test_session("locked", 1, 4.5);
+  locked.drag_free = DragFreeSource::sensor_2;
+  MicroscopeCampaign campaign = quiet_campaign({test_session("inertial", 2), locked});
+  fix(campaign, "eotvos_parameter.masses_2_1", -3e-14);
+  fix(campaign, "read_out_bias_m_s2.sensor_1_x", 1e-8);
+  EXPECT_NEAR(estimate(campaign).values[delta], -3e-14, 3e-17);
+}
+
+// Γ_mes,dx holds a_d11 Γ_mes,cx, so that 2 a_d11 Γ_res,x is taken for δ g.
+TEST(EpTest, HasTheErrorOfAScaleFactorInItsBudget) {
+  MicroscopeCampaign campaign = circular_campaign();
+  fix(campaign, "scale_factor_error.sensor_1_x", 5e-3);
+  fix(campaign, "scale_factor_error.sensor_2_x", -5e-3);
+  const double budget = 2.0 * 5e-3 * in_phase(campaign, common_x);
+  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  EXPECT_GT(std::abs(budget), 1e-16);
+  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
+  EXPECT_NEAR(estimate(campaign, record, record.truth).values[delta], 0.0, 1e-18);
+}
+
+// 2 a_d12 Γ_res,y.
+TEST(EpTest, HasTheErrorOfAMisalignmentInItsBudget) {
+  MicroscopeCampaign campaign = circular_campaign();
+  campaign.scenario.environment.linear_y.orbital = 1e-8;
+  campaign.scenario.environment.linear_y.orbital_phase_rad = 0.0;
+  fix(campaign, "misalignment_rad.sensor_1_z", 1e-3);
+  fix(campaign, "misalignment_rad.sensor_2_z", -1e-3);
+  const double budget = 2.0 * 1e-3 * in_phase(campaign, common_y);
+  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  EXPECT_GT(std::abs(budget), 1e-17);
+  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
+  EXPECT_NEAR(estimate(campaign, record, record.truth).values[delta], 0.0, 1e-18);
+}
+
+// 4 K2c Γ_d Γ_res,x, of a constant Γ_d. a_d11' takes it up.
+TEST(EpTest, HasTheErrorOfAQuadraticFactorInItsBudget) {
+  MicroscopeCampaign campaign = circular_campaign();
+  for (const int sensor : {1, 2}) {
+    fix(campaign, "quadratic_factor_s2_m.sensor_" + std::to_string(sensor) + "_x", 14000.0);
+    fix(campaign, "parasitic_acceleration_m_s2.sensor_" + std::to_string(sensor) + "_x",
+        sensor == 1 ? -1.43e-8 : 1.43e-8);
+  }
+  const double budget = 4.0 * 14000.0 * 1.43e-8 * in_phase(campaign, common_x);
+  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  EXPECT_GT(std::abs(budget), 1e-17);
+  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
+  EXPECT_NEAR(estimate(campaign, record, record.truth).values[delta], 0.0, 1e-18);
+}
+
+// a_c12 T_yy Δy, whose gradient the orbit's eccentricity makes.
+TEST(EpTest, HasTheErrorOfAnOffcentringAcrossInItsBudget) {
+  MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2)});
+  fix(campaign, "offcentring_m.y", 20e-6);
+  for (const int sensor : {1, 2}) {
+    fix(campaign, "misalignment_rad.sensor_" + std::to_string(sensor) + "_z", 2e-3);
+  }
+  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  const double gravity =
+      3.986004418e14 / std::pow(3.986004418e14 / (f_orb_rad_s * f_orb_rad_s), 2.0 / 3.0);
+  const double budget = test_gradient_levels(campaign.scenario).yy * 2e-3 * 20e-6 / gravity;
+  EXPECT_NEAR(std::abs(estimate(campaign, record).values[delta]), budget, 0.01 * budget);
+  EXPECT_NEAR(estimate(campaign, record, record.truth).values[delta], 0.0, 1e-18);
+}
+
+// White noise, from the covariance of windows that overlap by half: its density at a low frequency
+// is that of the samples, and half of it goes where neighbours are half a turn apart.
+TEST(WindowNoise, IsThatOfTheWindowsWeights) {
+  const SensorNoise white{.white_asd = 1e-12};
+  constexpr double period_s = 0.25, window_s = 16 * period_s;
+  std::array<double, 32> weights{};
+  for (std::size_t k = 0; k < 16; ++k) {
+    weights[k] = (static_cast<double>(k) + 0.5) / 256.0;
+    weights[31 - k] = weights[k];
+  }
+  double square = 0.0, neighbour = 0.0;
+  for (std::size_t k = 0; k < 32; ++k) {
+    square += weights[k] * weights[k];
+    if (k < 16) neighbour += weights[k] * weights[k + 16];
+  }
+  const double variance = 0.5 * 1e-24 / (2.0 * period_s);
+  for (const double f : {1e-4, 3.1e-3, 0.05, 0.12}) {
+    const double turn = 2.0 * std::numbers::pi * f * window_s;
+    const double expected = 2.0 * window_s * variance * (square + 2.0 * neighbour * std::cos(turn));
+    EXPECT_NEAR(window_noise_psd(white, f, period_s), expected, 1e-9 * expected) << f;
+  }
+}
+
+/// Random instruments, noise, and the truth as the calibration.
+struct Coverage {
+  double within_95 = 0.0;
+  double rms = 0.0;  ///< Of error over standard error.
+};
+
+std::array<Coverage, num_test_parameters> coverage(double spin, int num_orbits) {
+  constexpr std::uint64_t num_runs = 208;
+  MicroscopeCampaign campaign;
+  campaign.scenario.sessions = {test_session("ep", num_orbits, spin)};
+  const RunPlan plan(campaign, no_calibration);
+  std::array<Coverage, num_test_parameters> found{};
+  for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
+    std::vector<RunRequest> requests;
+    for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
+    for (const RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
+      const TestEstimation test = estimate(campaign, record, record.truth);
+      const std::vector<double> truth =
+          run_truth(campaign.scenario, record.truth, record.eotvos_parameter);
+      for (std::size_t i = 0; i < num_test_parameters; ++i) {
+        const double ratio = (test.values[i] - truth[num_parameters + i]) / test.standard_errors[i];
+        if (std::abs(ratio) < 1.959964) found[i].within_95 += 1.0 / num_runs;
+        found[i].rms += ratio * ratio / num_runs;
+      }
+    }
+  }
+  for (Coverage& of : found) of.rms = std::sqrt(of.rms);
+  return found;
+}
+
+TEST(EpTest, HasHonestStandardErrors) {
+  for (const double spin : {0.0, 17.5}) {
+    const auto found = coverage(spin, 2);
+    for (std::size_t i = 0; i < num_test_parameters; ++i) {
+      // Three binomial deviations; the deviation of the rms is 1/√(2·208).
+      EXPECT_NEAR(found[i].within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin << i;
+      EXPECT_NEAR(found[i].rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin << i;
+    }
+  }
+}
+
+TEST(EpTest, HasTheSameBitsOnEveryInstructionSet) {
+  MicroscopeCampaign campaign;
+  for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
+  campaign.scenario.simulation.sample_period_s = 1.0;
+  campaign.scenario.simulation.settling_s = 400.0;
+  auto& sessions = campaign.scenario.sessions;
+  sessions.insert(sessions.begin(), test_session("first", 1, -4.5));
+  sessions.push_back(test_session("last", 1));
+  campaign.dispersions[index_of_eotvos_parameter].law = Law::uniform;
+  campaign.dispersions[index_of_eotvos_parameter].minimum = -1e-13;
+  campaign.dispersions[index_of_eotvos_parameter].maximum = 1e-13;
+  for (const char* method : {"hardy2013", "joint"}) {
+    for (std::size_t i = 0; i < estimation_methods().size(); ++i) {
+      if (estimation_methods()[i].name == method) {
+        campaign.scenario.estimation.method = static_cast<EstimationMethod>(i + 1);
+      }
+    }
+    campaign.validate();
+    const RunPlan plan(campaign);
+    EXPECT_FALSE(plan.runs_on_devices());
+    std::vector<RunRequest> requests;
+    for (std::uint64_t i = 0; i < 3; ++i) requests.push_back({RunIndex{i}, {}});
+    const std::vector<RunResult> alone = plan.simulate_batch(requests, InstructionSet::scalar);
+    while (requests.size() < batch_lanes) {
+      requests.push_back({RunIndex{requests.size()}, {}});
+    }
+    for (const InstructionSet set : available_instruction_sets()) {
+      if (set == InstructionSet::scalar) continue;
+      for (const std::size_t size : {std::size_t{3}, batch_lanes}) {
+        const auto batch = plan.simulate_batch(std::span(requests).first(size), set);
+        for (std::size_t i = 0; i < alone.size(); ++i) {
+          EXPECT_EQ(batch[i].status, alone[i].status);
+          EXPECT_EQ(batch[i].estimate, alone[i].estimate);
+          EXPECT_EQ(batch[i].standard_error, alone[i].standard_error);
+          EXPECT_EQ(batch[i].correlations, alone[i].correlations);
+        }
+      }
+    }
+    for (const RunResult& result : alone) {
+      EXPECT_EQ(result.estimate.size(), campaign.results().quantities.size());
+      EXPECT_EQ(result.truth.size(), campaign.results().quantities.size());
+      EXPECT_EQ(result.correlations.size(), num_correlations(campaign.results()));
+    }
+  }
+}
+
+// What a calibration estimates does not depend on the tests beside it.
+TEST(EpTest, LeavesTheCalibrationAlone) {
+  MicroscopeCampaign campaign;
+  for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
+  const RunResult without = RunPlan(campaign).simulate(RunIndex{0}, {});
+  campaign.scenario.sessions.insert(campaign.scenario.sessions.begin(), test_session("ep", 1));
+  const RunResult with = RunPlan(campaign).simulate(RunIndex{0}, {});
+  ASSERT_EQ(with.estimate.size(), num_parameters + num_test_parameters);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_EQ(with.estimate[i], without.estimate[i]);
+    EXPECT_EQ(with.truth[i], without.truth[i]);
+  }
+}
+
+}  // namespace
+}  // namespace proofmass
