@@ -41,8 +41,8 @@ std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
   return compare_definitions(*this, *second);
 }
 
-// With the columns of standard errors whatever the method is, as databases of all campaigns had them
-// from the first; where sessions test, of what has them, and the quantities of the test.
+// With the columns of standard errors whatever the method is, as databases of all campaigns had
+// them from the first; where sessions test, of what has them, and the quantities of the test.
 ResultSchema MicroscopeCampaign::results() const {
   const bool has_tests = scenario.has_tests();
   const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;

@@ -14,9 +14,9 @@
 
 namespace proofmass {
 
-/// A campaign of MICROSCOPE, which calibrates and may test the equivalence principle: the scenario that all runs share, and the laws by which
-/// the instrument of each run is drawn. `microscope_model.cpp` defines what derives from other
-/// modules.
+/// A campaign of MICROSCOPE, which calibrates and may test the equivalence principle: the scenario
+/// that all runs share, and the laws by which the instrument of each run is drawn.
+/// `microscope_model.cpp` defines what derives from other modules.
 class MicroscopeCampaign final : public Campaign {
  public:
   MicroscopeCampaign() { name = "hardy2013"; }

@@ -49,8 +49,9 @@ struct Scenario {
 };
 
 /// Calls visit(FieldInfo, value) for every number and choice of the scenario except its sessions,
-/// in file order; for those of a test only if the scenario has_tests(). `Config` is Scenario or const Scenario; the value is a (const) reference to
-/// double, std::int64_t or one of the enumerations above.
+/// in file order; for those of a test only if the scenario has_tests(). `Config` is Scenario or
+/// const Scenario; the value is a (const) reference to double, std::int64_t or one of the
+/// enumerations above.
 template <typename Config, typename Visitor>
 void for_each_field(Config& scenario, Visitor&& visit);
 

@@ -28,17 +28,18 @@ constexpr double centre_offset_max_m = 1e-3;           // Of the centre of mass,
 constexpr double coupling_max_rad = 1e-4;              // η.
 
 /// The parameter that a session of each target helps to find; the two slopes of K2c have one.
-constexpr std::array<Parameter, index(SessionTarget::no_target)> found_parameters{Parameter::a_c11_delta_x,
-                                                                          Parameter::a_c11_delta_z,
-                                                                          Parameter::a_c11_delta_y,
-                                                                          Parameter::a_c12,
-                                                                          Parameter::a_c13,
-                                                                          Parameter::a_d11_prime,
-                                                                          Parameter::a_d12,
-                                                                          Parameter::a_d13,
-                                                                          Parameter::k2d,
-                                                                          Parameter::k2c,
-                                                                          Parameter::k2c};
+constexpr std::array<Parameter, index(SessionTarget::no_target)> found_parameters{
+    Parameter::a_c11_delta_x,
+    Parameter::a_c11_delta_z,
+    Parameter::a_c11_delta_y,
+    Parameter::a_c12,
+    Parameter::a_c13,
+    Parameter::a_d11_prime,
+    Parameter::a_d12,
+    Parameter::a_d13,
+    Parameter::k2d,
+    Parameter::k2c,
+    Parameter::k2c};
 
 Parameter parameter_of(SessionTarget target) { return found_parameters[index(target)]; }
 

@@ -36,8 +36,8 @@ using ParameterArray = std::array<double, num_parameters>;
   return static_cast<std::size_t>(parameter);
 }
 
-/// What the sessions that test the equivalence principle find: in the results of campaigns that have
-/// such sessions these quantities follow the ten.
+/// What the sessions that test the equivalence principle find: in the results of campaigns that
+/// have such sessions these quantities follow the ten.
 enum class TestParameter {
   eotvos_parameter,  ///< δ = m_g2/m_I2 − m_g1/m_I1, 1.
   a_c11_delta_x,     ///< a_c11·Δx by the test's own line at 2 f_EP, m.

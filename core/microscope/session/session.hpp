@@ -192,10 +192,10 @@ struct TargetInfo {
   ExcitationRule excitations;
   Stimulus stimulus;                        ///< Of ExcitationRule::stimulus.
   std::optional<DragFreeSource> drag_free;  ///< What the drag-free loop has to null; none: any.
-  Signal regressor;  ///< What Γ_mes,dx is fitted against, unless no_target or ep_test.
-  Product product;                          ///< What Signal::product is in the session.
-  double scale;                             ///< The target is this times the slope of that fit.
-  SignalSet signals;                        ///< What the correction of Γ_mes,dx needs.
+  Signal regressor;   ///< What Γ_mes,dx is fitted against, unless no_target or ep_test.
+  Product product;    ///< What Signal::product is in the session.
+  double scale;       ///< The target is this times the slope of that fit.
+  SignalSet signals;  ///< What the correction of Γ_mes,dx needs.
 };
 
 /// @pre target is one of the enumerators.

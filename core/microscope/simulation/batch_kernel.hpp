@@ -24,7 +24,7 @@ struct BatchSession {
   std::array<LoopConstants<double>, batch_lanes> constants{};
   std::array<NoiseStates<double>, batch_lanes> noise_states{};
   std::array<double, batch_lanes> eotvos_parameters{};  ///< Read in a test session alone.
-  std::span<double> weights_buffer;  ///< Room for a block of weights.
+  std::span<double> weights_buffer;                     ///< Room for a block of weights.
   /// Called with the number of record samples done, after each block or more often.
   void (*progress)(const void* context, std::size_t num_samples) = nullptr;
   const void* progress_context = nullptr;

@@ -145,8 +145,8 @@ struct Loop {
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
-      Vector3<T> kinematic_S = kinematic_acceleration<masses>(
-          sensor, satellite, shared.mass_motion, shared.second_motion);
+      Vector3<T> kinematic_S = kinematic_acceleration<masses>(sensor, satellite, shared.mass_motion,
+                                                              shared.second_motion);
       if constexpr (Fall::is_active) {
         kinematic_S += violation_acceleration(k, violation.eotvos_parameter, violation.gravity_m_s2,
                                               satellite.radial_S);

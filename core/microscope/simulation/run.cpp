@@ -130,10 +130,10 @@ struct RunPlan::Impl : RunParts {
     Readers readers(*this, i);
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
-    keep(i,
-         {alone.sums, session_health(alone.loop, alone.monitor), alone.further,
-          alone.test.products},
-         record);
+    keep(
+        i,
+        {alone.sums, session_health(alone.loop, alone.monitor), alone.further, alone.test.products},
+        record);
   }
 
   /// A session of a batch, with all that it is computed from.
@@ -223,22 +223,14 @@ struct RunPlan::Impl : RunParts {
     if (method.has_standard_errors) {
       yield.standard_errors.assign(found.standard_errors.begin(), found.standard_errors.end());
     }
-    if (!campaign.scenario.has_tests()) {
-      yield.correlations = pairs(yield.standard_errors.size(), [&](std::size_t i, std::size_t j) {
-        return found.correlations[i][j];
-      });
-      return yield;
+    TestEstimation test;
+    if (campaign.scenario.has_tests()) {
+      test = estimate_ep_test(record.phasors, estimation_input(), found);
+      yield.values.insert(yield.values.end(), test.values.begin(), test.values.end());
+      yield.standard_errors.push_back(test.standard_error);
     }
-    const TestEstimation test = estimate_ep_test(record.phasors, estimation_input(), found);
-    yield.values.insert(yield.values.end(), test.values.begin(), test.values.end());
-    yield.standard_errors.insert(yield.standard_errors.end(), test.standard_errors.begin(),
-                                 test.standard_errors.end());
-    // Those of the test alone, or with the calibration's before them.
-    const std::size_t first = method.has_standard_errors ? 0 : num_parameters;
     yield.correlations = pairs(yield.standard_errors.size(), [&](std::size_t i, std::size_t j) {
-      return i + first < num_parameters && j + first < num_parameters
-                 ? found.correlations[i][j]
-                 : test.correlations[j + first - num_parameters][i + first];
+      return j < num_parameters ? found.correlations[i][j] : test.correlations[i];
     });
     return yield;
   }
@@ -248,7 +240,8 @@ struct RunPlan::Impl : RunParts {
   [[nodiscard]] bool may_be_mixed() const {
     const Scenario& scenario = campaign.scenario;
     const SessionSignals signals(scenario, scenario.sessions[0], orbit, environment);
-    return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 && !scenario.has_tests() &&
+    return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 &&
+           !scenario.has_tests() &&
            std::ranges::all_of(groups, [](const auto& further) { return further.empty(); });
   }
 };

@@ -28,12 +28,12 @@ inline constexpr std::size_t batch_lanes = 16;
 /// the scenario's sessions, in their order.
 struct RunRecord {
   RunIndex run;
-  std::uint32_t num_draws = 0;  ///< Draws taken until one was accepted.
-  bool has_draw = false;        ///< False if none was; then the rest means nothing.
-  ParameterArray truth{};       ///< true_parameters() of the draw, SI.
+  std::uint32_t num_draws = 0;    ///< Draws taken until one was accepted.
+  bool has_draw = false;          ///< False if none was; then the rest means nothing.
+  ParameterArray truth{};         ///< true_parameters() of the draw, SI.
   double eotvos_parameter = 0.0;  ///< δ of the draw.
-  RunPhasors phasors{};         ///< With the lines and signals that the method needs.
-  HealthRecord health{};        ///< For judge_health().
+  RunPhasors phasors{};           ///< With the lines and signals that the method needs.
+  HealthRecord health{};          ///< For judge_health().
 };
 
 /// True value of each quantity of the results: of the ten parameters, and of those of a test if the

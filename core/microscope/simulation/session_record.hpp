@@ -333,10 +333,9 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
     const SharedSample& shared = signals.next();
     for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, test] : groups) {
       if constexpr (Observer::is_active) observer.begin_sample(loop);
-      const auto observation =
-          loop.template advance<kind.masses>(constants, setup.drag_free, setup.attitude, shared,
-                                             noise.next(), k % 4 == 0 ? Watch::yes : Watch::no,
-                                             violation_of<kind>(eotvos_parameter, setup, shared));
+      const auto observation = loop.template advance<kind.masses>(
+          constants, setup.drag_free, setup.attitude, shared, noise.next(),
+          k % 4 == 0 ? Watch::yes : Watch::no, violation_of<kind>(eotvos_parameter, setup, shared));
       if constexpr (Observer::is_active) {
         observer(shared, observation, ground_signals(observation, shared, setup.product));
       }
@@ -374,8 +373,8 @@ template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
   if (setup.test != nullptr) {
-    constexpr SampleKind kind{at_rest, SignalSet::all, false, Monitoring::on, RecordedLines::own,
-                              true};
+    constexpr SampleKind kind{at_rest,        SignalSet::all,     false,
+                              Monitoring::on, RecordedLines::own, true};
     return advance_groups<kind, Signals, Group, Observer>;
   }
   if (!setup.line_readers.empty()) {

@@ -32,11 +32,11 @@ struct TestSetup {
 /// weights.
 template <typename T>
 struct TestSums {
-  std::array<T, num_averaged_signals> plain{};    ///< Of the open block.
-  std::array<T, num_averaged_signals> rising{};   ///< Of the open block, with rising weights.
-  std::array<T, num_averaged_signals> before{};   ///< `rising` of the block before.
-  std::array<T, num_test_products> products{};    ///< Over the windows, as TestProducts.
-  std::size_t num_blocks = 0;                     ///< That ended.
+  std::array<T, num_averaged_signals> plain{};   ///< Of the open block.
+  std::array<T, num_averaged_signals> rising{};  ///< Of the open block, with rising weights.
+  std::array<T, num_averaged_signals> before{};  ///< `rising` of the block before.
+  std::array<T, num_test_products> products{};   ///< Over the windows, as TestProducts.
+  std::size_t num_blocks = 0;                    ///< That ended.
 
   /// Adds the sample `k` of a block.
   PROOFMASS_INLINE void add(const std::array<T, num_averaged_signals>& values, std::size_t k,
@@ -60,7 +60,8 @@ struct TestSums {
   PROOFMASS_INLINE void add_window(const TestSetup& setup) {
     std::array<T, num_test_signals> means;
     for (std::size_t s = 0; s < num_averaged_signals; ++s) {
-      means[s] = T(1.0 / static_cast<double>(test_block_size)) * (before[s] + (plain[s] - rising[s]));
+      means[s] =
+          T(1.0 / static_cast<double>(test_block_size)) * (before[s] + (plain[s] - rising[s]));
     }
     // Of the window's middle.
     const double time =

@@ -140,8 +140,7 @@ TEST_F(BlameTest, ARunThatCrashesAloneOnTwoHostsIsGivenUp) {
   EXPECT_EQ(state.hosts.at({"", "host"}).num_crashes, 0U) << "the run was the cause";
   const Strings events = outbox.take_events();
   EXPECT_EQ(events.at(2), "run_given_up run=0 crashes=4");
-  EXPECT_EQ(events.at(3),
-            "campaign_finished runs=2 given_up=1 duplicates=0 compared=0");
+  EXPECT_EQ(events.at(3), "campaign_finished runs=2 given_up=1 duplicates=0 compared=0");
   outbox.forget();
 }
 

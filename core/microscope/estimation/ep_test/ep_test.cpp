@@ -38,8 +38,8 @@ struct TestRecord {
   Products products;
   double common_mean = 0.0;        ///< Γ_mes,cx, m/s².
   double differential_mean = 0.0;  ///< Γ_mes,dx, m/s².
-  Eigen::Vector3d mean_gradient;   ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
-  Fitted density;                  ///< At the line of each regressor, (m/s²)²/Hz.
+  Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
+  Fitted density;                 ///< At the line of each regressor, (m/s²)²/Hz.
 };
 
 TestRecord test_record(const SessionPhasors& record, const Session& session,
@@ -219,25 +219,19 @@ TestEstimation estimate_ep_test(const RunPhasors& records, const EstimationInput
   const Fitted values = fit.values(calibration.values);
   const auto jacobian = fit.jacobian(calibration.values, input.objectives);
   const auto of_calibration = covariance_of(calibration);
-  Eigen::Matrix<double, num_fitted, num_calibrated + num_fitted> covariance;
-  covariance << jacobian * of_calibration,
-      fit.covariance() + jacobian * of_calibration * jacobian.transpose();
+  constexpr auto eotvos = static_cast<Eigen::Index>(index(TestParameter::eotvos_parameter));
+  const Eigen::RowVectorXd with_calibration = jacobian.row(eotvos) * of_calibration;
 
   TestEstimation result;
   for (std::size_t i = 0; i < num_test_parameters; ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    result.values[i] = values[at];
-    result.standard_errors[i] = std::sqrt(covariance(at, num_calibrated + at));
+    result.values[i] = values[static_cast<Eigen::Index>(i)];
   }
-  for (std::size_t i = 0; i < num_test_parameters; ++i) {
-    for (std::size_t j = 0; j < num_parameters + num_test_parameters; ++j) {
-      const double other = j < num_parameters ? calibration.standard_errors[j]
-                                              : result.standard_errors[j - num_parameters];
-      if (other == 0.0) continue;
-      result.correlations[i][j] =
-          covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
-          (result.standard_errors[i] * other);
-    }
+  result.standard_error =
+      std::sqrt(fit.covariance()(eotvos, eotvos) + with_calibration.dot(jacobian.row(eotvos)));
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    if (calibration.standard_errors[i] == 0.0) continue;
+    result.correlations[i] = with_calibration[static_cast<Eigen::Index>(i)] /
+                             (result.standard_error * calibration.standard_errors[i]);
   }
   return result;
 }

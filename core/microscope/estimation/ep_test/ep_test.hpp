@@ -9,17 +9,15 @@ namespace proofmass {
 /// What the tests of a run find.
 struct TestEstimation {
   TestArray values{};           ///< SI.
-  TestArray standard_errors{};  ///< SI.
-  /// Of each with the ten estimates of the calibration, then with the others of the test.
-  std::array<std::array<double, num_parameters + num_test_parameters>, num_test_parameters>
-      correlations{};
+  double standard_error = 0.0;  ///< Of the Eötvös parameter; nothing bounds what the others lack.
+  ParameterArray correlations{};  ///< Of the Eötvös parameter with the calibration's estimates.
 };
 
 /// Estimates the Eötvös parameter, with a_c11Δx and a_c11Δz, from all sessions of a run that test:
 /// corrects Γ_mes,dx by what the calibration found, then fits it by least squares. README.md has
 /// the equations.
 ///
-/// Standard errors are those of the sensors' noise at the lines, without noise (noise.scale 0) of
+/// The standard error is that of the sensors' noise at the lines, without noise (noise.scale 0) of
 /// scale 1, and of the calibration if this has standard errors.
 ///
 /// @param calibration  The estimates of the same run.

@@ -260,10 +260,9 @@ class JointFit {
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_.unit[i];
     }
-    equations.add(
-        slope,
-        means[index(Signal::differential_x)] - read_out_bias_m_s2_ - constant.value,
-        1.0 / read_out_variance_);
+    equations.add(slope,
+                  means[index(Signal::differential_x)] - read_out_bias_m_s2_ - constant.value,
+                  1.0 / read_out_variance_);
     return equations;
   }
 

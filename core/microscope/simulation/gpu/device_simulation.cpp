@@ -66,7 +66,8 @@ bool can_simulate(const RunParts& parts) {
   const auto is_short = [](const NoiseFilter& filter) {
     return filter.num_real <= num_device_poles_max;
   };
-  return !program().empty() && !parts.campaign.scenario.has_tests() && is_short(parts.noise.linear_x) && is_short(parts.noise.linear_yz) &&
+  return !program().empty() && !parts.campaign.scenario.has_tests() &&
+         is_short(parts.noise.linear_x) && is_short(parts.noise.linear_yz) &&
          is_short(parts.noise.angular) &&
          std::ranges::all_of(parts.groups, [](const auto& further) { return further.empty(); });
 }

@@ -73,17 +73,18 @@ TEST(ValidateSessions, RefusesLinesAndExcitationsOfTests) {
       change(sessions.back());
     });
   };
-  EXPECT_EQ(refusal([](Session& s) { s.fit_lines = {{1, 0}}; }),
+  EXPECT_EQ(refusal([](Session& s) {
+              s.fit_lines = {{1, 0}};
+            }),
             "session[11].fit_lines = 1 lines (target ep_test has lines of its own, f_EP and "
             "2 f_EP: leave this out)");
   EXPECT_THAT(refusal([](Session& s) { s.known_lines = {{1, 0}}; }), HasSubstr("known_lines"));
   EXPECT_THAT(refusal([](Session& s) { s.excitations = hardy2013_sessions()[2].excitations; }),
               HasSubstr("target ep_test needs none"));
   // The frame turns with the Earth's direction.
-  EXPECT_THAT(refusal([](Session& s) {
-                s.spin_rate_rad_s = -2.0 * std::numbers::pi / orbit_period_s;
-              }),
-              HasSubstr("must leave f_EP = |f_orb + f_spin| at 1/(10 orbits) or more"));
+  EXPECT_THAT(
+      refusal([](Session& s) { s.spin_rate_rad_s = -2.0 * std::numbers::pi / orbit_period_s; }),
+      HasSubstr("must leave f_EP = |f_orb + f_spin| at 1/(10 orbits) or more"));
 }
 
 TEST(LineFrequency, AddsMultiplesOfOrbitAndExcitation) {
