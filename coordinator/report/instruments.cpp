@@ -262,7 +262,9 @@ std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) 
                                 statistics.num_not_estimated,
                                 statistics.num_not_estimated == 1 ? "instrument" : "instruments"));
   }
-  notes.emplace_back("from, to: 95 % interval with the instrument as the unit");
+  notes.emplace_back(
+      "from, to: 95 % interval with the instrument as the unit; each holds by itself: of 20, one "
+      "misses the true value");
   notes.emplace_back(
       "noise: no choice of the instruments reduces the runs that a bias needs by more than the "
       "inverse of this share");

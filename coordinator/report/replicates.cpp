@@ -168,6 +168,7 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
                         ? fmt::format(" and others, {} in all", statistics.num_incomplete)
                         : std::string()));
   }
+  notes.emplace_back("each interval holds by itself: of 20, one misses the true value");
   notes.emplace_back("beyond: runs whose error exceeds the objective, or without an estimate");
   if (const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
       statistics.num_estimated < num_runs) {
@@ -215,9 +216,9 @@ Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& sta
               .caption = "95 % intervals from replicates of the design, in the units above",
               .columns = {{"parameter", true, 11},
                           {"from", false, 8, magnitude},
-                          {"to", false, 9, magnitude},
+                          {"to", false, 8, magnitude},
                           {"from", false, 9, bias, true},
-                          {"to", false, 9, bias},
+                          {"to", false, 10, bias},
                           {"from", false, 9, rms, true},
                           {"to", false, 9, rms},
                           {"from", false, 8, beyond, true},

@@ -172,6 +172,11 @@ std::string execution_markup(const Review& review) {
   return html + "</ul>\n";
 }
 
+/// What intervals take for their unit instead of the run.
+std::string groups_heading(const Review& review) {
+  return review.results.replicates ? "Replicates of the design" : "Instruments";
+}
+
 std::vector<Section> sections_of(const Review& review) {
   const ResultSchema& schema = review.schema;
   const CampaignStatistics& statistics = review.results.statistics;
@@ -183,7 +188,7 @@ std::vector<Section> sections_of(const Review& review) {
                table_part(error_table(schema, statistics, review.num_given_up,
                                       review.interpretation, review.why_not_independent))},
           {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
-          {"instruments-section", "Instruments", instruments_markup(review)},
+          {"instruments-section", groups_heading(review), instruments_markup(review)},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
@@ -305,7 +310,7 @@ std::string review_markdown(const Review& review) {
                                        review.interpretation, review.why_not_independent)}) +
       section("Standard errors", {standard_error_table(schema, review.results.standard_errors)}) +
       section(
-          "Instruments",
+          groups_heading(review),
           {variance_table(schema, instruments), instrument_table(schema, instruments),
            replicate_table(schema, review.results.replicates.value_or(ReplicateStatistics{}))}) +
       section("Budget", {review_budget_table(review)}) +

@@ -21,9 +21,17 @@ std::string list_of(const std::vector<std::string>& names) {
   return list;
 }
 
+/// What results are counted in: realisations share a draw.
+std::string_view unit_of(const Review& review) {
+  return review.results.instruments ? "runs" : "draws";
+}
+
 std::string_view be(std::uint64_t count) { return count == 1 ? "is" : "are"; }
 
 std::string question(const Review& review) {
+  if (!review.why_not_independent.empty()) {
+    return "No requirement can be judged by this campaign.";
+  }
   if (review.matrix.empty()) {
     return "No requirement was given and no parameter has an objective: nothing was asked.";
   }
@@ -49,9 +57,9 @@ std::string draws(const Review& review) {
   const std::uint64_t num_done = statistics.num_runs + review.num_given_up;
   const std::uint64_t num_missing = num_done - statistics.num_estimated;
   std::string text = num_done < num_wanted
-                         ? fmt::format("The campaign is not finished: {} of {} draws {} done",
-                                       num_done, num_wanted, be(num_done))
-                         : fmt::format("All {} draws are done", num_wanted);
+                         ? fmt::format("The campaign is not finished: {} of {} {} {} done",
+                                       num_done, num_wanted, unit_of(review), be(num_done))
+                         : fmt::format("All {} {} are done", num_wanted, unit_of(review));
   if (num_missing > 0) {
     text += fmt::format(", {} of them without an estimate ({}), which {} as {}", num_missing,
                         reasons_text(review.missing), num_missing == 1 ? "counts" : "count",
@@ -93,10 +101,17 @@ std::optional<std::size_t> worst_quantity(const Review& review) {
   return worst;
 }
 
-std::string driver_of(const std::optional<Causes>& causes, std::size_t quantity) {
+std::string driver_of(const Review& review, std::size_t quantity) {
+  if (!review.why_not_independent.empty()) {
+    return "what drives it is not sought, as that needs independent draws";
+  }
+  const std::optional<Causes>& causes = review.causes;
   if (!causes) return "what drives it is not known, as fewer than 16 draws have an estimate";
   const auto term = std::ranges::find(causes->terms, quantity, &CauseTerm::quantity);
-  if (term == causes->terms.end()) return "no drawn quantity or product of two explains it";
+  if (term == causes->terms.end()) {
+    return fmt::format("in {} draws no drawn quantity or product of two was found to explain it",
+                       causes->num_runs);
+  }
   return fmt::format("of the variance of this error over the draws, {} % follows from {}",
                      figure_text(100.0 * term->share), term->name);
 }
@@ -114,7 +129,7 @@ SummarySentence worst_error(const Review& review) {
                       quantity.symbol, accuracy.worst_run.value,
                       quantity_text(accuracy.worst, quantity),
                       figure_text(100.0 * accuracy.worst / review.objectives[*worst]) + " %",
-                      driver_of(review.causes, *worst)),
+                      driver_of(review, *worst)),
           review.causes && !review.causes->terms.empty() ? "Causes of the errors" : "Accuracy"};
 }
 
@@ -133,12 +148,12 @@ SummarySentence consequence(const Review& review) {
                     budget, before),
         "Budget"};
   }
-  return {
-      fmt::format("Calibration takes the {} from {} m/s² to at most {} m/s² in half of the "
-                  "draws, {} m/s² in 95 % of them, and {} m/s² in the worst, run {}.",
-                  budget, before, figure_text(totals->median), figure_text(totals->percentile_95),
-                  figure_text(totals->worst), totals->worst_run.value),
-      "Budget"};
+  return {fmt::format("Calibration takes the {} from {} m/s² to at most {} m/s² in half of the "
+                      "{}, {} m/s² in 95 % of them, and {} m/s² in the worst, run {}.",
+                      budget, before, figure_text(totals->median), unit_of(review),
+                      figure_text(totals->percentile_95), figure_text(totals->worst),
+                      totals->worst_run.value),
+          "Budget"};
 }
 
 }  // namespace

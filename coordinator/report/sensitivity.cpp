@@ -107,11 +107,22 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
   return table;
 }
 
+/// What it means that no term was found: the fewer runs, the less.
+std::string not_found_text(const DrawnRuns& drawn) {
+  const double percent = 100.0 * term_share_found(inputs_of(drawn), default_confidence);
+  const std::string text = "No quantity and no product of two was found to explain the error";
+  if (percent >= 100.0) {
+    return fmt::format("{}: {} runs are too few to find any", text, drawn.runs.size());
+  }
+  return fmt::format("{}: {} runs find one that explains {} % of its variance in half of the cases",
+                     text, drawn.runs.size(), measured_figure(percent));
+}
+
 /// The sum of quantities and products of two that explains the error.
 Table term_table(const DrawnRuns& drawn, std::size_t quantity) {
   const std::vector<ExplanatoryTerm> terms = explanatory_terms(
       inputs_of(drawn), drawn.errors[quantity], num_terms_max, default_confidence);
-  if (terms.empty()) return {.notes = {"No quantity and no product of two explains the error."}};
+  if (terms.empty()) return {.notes = {not_found_text(drawn)}};
   Table table{.columns = {{.title = "error as a sum of",
                            .is_text = true,
                            .width = 44,

@@ -28,7 +28,8 @@ std::string Range::rule() const {
 
 void check_field(const FieldInfo& field, double value) {
   if (field.range.contains(value)) return;
-  throw ConfigError(field.path, fmt::format("{}", value), field.range.rule());
+  throw ConfigError(field.path, fmt::format("{}", value),
+                    std::isfinite(value) ? field.range.rule() : "must be finite");
 }
 
 }  // namespace proofmass

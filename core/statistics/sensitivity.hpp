@@ -85,6 +85,13 @@ struct ExplanatoryTerm {
                                                              Column output, std::size_t num_max,
                                                              double confidence);
 
+/// The share of an output's variance that a term has to explain to be found by explanatory_terms()
+/// in half of all samples of this size: z²/n, where the normal law exceeds z with the probability
+/// that a candidate is kept at, as the statistic of a term with the correlation r is about r√n.
+///
+/// @return At least term_share_min; above 1 if no term would be found so often.
+[[nodiscard]] double term_share_found(std::span<const Column> inputs, double confidence);
+
 /// Smallest share of the variance that a term must explain.
 inline constexpr double term_share_min = 0.01;
 

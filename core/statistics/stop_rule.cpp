@@ -34,7 +34,10 @@ void read_statistic(detail::Phrase& phrase, StopRule& rule) {
     rule.statistic = StopRule::Statistic::percentile;
     rule.level = *percent / 100.0;
   } else {
-    phrase.refuse(fmt::format("{} is no statistic; they are mean, std and p1 to p99", name));
+    phrase.refuse(
+        fmt::format("{} is no statistic; they are mean, std and p1 to p99. A requirement "
+                    "is waited for as: REQUIREMENT decided",
+                    name));
   }
 }
 

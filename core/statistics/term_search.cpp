@@ -69,6 +69,16 @@ void remove(Column column, Values& values) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] -= factor * column[i];
 }
 
+bool varies(Column column) {
+  return !std::ranges::all_of(column, [&](double value) { return value == column.front(); });
+}
+
+/// Inputs and products of two of so many.
+double num_terms_of(std::size_t num_inputs) {
+  const auto n = static_cast<double>(num_inputs);
+  return n + 0.5 * n * (n + 1.0);
+}
+
 /// An input, or a product of two.
 struct Candidate {
   std::size_t first = 0;
@@ -83,9 +93,7 @@ class TermSearch {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       const double largest = std::abs(
           *std::ranges::max_element(inputs[i], {}, [](double value) { return std::abs(value); }));
-      if (std::ranges::all_of(inputs[i], [&](double one) { return one == inputs[i].front(); })) {
-        continue;
-      }
+      if (!varies(inputs[i])) continue;
       // Products of values in units of the largest one stay within the range of a double.
       Values scaled(inputs[i].begin(), inputs[i].end());
       for (double& value : scaled) value /= largest;
@@ -108,10 +116,7 @@ class TermSearch {
   }
 
  private:
-  [[nodiscard]] double num_candidates() const {
-    const auto n = static_cast<double>(columns_.size());
-    return n + 0.5 * n * (n + 1.0);
-  }
+  [[nodiscard]] double num_candidates() const { return num_terms_of(columns_.size()); }
 
   [[nodiscard]] Values values_of(const Candidate& candidate) const {
     Values values = columns_[candidate.first];
@@ -244,6 +249,15 @@ std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs, C
     detail::check_values("input", input, sensitivity_values_min);
   }
   return TermSearch(inputs, output).run(num_max, 1.0 - confidence);
+}
+
+double term_share_found(std::span<const Column> inputs, double confidence) {
+  detail::check_fraction("confidence", confidence);
+  const auto num_inputs = static_cast<std::size_t>(std::ranges::count_if(inputs, varies));
+  if (num_inputs == 0) return 1.0;
+  const double significance = (1.0 - confidence) / num_terms_of(num_inputs);
+  const double square = chi_square_quantile(1.0 - significance, 1.0);  // Of a normal deviate.
+  return std::max(square / static_cast<double>(inputs.front().size()), term_share_min);
 }
 
 }  // namespace proofmass

@@ -123,8 +123,9 @@ Table bound_table(const Planned& plan) {
                           given_figure(objective / scale), measured_figure(sigma / scale),
                           measured_figure(objective / sigma), percent_text(plan.bound.misses[i])});
   }
-  table.remarks.push_back({fmt::format("all objectives hold in {} % of the runs",
-                                       percent_text(plan.bound.misses_any))});
+  table.remarks.push_back(
+      {fmt::format("all objectives hold in {} % of the runs, if estimated by the method {}",
+                   percent_text(plan.bound.misses_any), plan.method)});
   if (plan.bound.mean_budget) {
     table.remarks.push_back(
         {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});

@@ -191,8 +191,9 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
   const Store store = store_with(100);
   Review review = review_of(store, 100);
   review.causes = Causes{};
-  EXPECT_THAT(sentences_of(review)[3],
-              HasSubstr("; no drawn quantity or product of two explains it."));
+  EXPECT_THAT(
+      sentences_of(review)[3],
+      HasSubstr("; in 0 draws no drawn quantity or product of two was found to explain it."));
   review.causes->terms = {{.quantity = 0, .name = "true a × b", .slope = 1.0, .share = 0.982},
                           {.quantity = 0, .name = "c", .slope = 1.0, .share = 0.01}};
   EXPECT_THAT(sentences_of(review)[3],
