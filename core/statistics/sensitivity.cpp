@@ -26,10 +26,6 @@ std::size_t num_bins_for(std::size_t num_values) {
   return std::clamp(root / 2, std::size_t{4}, std::size_t{64});
 }
 
-bool varies(Column column) {
-  return std::ranges::any_of(column, [&](double value) { return value != column.front(); });
-}
-
 /// Subtracts the mean; the second round takes what the first mean lacked for its rounding.
 void centre(std::span<double> values) {
   for (int round = 0; round < 2; ++round) {
@@ -149,7 +145,7 @@ std::vector<Ranks> ranks_of_all(std::span<const Column> outputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     detail::check_same_size("output", outputs[i], outputs.front());
     detail::check_values("output", outputs[i], sensitivity_values_min);
-    if (varies(outputs[i])) ranks[i] = ranks_of(outputs[i]);
+    if (detail::varies(outputs[i])) ranks[i] = ranks_of(outputs[i]);
   }
   return ranks;
 }
@@ -181,7 +177,7 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     detail::check_same_size("input", inputs[i], outputs.front());
     detail::check_values("input", inputs[i], sensitivity_values_min);
-    if (!varies(inputs[i])) continue;
+    if (!detail::varies(inputs[i])) continue;
     const std::vector<std::size_t> order = ascending_order(inputs[i]);
     const std::vector<double> ranks = average_ranks(inputs[i]);
     for (std::size_t j = 0; j < outputs.size(); ++j) {

@@ -69,10 +69,6 @@ void remove(Column column, Values& values) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] -= factor * column[i];
 }
 
-bool varies(Column column) {
-  return !std::ranges::all_of(column, [&](double value) { return value == column.front(); });
-}
-
 /// Inputs and products of two of so many.
 double num_terms_of(std::size_t num_inputs) {
   const auto n = static_cast<double>(num_inputs);
@@ -93,7 +89,7 @@ class TermSearch {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       const double largest = std::abs(
           *std::ranges::max_element(inputs[i], {}, [](double value) { return std::abs(value); }));
-      if (!varies(inputs[i])) continue;
+      if (!detail::varies(inputs[i])) continue;
       // Products of values in units of the largest one stay within the range of a double.
       Values scaled(inputs[i].begin(), inputs[i].end());
       for (double& value : scaled) value /= largest;
@@ -253,7 +249,7 @@ std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs, C
 
 double term_share_found(std::span<const Column> inputs, double confidence) {
   detail::check_fraction("confidence", confidence);
-  const auto num_inputs = static_cast<std::size_t>(std::ranges::count_if(inputs, varies));
+  const auto num_inputs = static_cast<std::size_t>(std::ranges::count_if(inputs, detail::varies));
   if (num_inputs == 0) return 1.0;
   const double significance = (1.0 - confidence) / num_terms_of(num_inputs);
   const double square = chi_square_quantile(1.0 - significance, 1.0);  // Of a normal deviate.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.hpp"
@@ -24,6 +25,10 @@ void check_same_size(std::string_view name, std::span<const double> values,
   if (values.size() == others.size()) return;
   throw InvalidArgument(fmt::format("{} = {} values (must be as many as the others, {})", name,
                                     values.size(), others.size()));
+}
+
+bool varies(std::span<const double> values) {
+  return std::ranges::any_of(values, [&](double value) { return value != values.front(); });
 }
 
 void check_fraction(std::string_view name, double value) {

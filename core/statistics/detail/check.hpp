@@ -14,6 +14,10 @@ void check_values(std::string_view name, std::span<const double> values, std::si
 void check_same_size(std::string_view name, std::span<const double> values,
                      std::span<const double> others);
 
+/// True if not all values are the same.
+/// @pre There is one.
+[[nodiscard]] bool varies(std::span<const double> values);
+
 /// @throws InvalidArgument unless 0 < value < 1; for levels and confidences.
 void check_fraction(std::string_view name, double value);
 
