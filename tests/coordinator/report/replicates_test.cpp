@@ -113,7 +113,7 @@ TEST(Replicates, CountRunsWithoutAnEstimateAsBeyondEveryObjective) {
   EXPECT_NEAR(statistics.within_objectives.mean, 7.0 / 8.0, 1e-12);
   EXPECT_NEAR(statistics.quantities.front().beyond.mean, 1.0 / 8.0, 1e-12);
   EXPECT_FALSE(statistics.quantities.front().covered);
-  EXPECT_THAT(terminal_text(replicate_table(statistics)),
+  EXPECT_THAT(terminal_text(replicate_table(test::schema(), statistics)),
               HasSubstr("1 run without an estimate is left out of the means of its replicate\n"));
   const double objective = test::campaign_of(1).objectives().front();
   EXPECT_NEAR(statistics.quantities.front().bias.mean / objective, 0.5 * (1.0 / 3.0), 1e-12);

@@ -58,14 +58,26 @@ TEST(RunResult, HasTheCountsThatItsStatusAllows) {
   EXPECT_EQ(broken(RunStatus::no_draw, 1000, 0), "");
 }
 
+Quantity quantity_of(std::string name, bool has_standard_error = false) {
+  Quantity quantity;
+  quantity.name = std::move(name);
+  quantity.has_standard_error = has_standard_error;
+  return quantity;
+}
+
+HealthQuantity health_of(std::string name) {
+  HealthQuantity quantity;
+  quantity.name = std::move(name);
+  return quantity;
+}
+
 /// The first rule about sizes that a result of two quantities, one with a standard error, breaks.
 std::string broken_size(const std::function<void(RunResult&)>& change) {
-  const ResultSchema schema{
-      .quantities = {{.name = "gain", .has_standard_error = true}, {.name = "offset"}},
-      .health = {{.name = "peak"}},
-      .loss_causes = {"saturation"},
-      .loss_sessions = {"first", "second"},
-      .fit = {{.name = "chi_squared"}}};
+  const ResultSchema schema{.quantities = {quantity_of("gain", true), quantity_of("offset")},
+                            .health = {health_of("peak")},
+                            .loss_causes = {"saturation"},
+                            .loss_sessions = {"first", "second"},
+                            .fit = {health_of("chi_squared")}};
   RunResult result{.run = {0},
                    .truth = {1.0, 2.0},
                    .estimate = {1.5, 2.5},
@@ -113,7 +125,7 @@ TEST(ResultSchema, HasTheQuantityInTheMiddleAsAnExample) {
   for (const std::size_t num_quantities : {1U, 2U, 3U, 10U}) {
     ResultSchema schema;
     for (std::size_t i = 0; i < num_quantities; ++i) {
-      schema.quantities.push_back({.name = std::string(i + 1, 'a')});
+      schema.quantities.push_back(quantity_of(std::string(i + 1, 'a')));
     }
     EXPECT_EQ(example_quantity(schema).name, schema.quantities[(num_quantities - 1) / 2].name);
   }
