@@ -94,6 +94,7 @@ Budget ErrorBudget::before(double level_of_runs) const {
 
 Budget ErrorBudget::after(std::span<const double> errors, double level_of_runs) const {
   return budget_of(*this, level_of_runs, [errors](const BudgetTerm& term) {
+    PROOFMASS_EXPECT(errors.size() == term.coefficients.size());
     return std::inner_product(errors.begin(), errors.end(), term.coefficients.begin(), 0.0);
   });
 }

@@ -163,11 +163,14 @@ ErrorBudget microscope_budget(const Scenario& scenario, const DispersionSet& dis
                      .level_label = "Γ_res",
                      .assumed_level = residual,
                      .note = test_note(scenario)};
+  // What the tests of a run find enters no budget: that of the calibration is for them.
+  const std::size_t num_quantities =
+      num_parameters + (scenario.has_tests() ? num_test_parameters : 0);
   using Factors = std::initializer_list<std::pair<Parameter, double>>;
   const auto add = [&](double before, const Factors& factors, bool follows_level = false) {
     BudgetTerm term{.info = infos[budget.terms.size()],
                     .before = before,
-                    .coefficients = std::vector<double>(num_parameters),
+                    .coefficients = std::vector<double>(num_quantities),
                     .follows_level = follows_level};
     for (const auto& [parameter, factor] : factors) term.coefficients[index(parameter)] = factor;
     budget.terms.push_back(std::move(term));

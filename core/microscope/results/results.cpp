@@ -54,8 +54,8 @@ ResultSchema make_schema() {
 const std::array<Quantity, num_test_parameters>& test_quantities() {
   static const std::array<Quantity, num_test_parameters> quantities{{
       {"eotvos_parameter", "", "δ", "1", 1e-15, "1e-15", 1e-15, {}, true},
-      {"test_a_c11_delta_x", "_m", "a_c11·Δx, test", "m", 1e-9, "nm", 0.1e-6},
-      {"test_a_c11_delta_z", "_m", "a_c11·Δz, test", "m", 1e-9, "nm", 0.1e-6},
+      {"test_a_c11_delta_x", "_m", "Δx, test", "m", 1e-9, "nm", 0.1e-6},
+      {"test_a_c11_delta_z", "_m", "Δz, test", "m", 1e-9, "nm", 0.1e-6},
   }};
   return quantities;
 }

@@ -63,7 +63,7 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
     auto& of_groups = group_weights.emplace_back();
     for (const LineGroup& group : groups.back()) of_groups.emplace_back(group.fit);
-    if (!session.excitations.empty() || is_monitored_before(i)) continue;
+    if (is_test(session) || !session.excitations.empty() || is_monitored_before(i)) continue;
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
 }
