@@ -35,8 +35,8 @@ void read_statistic(detail::Phrase& phrase, StopRule& rule) {
     rule.level = *percent / 100.0;
   } else {
     phrase.refuse(
-        fmt::format("{} is no statistic; they are mean, std and p1 to p99. A requirement "
-                    "is waited for as: REQUIREMENT decided",
+        fmt::format("{} is no statistic; they are mean, std and p1 to p99, and a requirement "
+                    "ends with \"decided\"",
                     name));
   }
 }

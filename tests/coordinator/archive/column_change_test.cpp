@@ -27,6 +27,7 @@ const std::map<std::string, std::string> unheld{
     {"worker.host", "told by the worker alone"},
     {"worker.process_id", "told by the worker alone"},
     {"worker.num_slots", "told by the worker alone"},
+    {"worker.cards", "told by the worker alone"},
     {"worker.first_seen_utc", "a time of the wall clock"},
     {"worker.ended_utc", "a time of the wall clock"},
     {"worker.end_reason", "told by the coordinator of the time alone"},
