@@ -166,7 +166,7 @@ TEST_F(ResultTest, LastOneEndsTheCampaignAndWorkersForgetIt) {
   (void)outbox.take_sent<proto::ResultAck>(first);
   EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
   EXPECT_EQ(outbox.take_events(),
-            Strings{"campaign_finished runs=10 given_up=0 duplicates=0 compared=0 mismatches=0"});
+            Strings{"campaign_finished runs=10 given_up=0 duplicates=0 compared=0"});
 }
 
 TEST_F(ResultTest, ThatCannotBeStoredStopsTheLendingUntilItIs) {

@@ -5,6 +5,7 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
@@ -15,6 +16,7 @@ DrawnRuns made_up_runs() {
   std::mt19937_64 bits(5);
   DrawnRuns drawn;
   drawn.names.assign(drawn_names().begin(), drawn_names().end());
+  drawn.quantities = test::schema().quantities;
   drawn.columns.resize(num_drawn);
   drawn.errors.resize(num_parameters);
   for (std::uint64_t run = 0; run < 1000; ++run) {

@@ -177,7 +177,7 @@ TEST(ValidateSessions, WantsAnExcitationThatCanBeSeen) {
   };
   EXPECT_EQ(with_amplitude(0.0), "session[2].excitations[0].amplitude_rad = 0 (must be > 0)");
   EXPECT_EQ(with_amplitude(std::numeric_limits<double>::infinity()),
-            "session[2].excitations[0].amplitude_rad = inf (must be > 0)");
+            "session[2].excitations[0].amplitude_rad = inf (must be finite)");
   EXPECT_EQ(refusal_after([](Sessions& s) { s[at_delta_y].excitations[0].frequency_hz = 1.01; }),
             "session[2].excitations[0].frequency_hz = 1.01 (must be in (0, 1])");
   EXPECT_EQ(refusal_after([](Sessions& s) { s[at_delta_y].excitations[0].frequency_hz = 0.0; }),
