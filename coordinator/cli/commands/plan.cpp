@@ -298,7 +298,7 @@ void add_plan(CLI::App& app, Command& chosen) {
   CLI::Option* const optimise =
       command.add_option("--optimise", options.new_file,
                          "Allocate the time to the sessions as is best, and\nwrite the new "
-                         "campaign file; Ctrl-C ends the search\nwith the best found so far");
+                         "campaign file; Ctrl-C ends\nthe search with the best found so far");
   optimise->type_name(campaign_file_type);
   const std::string steps(model().step_name());
   command
