@@ -25,8 +25,9 @@ struct Measured {};
 /// numbers and 90 bytes for how and by whom it was computed. Measured with 25 numbers a run.
 double database_mb(const ResultSchema& schema, std::uint64_t num_runs) {
   constexpr double empty_size = 170e3, number_size = 8.0, further_size = 90.0;
-  // Truth and estimate of each quantity.
-  const auto num_numbers = static_cast<double>(2 * schema.quantities.size() + schema.health.size());
+  // Truth and estimate of each quantity; where each session has a fit, each estimate has an error.
+  const auto num_numbers = static_cast<double>(2 * schema.quantities.size() + schema.health.size() +
+                                               2 * schema.fit_parts.size());
   const double run_size = number_size * num_numbers + further_size;
   return (empty_size + run_size * static_cast<double>(num_runs)) / 1e6;
 }

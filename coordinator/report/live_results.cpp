@@ -54,10 +54,11 @@ std::string LiveResults::html() const {
   StandardErrorStatistics errors = standard_errors_.statistics();
   if (!are_draws_independent_) leave_out_intervals(errors);
   const Table of_errors = standard_error_table(schema_, errors);
+  const Table of_fit = fit_table(schema_, errors.fit);
   return "<h3>Accuracy so far</h3>\n" +
          html_table(accuracy_table(schema_, objectives_, review.results.statistics)) +
          (of_errors.rows.empty() ? "" : html_table(of_errors)) +
-         "<h3>Errors so far</h3>\n<figure>\n" +
+         (of_fit.rows.empty() ? "" : html_table(of_fit)) + "<h3>Errors so far</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }
 

@@ -28,7 +28,8 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
         interval_table(schema, statistics, num_given_up),
         error_table(schema, statistics, num_given_up, campaign.interpretation(),
                     why_not_independent(campaign)),
-        standard_error_table(schema, results.standard_errors), variance_table(schema, instruments),
+        standard_error_table(schema, results.standard_errors),
+        fit_table(schema, results.standard_errors.fit), variance_table(schema, instruments),
         instrument_table(schema, instruments),
         replicate_table(schema, results.replicates.value_or(ReplicateStatistics{})),
         budget_table(schema, campaign.error_budget(), statistics, results.totals)}) {

@@ -132,7 +132,7 @@ Json warnings_of(const ResultSchema& schema, const CampaignWarnings& warnings) {
 /// Null without standard errors.
 Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return nullptr;
-  Json json{{"parameters", Json::array()}, {"fit", Json::object()}};
+  Json json{{"parameters", Json::array()}, {"fit", Json::array()}};
   for (const StandardErrorStatistic& of : statistics.quantities) {
     json["parameters"].push_back({{"parameter", schema.quantities[of.quantity].name},
                                   {"num_runs", of.num_runs},
@@ -142,8 +142,12 @@ Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistic
                                   {"num_within_95", of.num_within},
                                   {"fraction_within_95_interval", bounds_of(of.within)}});
   }
-  for (std::size_t i = 0; i < statistics.fit.size(); ++i) {
-    json["fit"]["mean_" + schema.fit[i].column()] = statistics.fit[i];
+  for (const FitStatistic& of : statistics.fit) {
+    json["fit"].push_back({{"session", of.session},
+                           {"mean_chi_squared", of.chi_squared},
+                           {"mean_degrees_of_freedom", of.degrees_of_freedom},
+                           {"ratio_standard_error", or_null(of.ratio_error)},
+                           {"p_value", or_null(of.p_value)}});
   }
   return json;
 }

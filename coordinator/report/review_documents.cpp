@@ -111,7 +111,8 @@ std::string standard_errors_markup(const Review& review) {
   const StandardErrorStatistics& statistics = review.results.standard_errors;
   const std::optional<ChartGrid> pulls = pull_overview(review.schema, statistics);
   if (!pulls) return "";
-  return flow(table_part(standard_error_table(review.schema, statistics)) + figure_of(*pulls));
+  return flow(table_part(standard_error_table(review.schema, statistics)) +
+              table_part(fit_table(review.schema, statistics.fit)) + figure_of(*pulls));
 }
 
 std::string instruments_markup(const Review& review) {
@@ -308,7 +309,8 @@ std::string review_markdown(const Review& review) {
                            interval_table(schema, statistics, review.num_given_up),
                            error_table(schema, statistics, review.num_given_up,
                                        review.interpretation, review.why_not_independent)}) +
-      section("Standard errors", {standard_error_table(schema, review.results.standard_errors)}) +
+      section("Standard errors", {standard_error_table(schema, review.results.standard_errors),
+                                  fit_table(schema, review.results.standard_errors.fit)}) +
       section(
           groups_heading(review),
           {variance_table(schema, instruments), instrument_table(schema, instruments),

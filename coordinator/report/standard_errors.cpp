@@ -18,16 +18,6 @@ double share_within(const StandardErrorStatistic& statistic) {
   return static_cast<double>(statistic.num_within) / static_cast<double>(statistic.num_runs);
 }
 
-/// `the fits have a mean chi_squared of 36.4, degrees_of_freedom 36.2`; empty without any.
-std::string fit_sentence(const ResultSchema& schema, const std::vector<double>& fit) {
-  std::string text;
-  for (std::size_t i = 0; i < fit.size(); ++i) {
-    text += fmt::format("{}{} {}", text.empty() ? "means of the fits: " : ", ",
-                        schema.fit[i].column(), figure_text(fit[i]));
-  }
-  return text;
-}
-
 Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statistic, bool is_first) {
   const Histogram& histogram = statistic.pulls;
   Bars bars{.edges = histogram.edges};
@@ -56,9 +46,10 @@ void leave_out_intervals(StandardErrorStatistics& statistics) {
     statistic.squared_ratio_error.reset();
     statistic.within.reset();
   }
+  leave_out_intervals(statistics.fit);
 }
 
-RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema) {
+RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema) : fit_(schema) {
   for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
     if (schema.quantities[i].has_standard_error) indices_.push_back(i);
   }
@@ -79,8 +70,7 @@ void RunningStandardErrors::add(const RunResult& result) {
     if (std::abs(error) < normal_95 * sigma) ++sums.num_within;
     if (sigma > 0.0 && is_in_range(error / sigma)) sums.pulls.add(error / sigma);
   }
-  fit_.resize(result.fit.size());
-  for (std::size_t i = 0; i < fit_.size(); ++i) fit_[i] += result.fit[i];
+  fit_.add(result);
 }
 
 StandardErrorStatistics RunningStandardErrors::statistics() const {
@@ -102,7 +92,7 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
              probability_interval(static_cast<double>(sums.num_within), n, default_confidence),
          .pulls = sums.pulls.histogram()});
   }
-  for (const double sum : fit_) statistics.fit.push_back(sum / n);
+  statistics.fit = fit_.statistics();
   return statistics;
 }
 
@@ -142,7 +132,6 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
     if (have_intervals) add_ends(statistic.within, 0.01, row);
     table.rows.push_back(std::move(row));
   }
-  if (!statistics.fit.empty()) table.notes.push_back(fit_sentence(schema, statistics.fit));
   return table;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
+#include "coordinator/report/fit.hpp"
 #include "coordinator/report/histogram.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/run_result.hpp"
@@ -33,7 +34,7 @@ inline constexpr double normal_95 = 1.96;
 
 struct StandardErrorStatistics {
   std::vector<StandardErrorStatistic> quantities;  ///< None if no run has standard errors.
-  std::vector<double> fit;                         ///< Means of the fit quantities of these runs.
+  std::vector<FitStatistic> fit;                   ///< Of these runs.
 };
 
 /// Intervals and the standard error of the ratio, for draws that are not independent.
@@ -59,7 +60,7 @@ class RunningStandardErrors {
   std::vector<std::size_t> indices_;  ///< Of the quantities that have a standard error.
   std::uint64_t num_runs_ = 0;
   std::vector<Sums> quantities_;  ///< Of these.
-  std::vector<double> fit_;
+  RunningFit fit_;
 };
 
 /// No rows without standard errors; no columns of intervals if no quantity has one.

@@ -66,8 +66,13 @@ struct ResultSchema {
   /// level.
   std::vector<std::string_view> budget_terms = {};
   std::size_t budget_level = 0;
-  /// How well estimates that have standard errors fit what was measured.
+  /// How well estimates that have standard errors fit what was measured: χ² and its degrees of
+  /// freedom, of all data and then of each of `fit_parts`; or nothing.
   std::vector<HealthQuantity> fit = {};
+  std::vector<std::string> fit_parts = {};  ///< Names of the sessions that have their own: `a_c12`.
+  /// By so much, relative, χ² may be off in the mean although the noise is what the method takes
+  /// it for.
+  double fit_tolerance = 0.0;
 };
 
 /// Quantities that have a standard error.

@@ -1,6 +1,5 @@
-#include <fmt/format.h>
-
 #include <array>
+#include <charconv>
 #include <memory>
 #include <span>
 #include <string>
@@ -41,9 +40,11 @@ std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
   return compare_definitions(*this, *second);
 }
 
-// With the columns of standard errors whatever the method is, as databases of all campaigns had
-// them from the first; where sessions test, of what has them, and the quantities of the test.
-ResultSchema MicroscopeCampaign::results() const {
+namespace {
+
+/// With the columns of standard errors whatever the method is, as databases of all campaigns had
+/// them from the first; where sessions test, of what has them, and the quantities of the test.
+ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
   const bool has_tests = scenario.has_tests();
   const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
   ResultSchema schema =
@@ -54,8 +55,13 @@ ResultSchema MicroscopeCampaign::results() const {
   }
   for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
   schema.budget_level = budget_level();
+  if (has_errors && has_session_fits) add_session_fits(scenario.sessions, schema);
   return schema;
 }
+
+}  // namespace
+
+ResultSchema MicroscopeCampaign::results() const { return scenario_results(scenario, true); }
 
 std::vector<double> MicroscopeCampaign::objectives() const {
   std::vector<double> objectives(scenario.objectives.begin(), scenario.objectives.end());
@@ -114,6 +120,27 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   return drawn;
 }
 
+/// Whether results have χ² of each session: from hardy2013-6 on.
+bool has_session_fits(std::string_view version) {
+  constexpr std::string_view name = "hardy2013-";
+  constexpr int first = 6;
+  if (!version.starts_with(name)) return false;
+  int number = 0;
+  const char* const end = version.data() + version.size();
+  const auto [stop, error] = std::from_chars(version.data() + name.size(), end, number);
+  return error == std::errc() && stop == end && number >= first;
+}
+
+/// What a stored definition says of the results. Where it cannot be read, that of the nominal
+/// campaign: the database of which it is has other faults to report.
+Scenario recorded_scenario(std::string_view definition) {
+  try {
+    return recorded_campaign(definition).scenario;
+  } catch (const Error&) {
+    return hardy2013_campaign().scenario;
+  }
+}
+
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -122,21 +149,9 @@ class MicroscopeModel final : public Model {
     return "Validates the in-flight calibration of drag-free accelerometers.";
   }
 
-  /// Of a canonical text: the quantities depend on whether it tests, and then on its method.
   [[nodiscard]] ResultSchema results_of(std::string_view definition,
-                                        std::string_view /*version*/) const override {
-    MicroscopeCampaign campaign = hardy2013_campaign();
-    if (definition.find("\ntarget = \"ep_test\"\n") == std::string_view::npos) {
-      return campaign.results();
-    }
-    campaign.scenario.sessions.front().target = SessionTarget::ep_test;
-    const auto methods = estimation_methods();
-    for (std::size_t i = 0; i < methods.size(); ++i) {
-      const std::string line = fmt::format("\nmethod = \"{}\"\n", methods[i].name);
-      if (definition.find(line) == std::string_view::npos) continue;
-      campaign.scenario.estimation.method = static_cast<EstimationMethod>(i + 1);
-    }
-    return campaign.results();
+                                        std::string_view version) const override {
+    return scenario_results(recorded_scenario(definition), has_session_fits(version));
   }
 
   [[nodiscard]] std::span<const DataTableSchema> tables() const override {

@@ -80,8 +80,12 @@ void ResultBatches::add(CampaignId campaign, Attempt attempt, const ComputedRun&
   proto::ResultBatch& batch = open_[{campaign, attempt}];
   batch.set_campaign(campaign.value);
   batch.set_attempt(attempt.value);
-  write_run(computed, *batch.add_results());
-  if (batch.results_size() < static_cast<int>(runs_per_lease_max)) return;
+  proto::ComputedRun& run = *batch.add_results();
+  write_run(computed, run);
+  // Results of one campaign are about as large as each other; half of a message is left for that.
+  const std::size_t count_max = std::clamp(message_size_max / 2 / run.ByteSizeLong(),
+                                           std::size_t{1}, std::size_t{runs_per_lease_max});
+  if (static_cast<std::size_t>(batch.results_size()) < count_max) return;
   full_.push_back(std::move(batch));
   open_.erase({campaign, attempt});
 }

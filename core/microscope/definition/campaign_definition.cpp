@@ -294,6 +294,15 @@ Definition definition_of(const MicroscopeCampaign& campaign, TableColumns column
   return definition;
 }
 
+MicroscopeCampaign recorded_campaign(std::string_view text) {
+  Document document("definition", text, {});
+  MicroscopeCampaign campaign = read_definition(document);
+  const Scenario& scenario = campaign.scenario;
+  validate_sessions(scenario.sessions, scenario.orbit.period_s,
+                    scenario.simulation.sample_period_s);
+  return campaign;
+}
+
 MicroscopeCampaign campaign_of(Definition definition, TableColumns columns,
                                std::string_view source) {
   if (columns == TableColumns::left_out && !definition.table_columns.empty()) {

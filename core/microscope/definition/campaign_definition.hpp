@@ -46,6 +46,11 @@ class Document;
 [[nodiscard]] Definition definition_of(const MicroscopeCampaign& campaign,
                                        TableColumns columns = TableColumns::included);
 
+/// The campaign of a stored definition without its data files, as far as its results depend on it:
+/// its sessions are valid, and all else is what can be read.
+/// @throws DefinitionError or ConfigError if its sessions are not.
+[[nodiscard]] MicroscopeCampaign recorded_campaign(std::string_view text);
+
 /// The campaign of a definition that another program sent.
 ///
 /// @param definition  Anything at all. Time and memory are in proportion to its size.

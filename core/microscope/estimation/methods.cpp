@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <span>
+#include <string>
 
 #include "core/error.hpp"
 #include "core/microscope/estimation/hardy2013/hardy2013.hpp"
@@ -23,6 +25,16 @@ constexpr std::array<std::string_view, methods.size()> method_names = [] {
   return names;
 }();
 
+// The densities that the weights are made of are within 0.15 dB of those of the noise filters.
+constexpr double fit_tolerance = 0.035;
+
+std::string in_small_letters(std::string text) {
+  for (char& letter : text) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return text;
+}
+
 }  // namespace
 
 const EstimationMethodInfo& estimation_method(EstimationMethod method) {
@@ -38,7 +50,20 @@ ResultSchema results_of(std::span<const EstimationMethodInfo> possible) {
   if (std::ranges::none_of(possible, &EstimationMethodInfo::has_standard_errors)) return schema;
   for (Quantity& quantity : schema.quantities) quantity.has_standard_error = true;
   schema.fit = {{"chi_squared", "", "1"}, {"degrees_of_freedom", "", "1"}};
+  schema.fit_tolerance = fit_tolerance;
   return schema;
+}
+
+void add_session_fits(const std::vector<Session>& sessions, ResultSchema& schema) {
+  std::set<std::string> taken;
+  for (const Session& session : sessions) {
+    // Names of sessions may differ in case alone, and names of columns may not.
+    std::string name = session.name;
+    while (!taken.insert(in_small_letters(name)).second) name += '_';
+    schema.fit_parts.push_back(session.name);
+    schema.fit.push_back({"chi_squared_" + name, "", "1"});
+    schema.fit.push_back({"degrees_of_freedom_" + name, "", "1"});
+  }
 }
 
 std::span<const std::string_view> names_of(Correction) {

@@ -94,6 +94,10 @@ struct EstimationMethodInfo {
 /// have none.
 [[nodiscard]] ResultSchema results_of(std::span<const EstimationMethodInfo> methods);
 
+/// Adds χ² and degrees of freedom of each session, `chi_squared_a_c12` and
+/// `degrees_of_freedom_a_c12`, as RunResult::fit has them for methods with standard errors.
+void add_session_fits(const std::vector<Session>& sessions, ResultSchema& schema);
+
 /// The method that a scenario names.
 /// @pre Scenario::validate() passed.
 [[nodiscard]] const EstimationMethodInfo& estimation_method(EstimationMethod method);

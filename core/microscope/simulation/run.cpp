@@ -87,6 +87,7 @@ std::vector<double> run_truth(const Scenario& scenario, const ParameterArray& tr
   for (const Parameter delta : {Parameter::a_c11_delta_x, Parameter::a_c11_delta_z}) {
     values.push_back(truth[index(delta)]);
   }
+  values.push_back(eotvos_parameter);
   return values;
 }
 
@@ -392,8 +393,11 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   if (has_errors) {
     result.fit = {0.0, 0.0};
     for (const SessionFit& session : found.session_fits) {
+      // A session whose data are all adapted to has none left, but for rounding.
+      const double freedom = std::max(session.degrees_of_freedom, 0.0);
       result.fit[0] += session.chi_squared;
-      result.fit[1] += session.degrees_of_freedom;
+      result.fit[1] += freedom;
+      result.fit.insert(result.fit.end(), {session.chi_squared, freedom});
     }
   }
   return result;

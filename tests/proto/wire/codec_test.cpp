@@ -225,6 +225,19 @@ TEST(Codec, HasRoomForTheLargestLeaseAndBatch) {
   (void)round_trip(make_result_batch({~0ULL}, {~0U}, results));
 }
 
+// Results with many numbers are sent in more batches: 16,000 numbers a run are 128 kB, and half a
+// message holds 16 of them.
+TEST(ResultBatches, AreSmallerWhereResultsAreLarge) {
+  ComputedRun run{.result = some_result({1}, RunStatus::completed), .compute_s = 0.1};
+  run.result.fit.assign(16000, 1.0);
+  ResultBatches batches;
+  for (int i = 0; i < 40; ++i) batches.add({1}, {1}, run);
+  const std::vector<proto::ResultBatch> taken = batches.take();
+  ASSERT_EQ(taken.size(), 3U);
+  EXPECT_EQ(taken[0].results_size(), 16);
+  EXPECT_LT(taken[0].ByteSizeLong(), message_size_max);
+}
+
 std::string encoded_part() {
   const EncodedDefinition definition(definition_of(unusual_campaign()));
   return encoded(definition.part({6}, 0));

@@ -2,6 +2,9 @@
 
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "core/model.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -47,6 +50,28 @@ TEST(MicroscopeCampaign, IsInterpretedByWhatDiffersFromRunToRun) {
   EXPECT_EQ(campaign.interpretation(), Interpretation::temporal);
   campaign.scenario.noise.scale = 0.0;
   EXPECT_EQ(campaign.interpretation(), Interpretation::ensemble);
+}
+
+// Databases of former versions have χ² of all data alone, and go on being read.
+TEST(MicroscopeCampaign, HasAFitOfEachSessionSinceTheSixthVersion) {
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  EXPECT_EQ(campaign.results().fit.size(), 2U);
+  campaign.scenario.estimation.method = EstimationMethod::joint;
+  campaign.scenario.sessions[3].name = "A_C12";
+  campaign.scenario.sessions[4].name = "a_c12";
+  const std::string definition = canonical_definition(campaign);
+  const ResultSchema schema = model().results_of(definition, model_version);
+  ASSERT_EQ(schema.fit_parts.size(), campaign.scenario.sessions.size());
+  EXPECT_EQ(schema.fit_parts[3], "A_C12");
+  ASSERT_EQ(schema.fit.size(), 2 + 2 * schema.fit_parts.size());
+  EXPECT_EQ(schema.fit[8].name, "chi_squared_A_C12");
+  EXPECT_EQ(schema.fit[10].name, "chi_squared_a_c12_");  // Names of columns have no case.
+  EXPECT_EQ(schema.fit[11].name, "degrees_of_freedom_a_c12_");
+  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-6x", "other-7", ""}) {
+    EXPECT_EQ(model().results_of(definition, version).fit.size(), 2U) << version;
+  }
+  EXPECT_EQ(model().results_of(definition, "hardy2013-10").fit.size(), schema.fit.size());
+  EXPECT_EQ(model().results_of("[[session", model_version).fit.size(), 2U);
 }
 
 TEST(MicroscopeCampaign, RefusesABadName) {

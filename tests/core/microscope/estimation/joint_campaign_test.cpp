@@ -100,8 +100,9 @@ TEST(JointCampaign, IsNotMovedByARotationAtTwiceTheFrequencyOfAMass) {
 
 // A mean of n squares of standard normal numbers scatters by √(2/n). Five of that for each
 // parameter, in 48 draws, tell a standard error that is wrong by half; χ² of all sessions, 3000
-// degrees of freedom, one that is wrong by a tenth. 4 % are left to the filters of the noise, which
-// keep within 0.15 dB of the density that the weights are made of.
+// degrees of freedom, one that is wrong by a tenth, and that of a session, 300, by half. 4 % are
+// left to the filters of the noise, which keep within 0.15 dB of the density that the weights are
+// made of.
 TEST(JointCampaign, HasHonestStandardErrors) {
   constexpr std::uint64_t num_runs = 48;
   MicroscopeCampaign campaign;
@@ -123,15 +124,22 @@ TEST(JointCampaign, HasHonestStandardErrors) {
     EXPECT_GT(squares / variance, 0.4) << name;  // χ² of 48 is below that in 1 of 1e5.
     EXPECT_LE(std::abs(errors), 5.0 * std::sqrt(variance / static_cast<double>(num_runs))) << name;
   }
-  double chi_squared = 0.0, freedom = 0.0;
+  std::vector<SessionFit> sessions(campaign.scenario.sessions.size());
+  SessionFit all;
   for (const Outcome& run : runs) {
     EXPECT_TRUE(run.found.converged);
-    for (const SessionFit& fit : run.found.session_fits) {
-      chi_squared += fit.chi_squared;
-      freedom += fit.degrees_of_freedom;
+    for (std::size_t i = 0; i < sessions.size(); ++i) {
+      for (SessionFit* const sum : {&sessions[i], &all}) {
+        sum->chi_squared += run.found.session_fits[i].chi_squared;
+        sum->degrees_of_freedom += run.found.session_fits[i].degrees_of_freedom;
+      }
     }
   }
-  EXPECT_NEAR(chi_squared / freedom, 1.0, 5.0 * std::sqrt(2.0 / freedom) + 0.04);
+  sessions.push_back(all);
+  for (const SessionFit& fit : sessions) {
+    const double freedom = fit.degrees_of_freedom;
+    EXPECT_NEAR(fit.chi_squared / freedom, 1.0, 5.0 * std::sqrt(2.0 / freedom) + 0.04) << freedom;
+  }
 }
 
 Dispersion normal_law(Law law, double mean, double deviation) {

@@ -129,7 +129,7 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
   const RunResult result = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(result.status, RunStatus::completed);
   EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3e-9));
-  EXPECT_EQ(result.fit, (std::vector<double>{3.75, 4.0}));
+  EXPECT_EQ(result.fit, (std::vector<double>{3.75, 4.0, 1.25, 1.5, 2.5, 2.5}));
   ASSERT_EQ(result.correlations.size(), num_correlations(results_of(std::array{method})));
   EXPECT_EQ(result.correlations[9], 0.123457);  // Of the second with the third.
   campaign.scenario.estimation.convergence = 0.7;
