@@ -155,7 +155,7 @@ void visit_tables(Config& scenario, Visitor& visit) {
     visit(FieldInfo{objective_path(i), "Largest acceptable |error|.", range::positive},
           scenario.objectives[i]);
   }
-  for (std::size_t i = 0; scenario.has_tests() && i < num_test_parameters; ++i) {
+  for (std::size_t i = 0; scenario.has_tests() && i < num_test_objectives; ++i) {
     visit(FieldInfo{test_objective_path(i), "Largest acceptable |error|.", range::positive},
           scenario.test_objectives[i]);
   }

@@ -57,7 +57,7 @@ class Comparison {
           "environment.file"};
       return std::ranges::find(left_out, entry.path) != left_out.end();
     });
-    for (std::size_t i = 0; !with_tests && i < num_test_parameters; ++i) {
+    for (std::size_t i = 0; !with_tests && i < num_test_objectives; ++i) {
       std::erase_if(entries,
                     [&](const Entry& entry) { return entry.path == test_objective_path(i); });
     }

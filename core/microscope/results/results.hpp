@@ -42,9 +42,12 @@ enum class TestParameter {
   eotvos_parameter,  ///< δ = m_g2/m_I2 − m_g1/m_I1, 1.
   a_c11_delta_x,     ///< a_c11·Δx by the test's own line at 2 f_EP, m.
   a_c11_delta_z,     ///< a_c11·Δz by that line, m.
+  uncorrected,       ///< δ of the same tests without any calibration, 1.
 };
 
-inline constexpr std::size_t num_test_parameters = 3;
+inline constexpr std::size_t num_test_parameters = 4;
+/// The first that many have an objective. That of the fourth shows what the calibration is worth.
+inline constexpr std::size_t num_test_objectives = 3;
 
 /// One value for each, indexed by `index(parameter)`.
 using TestArray = std::array<double, num_test_parameters>;
@@ -62,7 +65,7 @@ inline constexpr std::uint32_t num_draws_max = 1000;
 /// be lost.
 [[nodiscard]] const ResultSchema& microscope_results();
 
-/// The quantities of a test, in enumeration order, each with a standard error.
+/// The quantities of a test, in enumeration order; the first has a standard error.
 [[nodiscard]] const std::array<Quantity, num_test_parameters>& test_quantities();
 
 }  // namespace proofmass

@@ -16,7 +16,7 @@ namespace {
 using enum TestSignal;
 
 constexpr auto num_averaged = static_cast<Eigen::Index>(num_averaged_signals);
-constexpr auto num_fitted = static_cast<Eigen::Index>(num_test_parameters);
+constexpr Eigen::Index num_fitted = 3;
 constexpr auto num_calibrated = static_cast<Eigen::Index>(num_parameters);
 constexpr auto num_powers = static_cast<Eigen::Index>(num_test_signals - num_averaged_signals);
 
@@ -29,9 +29,8 @@ using FittedMatrix = Eigen::Matrix<double, num_fitted, num_fitted>;
 
 Eigen::Index row(TestSignal signal) { return static_cast<Eigen::Index>(index(signal)); }
 
-/// What each parameter of the test multiplies, in the order of TestParameter; half of it.
-constexpr std::array<TestSignal, num_test_parameters> regressors{gravity_x, gradient_xx,
-                                                                 gradient_xz};
+/// What each fitted parameter of the test multiplies, in the order of TestParameter; half of it.
+constexpr std::array<TestSignal, num_fitted> regressors{gravity_x, gradient_xx, gradient_xz};
 
 /// A session that tests.
 struct TestRecord {
@@ -223,9 +222,10 @@ TestEstimation estimate_ep_test(const RunPhasors& records, const EstimationInput
   const Eigen::RowVectorXd with_calibration = jacobian.row(eotvos) * of_calibration;
 
   TestEstimation result;
-  for (std::size_t i = 0; i < num_test_parameters; ++i) {
+  for (std::size_t i = 0; i < regressors.size(); ++i) {
     result.values[i] = values[static_cast<Eigen::Index>(i)];
   }
+  result.values[index(TestParameter::uncorrected)] = fit.values({})[eotvos];
   result.standard_error =
       std::sqrt(fit.covariance()(eotvos, eotvos) + with_calibration.dot(jacobian.row(eotvos)));
   for (std::size_t i = 0; i < num_parameters; ++i) {
