@@ -68,6 +68,14 @@ bool have_same_draw(std::span<const CommonQuantity> common, const RunResult& fir
   });
 }
 
+/// What the other side has of a run with an estimate.
+enum class Partner : std::uint8_t { none, without_estimate, with_estimate };
+
+Partner partner_of(const RunResult* other) {
+  if (other == nullptr) return Partner::none;
+  return other->is_completed() ? Partner::with_estimate : Partner::without_estimate;
+}
+
 /// Errors of some parameters in the runs of one side that have an estimate.
 class SideErrors {
  public:
@@ -75,32 +83,34 @@ class SideErrors {
   SideErrors(std::span<const CommonQuantity> parameters, std::size_t CommonQuantity::*place)
       : parameters_(parameters), place_(place), columns_(parameters.size()) {}
 
-  /// @param has_pair  Whether the other side has an estimate of the run as well.
-  void add(const RunResult& result, bool has_pair) {
+  void add(const RunResult& result, Partner partner) {
     for (std::size_t i = 0; i < columns_.size(); ++i) {
       columns_[i].push_back(result.error(parameters_[i].*place_));
     }
-    have_pairs_.push_back(has_pair);
+    partners_.push_back(partner);
   }
-  void keep_pairs() {
-    for (std::vector<double>& errors : columns_) {
-      std::size_t num_kept = 0;
-      for (std::size_t i = 0; i < errors.size(); ++i) {
-        if (have_pairs_[i]) errors[num_kept++] = errors[i];
-      }
-      errors.resize(num_kept);
-    }
+  [[nodiscard]] std::size_t count(Partner partner) const {
+    return static_cast<std::size_t>(std::ranges::count(partners_, partner));
   }
+  [[nodiscard]] std::size_t size() const { return partners_.size(); }
   [[nodiscard]] const std::vector<double>& of(std::size_t i) const { return columns_[i]; }
+  /// Those of the runs of which the other side has this.
+  [[nodiscard]] std::vector<double> of(std::size_t i, Partner partner) const {
+    std::vector<double> errors;
+    for (std::size_t k = 0; k < size(); ++k) {
+      if (partners_[k] == partner) errors.push_back(columns_[i][k]);
+    }
+    return errors;
+  }
 
  private:
   std::span<const CommonQuantity> parameters_;
   std::size_t CommonQuantity::*place_;
   std::vector<std::vector<double>> columns_;
-  std::vector<bool> have_pairs_;
+  std::vector<Partner> partners_;
 };
 
-/// Reads the errors that are compared, and sets why they are not those of pairs.
+/// Reads the errors that are compared, and sets how many there are and why they are not paired.
 void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
                  std::span<const CommonQuantity> common, CampaignComparison& comparison,
                  SideErrors& of_first, SideErrors& of_second) {
@@ -113,16 +123,19 @@ void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
         why = fmt::format("the draws of run {} differ", a->run.value);
       }
     }
-    const bool has_first = a != nullptr && a->is_completed();
-    const bool has_second = b != nullptr && b->is_completed();
-    if (has_first) of_first.add(*a, has_second);
-    if (has_second) of_second.add(*b, has_first);
+    if (a != nullptr && a->is_completed()) of_first.add(*a, partner_of(b));
+    if (b != nullptr && b->is_completed()) of_second.add(*b, partner_of(a));
   });
   if (why.empty() && !has_common_run) why = "no run is finished in both";
   comparison.why_unpaired = why;
+  comparison.num_first = of_first.size();
+  comparison.num_second = of_second.size();
   if (!comparison.is_paired()) return;
-  of_first.keep_pairs();
-  of_second.keep_pairs();
+  comparison.num_pairs = of_first.count(Partner::with_estimate);
+  const std::size_t a = of_first.count(Partner::none), b = of_second.count(Partner::none);
+  const bool are_many = std::max(a, b) >= std::max(comparison.num_pairs, std::size_t{2});
+  if (!are_many || std::min(of_first.size(), of_second.size()) < 2) return;
+  (a > b ? comparison.num_tested_first : comparison.num_tested_second) = std::max(a, b);
 }
 
 ComparedAccuracy accuracy_of(std::span<const double> errors, double limit) {
@@ -139,25 +152,48 @@ ComparedAccuracy accuracy_of(std::span<const double> errors, double limit) {
   return accuracy;
 }
 
-/// @param num_quantities  That are compared.
-void compare_parameter(const std::vector<double>& first, const std::vector<double>& second,
-                       bool is_paired, std::size_t num_quantities, ParameterComparison& parameter) {
+/// The p-values of two tests together, of which the smaller may be chosen.
+ChangePValues smaller_of(const ChangePValues& a, const ChangePValues& b) {
+  const auto smaller = [](double x, double y) { return std::min(2.0 * std::min(x, y), 1.0); };
+  return {.location = smaller(a.location, b.location),
+          .scale = smaller(a.scale, b.scale),
+          .tail = smaller(a.tail, b.tail)};
+}
+
+/// Compares parameter i of both sides.
+void compare_parameter(const CampaignComparison& comparison, const SideErrors& of_first,
+                       const SideErrors& of_second, std::size_t i, ParameterComparison& parameter) {
+  const std::vector<double>& first = of_first.of(i);
+  const std::vector<double>& second = of_second.of(i);
   const double limit = tail_limit(first, second);
   parameter.first = accuracy_of(first, limit);
   parameter.second = accuracy_of(second, limit);
   parameter.tail_limit = limit;
-  if (is_paired) {
-    std::vector<double> differences(first.size());
-    std::ranges::transform(second, first, differences.begin(), std::minus<>());
-    parameter.bias_interval = mean_interval(moments(differences), default_confidence);
-    parameter.smallest_scale_factor = smallest_paired_scale_factor(first, second, num_quantities);
-    parameter.p_values = compare_paired_errors(first, second);
-  } else {
-    parameter.bias_interval =
-        compare_means(moments(first), moments(second), default_confidence).interval;
+  const std::size_t num_quantities = comparison.parameters.size();
+  if (!comparison.is_paired()) {
+    const UnpairedComparison means =
+        compare_means(moments(first), moments(second), default_confidence);
+    parameter.bias_change = means.mean_difference;
+    parameter.bias_interval = means.interval;
     parameter.smallest_scale_factor = smallest_scale_factor(first, second, num_quantities);
     parameter.p_values = compare_errors(first, second);
+    return;
   }
+  const std::vector<double> a = of_first.of(i, Partner::with_estimate);
+  const std::vector<double> b = of_second.of(i, Partner::with_estimate);
+  std::vector<double> differences(a.size());
+  std::ranges::transform(b, a, differences.begin(), std::minus<>());
+  parameter.bias_change = moments(differences).mean;
+  parameter.bias_interval = mean_interval(moments(differences), default_confidence);
+  parameter.p_values = compare_paired_errors(a, b);
+  const bool tests_first = comparison.num_tested_first > 0;
+  const bool tests_others = tests_first || comparison.num_tested_second > 0;
+  parameter.smallest_scale_factor =
+      smallest_paired_scale_factor(a, b, tests_others ? 2 * num_quantities : num_quantities);
+  if (!tests_others) return;
+  parameter.p_values = smaller_of(
+      parameter.p_values, tests_first ? compare_errors(of_first.of(i, Partner::none), second)
+                                      : compare_errors(first, of_second.of(i, Partner::none)));
 }
 
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
@@ -173,10 +209,12 @@ std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
 
 std::string why_not_compared(const ComparedCampaign& first, const ComparedCampaign& second,
                              const CampaignComparison& comparison) {
-  const std::size_t num_needed = comparison.is_paired() ? 1 : 2;
-  if (std::min(comparison.num_first, comparison.num_second) < num_needed) {
-    return fmt::format("{} and {} runs with an estimate (must be at least {})",
-                       comparison.num_first, comparison.num_second, num_needed);
+  if (comparison.is_paired() && comparison.num_pairs == 0) {
+    return "no run has an estimate in both";
+  }
+  if (!comparison.is_paired() && std::min(comparison.num_first, comparison.num_second) < 2) {
+    return fmt::format("{} and {} runs with an estimate (must be at least 2)", comparison.num_first,
+                       comparison.num_second);
   }
   const std::string why = why_not_independent(*first.campaign);
   return why.empty() ? why_not_independent(*second.campaign) : why;
@@ -207,6 +245,7 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
                      .num_runs = store.num_runs(),
                      .statistics = std::move(checked.results.statistics),
                      .digest = checked.results.digests.results,
+                     .why_not_independent = why_not_independent(*campaign),
                      .missing = missing,
                      .quantities = store.schema().quantities,
                      .objectives = campaign->objectives(),
@@ -238,13 +277,10 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
     SideErrors of_first(some, &CommonQuantity::in_first);
     SideErrors of_second(some, &CommonQuantity::in_second);
     read_errors(first, second, common, comparison, of_first, of_second);
-    comparison.num_first = of_first.of(0).size();
-    comparison.num_second = of_second.of(0).size();
     comparison.why_not_compared = why_not_compared(first, second, comparison);
     if (!comparison.why_not_compared.empty()) return comparison;
     for (std::size_t i = 0; i < some.size(); ++i) {
-      compare_parameter(of_first.of(i), of_second.of(i), comparison.is_paired(), common.size(),
-                        comparison.parameters[begin + i]);
+      compare_parameter(comparison, of_first, of_second, i, comparison.parameters[begin + i]);
     }
   }
   return comparison;

@@ -37,7 +37,7 @@ struct ComparedCampaign {
   std::function<ResultStream()> open_results;
 };
 
-/// estimate − truth of one parameter over the runs of one side that are compared, SI.
+/// estimate − truth of one parameter over all runs of one side with an estimate, SI.
 struct ComparedAccuracy {
   double bias = 0.0;                ///< Mean of estimate − truth.
   double standard_deviation = 0.0;  ///< Of estimate − truth, with n − 1; 0 for a single run.
@@ -51,7 +51,8 @@ struct ParameterComparison {
   Quantity quantity;  ///< As the first campaign has it.
   ComparedAccuracy first;
   ComparedAccuracy second;
-  std::optional<Interval> bias_interval;  ///< Of second bias − first; empty if nothing varies.
+  double bias_change = 0.0;  ///< Second bias − first: of the pairs, if there are any.
+  std::optional<Interval> bias_interval;  ///< Of bias_change; empty if nothing varies.
   double tail_limit = 0.0;                ///< tail_limit() of both campaigns, SI.
   /// See smallest_scale_factor(); empty below num_welch_min runs unless runs are paired.
   std::optional<double> smallest_scale_factor;
@@ -66,8 +67,11 @@ struct CampaignComparison {
   std::vector<DefinitionDifference> differences;
   /// Why the draws are not the same, run by run; empty if they are, and pairs are compared.
   std::string why_unpaired;
-  std::size_t num_first = 0;   ///< Runs of the first campaign that are compared.
-  std::size_t num_second = 0;  ///< Runs of the second campaign; num_first if paired.
+  std::size_t num_first = 0;   ///< Runs of the first campaign with an estimate.
+  std::size_t num_second = 0;  ///< Runs of the second campaign with an estimate.
+  std::size_t num_pairs = 0;   ///< Runs with an estimate in both; 0 unless paired.
+  /// Runs that the other campaign has not computed, and that are tested beside the pairs.
+  std::size_t num_tested_first = 0, num_tested_second = 0;
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
   /// Of each quantity that both campaigns have, in the order of the first.
@@ -76,10 +80,14 @@ struct CampaignComparison {
   [[nodiscard]] bool is_paired() const { return why_unpaired.empty(); }
 };
 
-/// Compares the quantities that both campaigns have, in the runs with an estimate: those that both
-/// have, run by run, if their seed and the truths of these quantities in all common runs agree to
-/// the last bit, and else all of each. P-values are of compare_paired_errors() for pairs, else of
-/// compare_errors(); intervals are of 95 %.
+/// Compares the quantities that both campaigns have, in the runs with an estimate: run by run, if
+/// their seed and the truths of these quantities in all common runs agree to the last bit, and else
+/// all of each. P-values are of compare_paired_errors() for pairs, else of compare_errors();
+/// intervals are of 95 %.
+///
+/// Runs that only one campaign has computed are held against all runs of the other by
+/// compare_errors() if they are as many as the pairs. They share no draw with these, so that twice
+/// the smaller p-value holds for both tests together.
 ///
 /// Keeps the errors of as many parameters at a time as some 128 MB hold, of one at least: up to
 /// 800,000 runs in both together each file is read once.
@@ -95,7 +103,8 @@ struct ComparedMember {
   std::filesystem::path file;
   std::uint64_t num_runs = 0;  ///< Wanted.
   CampaignStatistics statistics;
-  std::string digest;        ///< Of the results.
+  std::string digest;               ///< Of the results.
+  std::string why_not_independent;  ///< Of its draws, see why_not_independent().
   MissingEstimates missing;  ///< Finished and given-up runs without an estimate: perhaps its worst.
   std::vector<Quantity> quantities;  ///< Of its results.
   std::vector<double> objectives;    ///< Of each quantity, SI; infinite if there is none.

@@ -72,11 +72,27 @@ Table definition_table(std::span<const ComparedMember> members, const MemberName
   return table;
 }
 
-std::string how_compared(const CampaignComparison& comparison) {
+std::string how_compared(const ComparedMember& member, const ComparedMember& first) {
+  const CampaignComparison& comparison = *member.comparison;
   if (!comparison.why_not_compared.empty()) return "not at all";
+  if (!member.digest.empty() && member.digest == first.digest) return "identical results";
   if (!comparison.is_paired()) return "as a whole, as " + comparison.why_unpaired;
-  return fmt::format("run by run, {} {} of the same draws", comparison.num_first,
-                     comparison.num_first == 1 ? "run" : "runs");
+  return fmt::format("run by run, {} {} of the same draws", comparison.num_pairs,
+                     comparison.num_pairs == 1 ? "run" : "runs");
+}
+
+/// Says what becomes of the runs of a campaign that have no pair in the other.
+/// @param num_tested  Of them.
+void add_unpaired(std::size_t num_unpaired, std::size_t num_tested, std::string_view name,
+                  std::string_view other, Table& table) {
+  if (num_unpaired == 0) return;
+  table.notes.push_back(fmt::format(
+      "{} runs of {} have no estimate in {}: they count in bias, std and tail, not in change; {}",
+      num_unpaired, name, other,
+      num_tested == 0 ? "they are in no test"
+                      : fmt::format("the {} that {} has not computed are tested as a whole, and p "
+                                    "is twice the smaller of both tests",
+                                    num_tested, other)));
 }
 
 /// Names the quantities that only one of two campaigns has, which are not compared.
@@ -102,10 +118,17 @@ Table campaign_table(std::span<const ComparedMember> members, const MemberNames&
     const ComparedMember& member = members[i];
     table.rows.push_back({names.names[i], member.file.string(),
                           std::to_string(member.statistics.num_estimated),
-                          member.comparison ? how_compared(*member.comparison) : ""});
+                          member.comparison ? how_compared(member, members.front()) : ""});
     if (member.comparison && !member.comparison->why_not_compared.empty()) {
       table.notes.push_back(fmt::format("{} cannot be compared: {}", names.names[i],
                                         member.comparison->why_not_compared));
+    }
+    if (member.comparison && member.comparison->num_pairs > 0) {
+      const CampaignComparison& of = *member.comparison;
+      const std::string& first = names.names.front();
+      add_unpaired(of.num_first - of.num_pairs, of.num_tested_first, first, names.names[i], table);
+      add_unpaired(of.num_second - of.num_pairs, of.num_tested_second, names.names[i], first,
+                   table);
     }
     add_own_quantities(members.front(), member, names.names.front(), names.names[i], table);
     if (member.missing.total() == 0) continue;
@@ -160,36 +183,6 @@ std::vector<Quantity> all_quantities(std::span<const ComparedMember> members) {
   return all;
 }
 
-/// The tests of bias, scatter and tail.
-struct TestNames {
-  std::string_view bias, scatter, tail;
-};
-
-TestNames tests_of(const CampaignComparison& comparison) {
-  constexpr std::string_view ranks = "Wilcoxon's signed ranks";
-  constexpr std::string_view larger = "larger of Welch's and Smirnov's test";
-  constexpr std::string_view exact = "Fisher's exact test";
-  if (comparison.is_paired()) return {ranks, ranks, "sign test"};
-  const bool are_few = std::min(comparison.num_first, comparison.num_second) < num_welch_min;
-  return are_few ? TestNames{larger, larger, exact} : TestNames{"Welch's t", "Welch's t", exact};
-}
-
-/// The names of one of the tests, with the campaigns if they are not all tested by the same.
-std::string test_text(std::span<const ComparedMember> members, const MemberNames& names,
-                      std::string_view TestNames::*test) {
-  std::vector<Shared> all;
-  for (std::size_t i = 1; i < members.size(); ++i) {
-    if (!has_changes(members[i])) continue;
-    share(all, std::string(tests_of(*members[i].comparison).*test), names.names[i]);
-  }
-  if (all.size() == 1) return all.front().first;
-  std::string text;
-  for (const auto& [name, of] : all) {
-    text += fmt::format("{}{} of {}", text.empty() ? "" : ", ", name, fmt::join(of, " "));
-  }
-  return text;
-}
-
 /// The p-value, and a mark if it is significant.
 void add_p(double p_value, Row& row) {
   row.emplace_back(measured_figure(p_value));
@@ -235,7 +228,7 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
     row.emplace_back(accuracy == nullptr ? "-" : figure_with_sign(accuracy->bias / scale));
     if (member == 0 || accuracy == nullptr) return;
     const ParameterComparison& change = *change_in(members[member], quantity.name);
-    row.emplace_back(figure_with_sign((change.second.bias - change.first.bias) / scale));
+    row.emplace_back(figure_with_sign(change.bias_change / scale));
     const auto& interval = change.bias_interval;
     row.emplace_back(interval ? figure_with_sign(interval->lower / scale) : "-");
     row.emplace_back(interval ? figure_with_sign(interval->upper / scale) : "-");
@@ -249,9 +242,10 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
                           {"p", false, 9},
                           {"", true, 2}},
                          add_cells);
-  table.notes.push_back(fmt::format("from, to: 95 % interval of the change from {}; p: {}",
-                                    names.names.front(),
-                                    test_text(members, names, &TestNames::bias)));
+  table.notes.push_back(fmt::format(
+      "from, to: 95 % interval of the change from {}; p: Wilcoxon's signed ranks of pairs; "
+      "as a whole Welch's t, of fewer than {} runs the larger of it and Smirnov's",
+      names.names.front(), num_welch_min));
   return table;
 }
 
@@ -284,11 +278,13 @@ Table scatter_table(std::span<const ComparedMember> members, const MemberNames& 
        {"", true, 2}},
       add_cells);
   table.notes = {
-      fmt::format("p: {} of distances from the mean; found: the smallest change of the scatter "
-                  "that this finds in {:.0f} % of such campaigns",
-                  test_text(members, names, &TestNames::scatter), 100.0 * finding_probability),
-      fmt::format("tail: beyond twice the root mean square of {} and the campaign, p: {}", first,
-                  test_text(members, names, &TestNames::tail)),
+      fmt::format(
+          "p: the tests of the bias, of distances from the mean; found: the smallest change of "
+          "the scatter that this finds in {:.0f} % of such campaigns",
+          100.0 * finding_probability),
+      fmt::format("tail: beyond twice the root mean square of {} and the campaign, p: sign test of "
+                  "pairs; as a whole Fisher's exact test",
+                  first),
       fmt::format("All p are adjusted for three tests of all parameters of all campaigns (Holm); "
                   "*: below {:.2f}",
                   significance)};

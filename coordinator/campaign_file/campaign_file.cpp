@@ -5,7 +5,6 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <set>
 #include <system_error>
 #include <utility>
 
@@ -37,12 +36,6 @@ std::vector<Assignment> assignments_of(const Overrides& overrides) {
   }
   if (overrides.seed) {
     assignments.push_back(count_assignment("--seed", "campaign.seed", *overrides.seed));
-  }
-  std::set<std::string> paths;
-  for (const Assignment& assignment : assignments) {
-    if (paths.insert(assignment.path).second) continue;
-    throw DefinitionError(
-        fmt::format("{}: {} is set more than once", assignment.origin, assignment.path));
   }
   return assignments;
 }

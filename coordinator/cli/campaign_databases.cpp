@@ -57,19 +57,19 @@ void require_no_fewer_runs(const Store& store, const Campaign& wanted,
                   wanted.num_runs, store.num_runs(), database.string()));
 }
 
+void check_independent_until(const Campaign& wanted, const std::string& stop_rule) {
+  if (stop_rule.empty()) return;
+  if (wanted.table_columns.empty()) return require_independent(wanted, "until", stop_rule);
+  throw UsageError(
+      fmt::format("until = {} (must not be with quantities whose law is a table)", stop_rule));
+}
+
 void extend_same(Store& store, const Campaign& wanted, const std::filesystem::path& database) {
   require_no_fewer_runs(store, wanted, database);
   if (wanted.num_runs > store.num_runs()) store.extend(wanted, text_of(wanted));
 }
 
 namespace {
-
-void check_plan(const Campaign& wanted, const StopPlan& plan) {
-  if (plan.stop_rule.empty()) return;
-  if (wanted.table_columns.empty()) return require_independent(wanted, "until", plan.stop_rule);
-  throw UsageError(
-      fmt::format("until = {} (must not be with quantities whose law is a table)", plan.stop_rule));
-}
 
 /// The campaign as it is to be for now; shared with the dispatch and with messages under way.
 std::shared_ptr<const Campaign> with_horizon(const Campaign& wanted, const StopPlan& plan,
@@ -83,7 +83,7 @@ std::shared_ptr<const Campaign> with_horizon(const Campaign& wanted, const StopP
 ServedCampaign open_same(const Campaign& wanted, const StopPlan& plan,
                          const std::filesystem::path& database, std::string_view remedy,
                          const Asker& asker) {
-  check_plan(wanted, plan);
+  check_independent_until(wanted, plan.stop_rule);
   Store store = Store::open(database);
   require_control(asker, wanted.name, store.owner());
   const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, store.num_runs());
@@ -99,7 +99,7 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
                               const std::filesystem::path& database, std::string_view remedy,
                               const Asker& asker) {
   if (std::filesystem::exists(database)) return open_same(wanted, plan, database, remedy, asker);
-  check_plan(wanted, plan);
+  check_independent_until(wanted, plan.stop_rule);
   const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, 0);
   std::optional<Store> store = Store::create(database, *campaign, text_of(*campaign));
   try {

@@ -28,6 +28,11 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
 void require_no_fewer_runs(const Store& store, const Campaign& wanted,
                            const std::filesystem::path& database);
 
+/// @throws UsageError or ConfigError if a rule cannot end a campaign, as its draws may depend on
+/// one
+///         another; an empty rule is none.
+void check_independent_until(const Campaign& wanted, const std::string& stop_rule);
+
 /// Gives a campaign's database as many runs as are wanted.
 /// @pre require_same() passed.
 /// @throws UsageError if the database holds more runs than wanted.

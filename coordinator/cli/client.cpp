@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -121,6 +123,18 @@ void add_optional_connection(CLI::App& command, ClientConnectionConfig& connecti
   command.add_option("--connect", connection.endpoint,
                      "Ask the coordinator with this address for\nclients; DB is a campaign's name");
   add_key_options(command, connection);
+}
+
+bool is_remote(const ClientConnectionConfig& connection, const std::filesystem::path& database) {
+  if (!connection.endpoint.empty()) return true;
+  std::error_code error;
+  const std::string name = database.string();
+  const bool may_be_campaign = wire::is_name(name) && !database.has_extension();
+  if (!may_be_campaign || std::filesystem::exists(database, error)) return false;
+  throw Error(
+      fmt::format("campaign database = {} (does not exist; a file ends in .db, and a campaign "
+                  "of a coordinator needs --connect)",
+                  name));
 }
 
 proto::RequestEnvelope question_about(const std::string& campaign, proto::Question question) {

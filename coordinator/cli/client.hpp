@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -61,10 +62,10 @@ using Ask = std::function<proto::ReplyEnvelope(const proto::RequestEnvelope&)>;
 /// @param connection  Lives as long as the command.
 void add_optional_connection(CLI::App& command, ClientConnectionConfig& connection);
 
-/// True if the coordinator is to be asked.
-[[nodiscard]] inline bool is_remote(const ClientConnectionConfig& connection) {
-  return !connection.endpoint.empty();
-}
+/// Whether a coordinator is to be asked about a campaign of this name.
+/// @throws Error if it is not, and no file has the name either.
+[[nodiscard]] bool is_remote(const ClientConnectionConfig& connection,
+                             const std::filesystem::path& database);
 
 /// An AnswerRequest, without options.
 /// @throws UsageError unless a campaign may have this name.

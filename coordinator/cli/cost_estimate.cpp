@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <ctime>
+#include <utility>
 #include <vector>
 
 #include "coordinator/cli/progress_display.hpp"
@@ -34,7 +35,7 @@ double database_mb(const ResultSchema& schema, std::uint64_t num_runs) {
 
 }  // namespace
 
-double measure_batch_s(const Campaign& campaign, const Plan& plan) {
+FirstBatch try_first_batch(const Campaign& campaign, const Plan& plan) {
   const InstructionSet set = best_instruction_set();
   // Scalar code simulates the runs of a batch one after the other.
   const std::size_t num_at_once = set == InstructionSet::scalar ? 1 : model().batch_size();
@@ -48,8 +49,9 @@ double measure_batch_s(const Campaign& campaign, const Plan& plan) {
     return static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);
   };
   int num_steps = plan.num_steps();
+  std::vector<RunResult> results;
   try {
-    (void)plan.simulate_batch(requests, set, [&](int num_steps_now) {
+    results = plan.simulate_batch(requests, set, [&](int num_steps_now) {
       if (num_steps_now == 0 || elapsed_s() < measured_s_max) return;
       num_steps = num_steps_now;
       throw Measured{};
@@ -59,7 +61,8 @@ double measure_batch_s(const Campaign& campaign, const Plan& plan) {
   }
   const double all_steps = static_cast<double>(plan.num_steps()) / num_steps;
   const std::size_t num_rounds = model().batch_size() / num_at_once;
-  return elapsed_s() * all_steps * static_cast<double>(num_rounds);
+  return {.time_s = elapsed_s() * all_steps * static_cast<double>(num_rounds),
+          .results = std::move(results)};
 }
 
 CostEstimate& CostEstimate::operator+=(const CostEstimate& other) {

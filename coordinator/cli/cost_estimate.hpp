@@ -2,16 +2,22 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator {
 
-/// Processor time of the campaign's first batch on this machine, which is a full one unless the
-/// campaign has fewer runs; extrapolated from the steps that its first half second takes.
-/// All steps of a run take about the same time.
+/// The campaign's first batch, which is a full one unless the campaign has fewer runs.
+struct FirstBatch {
+  /// Processor time on this machine, extrapolated from the steps that the first half second takes.
+  /// All steps of a run take about the same time.
+  double time_s = 0.0;
+  std::vector<RunResult> results;  ///< Empty if half a second was not enough for all steps.
+};
+
 /// @param plan  The campaign's.
-[[nodiscard]] double measure_batch_s(const Campaign& campaign, const Plan& plan);
+[[nodiscard]] FirstBatch try_first_batch(const Campaign& campaign, const Plan& plan);
 
 /// What it costs to run campaigns on this machine.
 struct CostEstimate {

@@ -43,6 +43,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   };
   try {
     wire::settle_surroundings();
+    wire::refuse_options_as_values(app);
     app.parse(argc, argv);
     const int exit_code = work();
     flush_standard_output();

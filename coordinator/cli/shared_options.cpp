@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/program.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
@@ -48,11 +49,8 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
 
 void check_stop_rule(const std::string& rule, const Campaign& campaign) {
   if (rule.empty()) return;
-  try {
-    (void)parse_stop_rule(rule, campaign.results());
-  } catch (const ConfigError& error) {
-    throw UsageError(error.what());
-  }
+  (void)parse_stop_rule(rule, campaign.results());
+  check_independent_until(campaign, rule);
 }
 
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {

@@ -30,7 +30,9 @@ struct StopOptions {
 /// @param options  Lives as long as the command.
 void add_stop_options(CLI::App& command, StopOptions& options);
 
-/// @throws UsageError `until = RULE (what is wrong)` if a rule is none about the campaign.
+/// @throws UsageError or ConfigError `until = RULE (what is wrong)` if a rule is none about the
+/// campaign, or its
+///         draws may depend on one another.
 void check_stop_rule(const std::string& rule, const Campaign& campaign);
 
 /// Declares --audit.

@@ -167,7 +167,13 @@ std::string_view name_of(RequirementVerdict verdict) {
   PROOFMASS_EXPECT(false);
 }
 
-std::string given_percent(double fraction) { return fmt::format("{:.12g} %", 100.0 * fraction); }
+// Thirteen decimals are those that a double near 1 has.
+std::string given_percent(double fraction) {
+  std::string percent = fmt::format("{:.13f}", 100.0 * fraction);
+  percent.erase(percent.find_last_not_of('0') + 1);
+  if (percent.back() == '.') percent.pop_back();
+  return percent + " %";
+}
 
 std::string interval_percent(const Interval& interval) {
   return fmt::format("{} to {} %", short_percent(interval.lower), short_percent(interval.upper));

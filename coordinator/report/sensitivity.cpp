@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
+#include "coordinator/report/review_tables.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
@@ -74,18 +75,17 @@ double percentile_of(const std::vector<double>& values, double value) {
   return 100.0 * static_cast<double>(below) / static_cast<double>(values.size());
 }
 
-/// Heading of the quantities that drive an output.
-std::string driver_heading(std::span<const Sensitivity> rows, std::string_view output) {
-  return rows.empty() ? fmt::format("{}: no input found", output)
-                      : fmt::format("drives {}", output);
-}
-
 /// The quantities that drive an output: how sure that is, or, of one run, what it drew.
 /// @param position  Of the run.
 Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                    std::string_view output, std::optional<std::size_t> position) {
-  Table table{
-      .columns = {{driver_heading(rows, output), true, 39}, {"% of variance (95 %)", false, 21}}};
+  if (rows.empty()) {
+    return {.notes = {fmt::format("{}: no input found whose influence chance does not explain; "
+                                  "--rows 5 lists the first ones nevertheless",
+                                  output)}};
+  }
+  Table table{.columns = {{fmt::format("drives {}", output), true, 39},
+                          {"% of variance (95 %)", false, 21}}};
   if (position) {
     table.columns.insert(table.columns.end(), {{"value", false, 10}, {"% below", false, 10}});
   } else {
@@ -273,8 +273,9 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                              std::optional<std::size_t> num_rows, Paint paint) {
   const TerminalStyle style{.paint = paint};
   const auto both = sensitivities_of(drawn, quantity);
-  Table drivers = driver_table(drawn, first_of(both[0], num_rows), "error", std::nullopt);
-  if (!both[1].empty()) {
+  const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
+  Table drivers = driver_table(drawn, of_error, "error", std::nullopt);
+  if (!of_error.empty() || !of_magnitude.empty()) {
     drivers.notes.push_back(
         fmt::format("% of variance: with its 95 % interval; rank: rank correlation; p: that chance "
                     "alone makes one of {} quantities look so influential (Kruskal-Wallis, Holm)",
@@ -283,8 +284,7 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
   return fmt::format(
       "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", drawn.quantities[quantity].symbol, drawn.runs.size(),
       limit_line(drawn), left_out(drawn),
-      terminal_text(driver_table(drawn, first_of(both[1], num_rows), "|error|", std::nullopt),
-                    style),
+      terminal_text(driver_table(drawn, of_magnitude, "|error|", std::nullopt), style),
       terminal_text(drivers, style), terminal_text(term_table(drawn, quantity), style),
       worst_run_text(drawn, quantity));
 }
@@ -297,9 +297,9 @@ std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIn
   const std::vector<double>& errors = drawn.errors[quantity];
   const auto both = sensitivities_of(drawn, quantity);
   return fmt::format(
-      "Run {}: error of {} {:.3g} {}, rank {} of {}\n{}{}\n{}\n{}", run.value, info.symbol,
-      errors[position] / info.display_scale, info.display_unit, rank_of(errors, position),
-      errors.size(), limit_line(drawn), left_out(drawn),
+      "Run {}: error of {} {}, rank {} of {}\n{}{}\n{}\n{}", run.value, info.symbol,
+      quantity_text(errors[position], info), rank_of(errors, position), errors.size(),
+      limit_line(drawn), left_out(drawn),
       terminal_text(driver_table(drawn, first_of(both[1], num_rows), "|error|", position), style),
       terminal_text(driver_table(drawn, first_of(both[0], num_rows), "error", position), style));
 }

@@ -103,7 +103,7 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
   const bool have_ratio_errors = statistics.quantities.front().squared_ratio_error.has_value();
   const bool have_intervals = std::ranges::any_of(
       statistics.quantities, [](const auto& of) { return of.within.has_value(); });
-  constexpr const char* ratio = "error²/σ²";
+  constexpr const char* ratio = "Σerror²/Σσ²";
   constexpr const char* within = "within 1.96 σ, %";
   Table table{.id = "standard-error-table",
               .caption = fmt::format("Standard errors σ of the estimates of {} {}",
@@ -112,7 +112,7 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
               .columns = {{"parameter", true, 11},
                           {"unit", true, 9},
                           {"mean", false, 9},
-                          {"mean", false, 10, ratio, true}},
+                          {"ratio", false, 10, ratio, true}},
               .notes = {"honest ones have a ratio of 1, and 95 % of the errors within"}};
   if (have_ratio_errors) table.columns.push_back({"±", false, 9, ratio});
   table.columns.push_back({"runs", false, have_intervals ? 9U : 18U, within, true});

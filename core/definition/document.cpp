@@ -1,6 +1,7 @@
 #include "core/definition/document.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -79,6 +80,30 @@ toml::table parse_text(std::string_view text, const std::string& name) {
   }
 }
 
+// `session[3].orbits` of `session.a_c12.orbits` or `session[a_c12].orbits`: the tables of a list
+// may go by their `name`.
+std::string with_index(const toml::table& root, const Assignment& assignment) {
+  const std::string& path = assignment.path;
+  const std::size_t begin = std::min(path.find_first_of(".["), path.size());
+  const std::string list_name = path.substr(0, begin);
+  const toml::array* const list = root[list_name].as_array();
+  const char closing = path[begin] == '[' ? ']' : '.';
+  const std::size_t end = std::min(path.find(closing, begin + 1), path.size());
+  if (list == nullptr || begin == path.size() || (closing == ']' && end == path.size()))
+    return path;
+  const std::string name = path.substr(begin + 1, end - begin - 1);
+  if (closing == ']' && name.find_first_not_of("0123456789") == name.npos) return path;
+  std::vector<std::string> names;
+  for (const toml::node& entry : *list) {
+    names.push_back(toml::at_path(entry, "name").value_or(std::string()));
+    if (names.back() != name) continue;
+    return fmt::format("{}[{}]{}", list_name, names.size() - 1,
+                       path.substr(closing == ']' ? end + 1 : end));
+  }
+  throw DefinitionError(fmt::format("{}: {} = {} (must be one of {})", assignment.origin, list_name,
+                                    name, fmt::join(names, " ")));
+}
+
 }  // namespace
 
 Assignment parse_assignment(const std::string& text) {
@@ -99,9 +124,15 @@ Assignment parse_assignment(const std::string& text) {
 }
 
 Document::Document(std::string name, std::string_view text, std::vector<Assignment> assignments)
-    : name_(std::move(name)),
-      root_(parse_text(text, name_)),
-      assignments_(std::move(assignments)) {}
+    : name_(std::move(name)), root_(parse_text(text, name_)), assignments_(std::move(assignments)) {
+  std::set<std::string> paths;
+  for (Assignment& assignment : assignments_) {
+    assignment.path = with_index(root_, assignment);
+    if (paths.insert(assignment.path).second) continue;
+    throw DefinitionError(
+        fmt::format("{}: {} is set more than once", assignment.origin, assignment.path));
+  }
+}
 
 const toml::node* Document::value_at(const std::string& path) const {
   for (auto it = assignments_.rbegin(); it != assignments_.rend(); ++it) {

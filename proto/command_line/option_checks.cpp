@@ -164,6 +164,18 @@ class OptionFile : public CLI::ConfigTOML {
 
 }  // namespace
 
+void refuse_options_as_values(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands(nullptr)) {
+    for (CLI::Option* option : command->get_options(nullptr)) {
+      if (option->get_positional() || option->get_items_expected_max() == 0) continue;
+      option->check([names = option_names(*command, "--")](const std::string& value) {
+        return names.contains(value) ? value + " (is an option; the value must stand before it)"
+                                     : "";
+      });
+    }
+  }
+}
+
 CLI::Validator one_of(const std::vector<std::string>& words) {
   const auto check = [words](const std::string& text) {
     if (std::ranges::find(words, text) != words.end()) return std::string();

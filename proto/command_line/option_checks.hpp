@@ -36,6 +36,10 @@ template <typename Number>
   return CLI::Validator(check, fmt::format("[{}, {}]", minimum, maximum), "in_range");
 }
 
+/// Makes every option of the commands refuse the name of another one as its value, which shows that
+/// its own was forgotten.
+void refuse_options_as_values(CLI::App& app);
+
 /// Takes one of some words.
 [[nodiscard]] CLI::Validator one_of(const std::vector<std::string>& words);
 

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,6 +13,7 @@
 #include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/shared_options.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
@@ -37,15 +40,76 @@ std::string differences_text(const Campaign& campaign) {
   return text;
 }
 
+/// What can be said of the first runs without computing many.
+struct Outlook {
+  std::uint64_t num_drawn = 0;  ///< Runs.
+  std::uint64_t num_draws = 0;  ///< Of these.
+  std::uint64_t num_without_draw = 0;
+  double batch_s = 0.0;
+  std::size_t num_simulated = 0;  ///< Runs; 0 if they take too long.
+  MissingEstimates missing;       ///< Of these.
+};
+
+Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
+  constexpr std::uint64_t runs_max = 1000, draws_max = 20'000;  // Some hundredths of a second.
+  const FirstBatch batch = try_first_batch(campaign, plan);
+  Outlook outlook{.batch_s = batch.time_s, .num_simulated = batch.results.size(), .missing = {}};
+  for (const RunResult& result : batch.results) outlook.missing.add(result);
+  std::uint64_t& run = outlook.num_drawn;
+  for (; run < std::min(campaign.num_runs, runs_max) && outlook.num_draws < draws_max; ++run) {
+    const RunDraw draw = campaign.draw(RunIndex{run});
+    outlook.num_draws += draw.num_draws;
+    if (draw.values.empty()) ++outlook.num_without_draw;
+  }
+  return outlook;
+}
+
+std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
+                         const Outlook& outlook) {
+  std::string text = fmt::format("Draws     {} of {} accepted, for the first {} runs\n",
+                                 outlook.num_drawn - outlook.num_without_draw, outlook.num_draws,
+                                 outlook.num_drawn);
+  if (outlook.num_without_draw > 0) {
+    text += fmt::format(
+        "Warning   {} of these runs find none in {} draws and end without an estimate:\n"
+        "          widen the bounds or narrow the laws\n",
+        outlook.num_without_draw, campaign.results().num_draws_max);
+  }
+  const std::uint64_t each = campaign.num_realisations(), rest = campaign.num_runs % each;
+  if (rest > 0) {
+    text += fmt::format(
+        "Warning   the last draw has {} of its {} runs, and reports leave it out; use --runs {}\n",
+        rest, each, campaign.num_runs - rest + each);
+  }
+  const std::string plan = fmt::format("see `proofmass plan {}`", options.file.string());
+  if (outlook.num_simulated == 0) return text + "Losses    not tried, as runs are long; " + plan;
+  const std::string reasons = reasons_text(outlook.missing);
+  text +=
+      fmt::format("Losses    {} of the first {} runs{}{}", outlook.missing.total(),
+                  outlook.num_simulated, reasons.empty() ? "" : ", without an estimate: " + reasons,
+                  outlook.missing.num_lost == 0 ? "" : "; for the cause " + plan);
+  return text;
+}
+
 using CheckJson = nlohmann::ordered_json;
 
 CheckJson check_json(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
-                     const CostEstimate& cost) {
-  CheckJson json{{"file", options.file.string()},         {"campaign", campaign.name},
-                 {"seed", std::to_string(campaign.seed)}, {"num_runs", campaign.num_runs},
-                 {"num_steps", plan.num_steps()},         {"step_name", model().step_name()},
-                 {"one_core_s", cost.one_core_s},         {"all_cores_s", cost.all_cores_s},
-                 {"num_cores", wire::num_processors()},   {"disk_bytes", cost.disk_mb * 1e6},
+                     const Outlook& outlook, const CostEstimate& cost) {
+  CheckJson json{{"file", options.file.string()},
+                 {"campaign", campaign.name},
+                 {"seed", std::to_string(campaign.seed)},
+                 {"num_runs", campaign.num_runs},
+                 {"num_steps", plan.num_steps()},
+                 {"step_name", model().step_name()},
+                 {"one_core_s", cost.one_core_s},
+                 {"all_cores_s", cost.all_cores_s},
+                 {"num_cores", wire::num_processors()},
+                 {"disk_bytes", cost.disk_mb * 1e6},
+                 {"num_drawn", outlook.num_drawn},
+                 {"num_draws", outlook.num_draws},
+                 {"num_without_draw", outlook.num_without_draw},
+                 {"num_simulated", outlook.num_simulated},
+                 {"num_without_estimate", outlook.missing.total()},
                  {"differences", CheckJson::array()}};
   for (const auto& [field, own, example] : campaign.differences_from(*example_campaign())) {
     json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});
@@ -54,22 +118,24 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
 }
 
 std::string check_text(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
-                       const CostEstimate& cost) {
-  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {} of {} {}\n{}\n{}",
+                       const Outlook& outlook, const CostEstimate& cost) {
+  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {} of {} {}\n{}\n{}\n{}",
                      options.file.string(), campaign.name, campaign.seed, campaign.num_runs,
-                     plan.num_steps(), model().step_name(), cost_text(cost),
+                     plan.num_steps(), model().step_name(),
+                     outlook_text(options, campaign, outlook), cost_text(cost),
                      differences_text(campaign));
 }
 
 int check_campaign_file(const CheckOptions& options) {
   const std::unique_ptr<const Campaign> campaign = read_campaign(options.file, options.overrides);
   const std::unique_ptr<const Plan> plan = campaign->prepare();
+  const Outlook outlook = outlook_on(*campaign, *plan);
   const CostEstimate cost =
-      estimated_cost(campaign->results(), campaign->num_runs, measure_batch_s(*campaign, *plan));
+      estimated_cost(campaign->results(), campaign->num_runs, outlook.batch_s);
   if (options.format == OutputFormat::json) {
-    print_json(check_json(options, *campaign, *plan, cost));
+    print_json(check_json(options, *campaign, *plan, outlook, cost));
   } else {
-    print_lines(check_text(options, *campaign, *plan, cost));
+    print_lines(check_text(options, *campaign, *plan, outlook, cost));
   }
   return exit_done;
 }

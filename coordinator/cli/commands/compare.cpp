@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "coordinator/archive/comparison.hpp"
@@ -19,6 +22,18 @@ struct CompareOptions {
   OutputFormat format = OutputFormat::text;
 };
 
+/// A file that is compared with itself is a slip.
+void refuse_same_files(std::span<const std::filesystem::path> files) {
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      std::error_code error;  // A file that is not there is refused when it is opened.
+      if (!std::filesystem::equivalent(files[i], files[j], error)) continue;
+      throw UsageError(
+          fmt::format("DB = {} (is the same file as {})", files[i].string(), files[j].string()));
+    }
+  }
+}
+
 int compare_databases(const CompareOptions& options) {
   std::vector<std::filesystem::path> files{options.first, options.second};
   files.insert(files.end(), options.others.begin(), options.others.end());
@@ -26,6 +41,7 @@ int compare_databases(const CompareOptions& options) {
     throw UsageError(
         fmt::format("DB = {} files (must be at most {})", files.size(), num_compared_max));
   }
+  refuse_same_files(files);
   return run_until_stopped([&](const IsStopped& is_stopped) {
     const std::vector<ComparedMember> members = compare_several(files, is_stopped);
     if (options.format == OutputFormat::json) {
@@ -33,6 +49,11 @@ int compare_databases(const CompareOptions& options) {
     } else {
       write_standard_output(
           comparison_text(members, lettered(members.size()), style_of(stdout).paint));
+    }
+    for (const ComparedMember& member : members) {
+      if (member.why_not_independent.empty()) continue;
+      throw UsageError(fmt::format("DB = {} (needs independent draws: {})", member.file.string(),
+                                   member.why_not_independent));
     }
     return static_cast<int>(exit_done);
   });

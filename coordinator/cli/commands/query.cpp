@@ -146,7 +146,7 @@ int query_remotely(const QueryOptions& options) {
 
 // SIGINT and SIGTERM end it in order.
 int query_database(const QueryOptions& options) {
-  if (is_remote(options.connection)) return query_remotely(options);
+  if (is_remote(options.connection, options.database)) return query_remotely(options);
   require_not_swapped(options);
   const QueryFiles files(options.database, attached_files_of(options.attached));
   // While it waits for input, a signal ends the process at once.
@@ -192,7 +192,8 @@ void add_query(CLI::App& app, Command& chosen) {
       ->capture_default_str();
   command
       .add_option("--columns", options.num_columns,
-                  "Characters that a line of a table may take; as\nthe terminal has by default")
+                  "Characters that a line of a table may take; by\ndefault as the terminal has, in "
+                  "a pipe any number")
       ->check(wire::in_range(std::size_t{20}, table_columns_max));
   add_optional_connection(command, options.connection);
 }

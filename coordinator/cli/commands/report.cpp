@@ -122,7 +122,7 @@ int write_documents(const ReportOptions& options, const Store& store, const Camp
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
 /// instead. JSON holds both. A document takes the place of the text.
 int print_report(const ReportOptions& options) {
-  if (is_remote(options.connection)) return print_remote_report(options);
+  if (is_remote(options.connection, options.database)) return print_remote_report(options);
   check_standard_output(options);
   check_document(options.html, options.if_there);
   check_document(options.markdown, options.if_there);

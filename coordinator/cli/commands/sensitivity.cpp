@@ -50,7 +50,7 @@ int print_remote_sensitivity(const SensitivityOptions& options) {
 }
 
 int print_sensitivity(const SensitivityOptions& options) {
-  if (is_remote(options.connection)) return print_remote_sensitivity(options);
+  if (is_remote(options.connection, options.database)) return print_remote_sensitivity(options);
   const Store store = Store::open_read_only(options.database);
   std::vector<std::size_t> quantities;
   if (options.parameter) quantities.push_back(quantity_named(*options.parameter, store.schema()));

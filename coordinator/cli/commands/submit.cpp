@@ -36,11 +36,7 @@ std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   check_stop_rule(options.stop.rule, *campaign);
   if (options.name) {
     campaign->name = *options.name;
-    try {
-      check_campaign_name(campaign->name, NameOrigin::given);
-    } catch (const ConfigError& error) {
-      throw UsageError(error.what());
-    }
+    check_campaign_name(campaign->name, NameOrigin::given);
   }
   return campaign;
 }

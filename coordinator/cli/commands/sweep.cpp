@@ -150,7 +150,7 @@ CostEstimate cost_of(const std::vector<const SweptCampaign*>& unfinished) {
       const std::unique_ptr<const Plan> plan = campaign->prepare();
       num_steps = plan->num_steps();
       results = campaign->results();
-      if (i == 0) step_s = measure_batch_s(*campaign, *plan) / num_steps;
+      if (i == 0) step_s = try_first_batch(*campaign, *plan).time_s / num_steps;
     }
     cost += estimated_cost(results, unfinished[i]->num_missing, step_s * num_steps);
   }

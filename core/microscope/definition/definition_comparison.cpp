@@ -44,6 +44,8 @@ class Comparison {
     };
     compare("campaign.realisations", first_.realisations, second_.realisations);
     compare("campaign.design", name_of(first_.design.kind), name_of(second_.design.kind));
+    const auto is_random = [](const SamplingDesign& of) { return of.kind == DesignKind::random; };
+    if (is_random(first_.design) || is_random(second_.design)) return;  // It has no points.
     compare("campaign.points", first_.design.points, second_.design.points);
   }
 
@@ -85,15 +87,24 @@ class Comparison {
     return "[" + text + "]";
   }
 
+  static std::string names_text(const std::vector<Session>& sessions) {
+    std::string text = fmt::format("{} (", sessions.size());
+    for (const Session& session : sessions) text += session.name + " ";
+    text.back() = ')';
+    return text;
+  }
+
   void compare_sessions() {
     const std::vector<Session>& first = first_.scenario.sessions;
     const std::vector<Session>& second = second_.scenario.sessions;
     if (first.size() != second.size()) {
-      differ("session", fmt::format("{}", first.size()), fmt::format("{}", second.size()));
+      differ("session", names_text(first), names_text(second));
       return;
     }
     for (std::size_t i = 0; i < first.size(); ++i) {
-      const std::string prefix = fmt::format("session[{}].", i);
+      const bool is_same = first[i].name == second[i].name;
+      const std::string prefix =
+          is_same ? fmt::format("session.{}.", first[i].name) : fmt::format("session[{}].", i);
       compare_entries(prefix, detail::session_entries(first[i]),
                       detail::session_entries(second[i]));
       if (first[i].excitations != second[i].excitations) {

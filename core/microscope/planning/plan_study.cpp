@@ -75,9 +75,11 @@ MicroscopeCampaign short_campaign(MicroscopeCampaign campaign) {
 }
 
 /// A short campaign without noise and without the errors of instruments, which change the
-/// amplitudes of lines by a percent, and without what other methods record.
+/// amplitudes of lines by a percent, without saturation, which the probes show, and without what
+/// other methods record.
 MicroscopeCampaign measured_campaign(MicroscopeCampaign campaign) {
   campaign.scenario.noise.scale = 0.0;
+  campaign.scenario.sensor.range_m_s2 = 1.0;
   for (Dispersion& dispersion : campaign.dispersions) {
     dispersion = {.law = Law::fixed, .file = {}, .column = {}};
   }

@@ -56,7 +56,11 @@ double Phrase::positive_number() {
 double Phrase::percentage() {
   const double percent = number();
   expect("%");
-  if (percent > 0.0 && percent < 100.0) return percent / 100.0;
+  if (percent > 0.0 && percent < 100.0) {
+    // The number next to what is written: 99.99999/100 is not the one next to 0.9999999.
+    const std::string digits = fmt::format("{}", percent);
+    return digits.find('e') == digits.npos ? std::stod(digits + "e-2") : percent / 100.0;
+  }
   refuse(fmt::format("{}% must be above 0% and below 100%", percent));
 }
 

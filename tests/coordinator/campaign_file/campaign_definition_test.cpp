@@ -145,14 +145,17 @@ TEST(DefinitionDifferences, NameFieldAndBothValues) {
               ElementsAre("noise.scale: 1 in the database, 0 asked for"));
   EXPECT_THAT(
       differences_after([](MicroscopeCampaign& c) { c.scenario.sessions[3].num_orbits = 2; }),
-      ElementsAre("session[3].orbits: 40 in the database, 2 asked for"));
-  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) { c.scenario.sessions.pop_back(); }),
-              ElementsAre("session: 11 in the database, 10 asked for"));
+      ElementsAre("session.a_c12.orbits: 40 in the database, 2 asked for"));
+  EXPECT_THAT(
+      differences_after([](MicroscopeCampaign& c) { c.scenario.sessions.resize(2); }),
+      ElementsAre("session: 11 (k2_sensor_2 a_c11_delta_z a_c11_delta_y a_c12 a_c13 a_d11_prime "
+                  "a_d12 a_d13 k2d k2_sensor_1 a_c11_delta_x) in the database, 2 (k2_sensor_2 "
+                  "a_c11_delta_z) asked for"));
   EXPECT_THAT(
       differences_after(
           [](MicroscopeCampaign& c) { c.scenario.sessions[8].excitations[0].amplitude = 1e-8; }),
       ElementsAre(
-          "session[8].excitations: [{ kind = \"drag_free\", axis = \"x\", amplitude_m_s2 = "
+          "session.k2d.excitations: [{ kind = \"drag_free\", axis = \"x\", amplitude_m_s2 = "
           "2e-8, frequency_hz = 0.00122847554 }] in the database, [{ kind = \"drag_free\", "
           "axis = \"x\", amplitude_m_s2 = 1e-8, frequency_hz = 0.00122847554 }] asked for"));
   EXPECT_THAT(
