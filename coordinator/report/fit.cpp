@@ -20,6 +20,7 @@ void leave_out_intervals(std::vector<FitStatistic>& fit) {
 
 RunningFit::RunningFit(const ResultSchema& schema)
     : sessions_(schema.fit_parts), tolerance_(schema.fit_tolerance) {
+  if (schema.fit.empty()) return;
   sessions_.insert(sessions_.begin(), "all");
   sums_.resize(sessions_.size());
 }
@@ -76,7 +77,7 @@ Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit
                           {"χ²/degrees", false, 12}},
               .notes = {"χ²: its mean over the runs; degrees of freedom: what is expected of it"}};
   if (has_p_values) {
-    table.columns.insert(table.columns.end(), {{"±", false, 9}, {"p", false, 9}, {"", true, 14}});
+    table.columns.insert(table.columns.end(), {{"±", false, 9}, {"p", false, 9}, {"", false, 14}});
     table.notes.push_back(fmt::format(
         "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
         "takes it for, to {:.2g} %",

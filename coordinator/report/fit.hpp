@@ -34,10 +34,10 @@ class RunningFit {
  public:
   explicit RunningFit(const ResultSchema& schema);
 
-  /// @pre The result has a fit, of this schema.
+  /// @pre The result has what the schema says of its fit.
   void add(const RunResult& result);
 
-  /// All data first, then each session; none before the first result.
+  /// All data first, then each session; none before the first result or without a fit.
   [[nodiscard]] std::vector<FitStatistic> statistics() const;
 
  private:

@@ -56,7 +56,7 @@ TEST(MicroscopeCampaign, IsInterpretedByWhatDiffersFromRunToRun) {
 TEST(MicroscopeCampaign, HasAFitOfEachSessionSinceTheSixthVersion) {
   MicroscopeCampaign campaign = hardy2013_campaign();
   EXPECT_EQ(campaign.results().fit.size(), 2U);
-  campaign.scenario.estimation.method = EstimationMethod::joint;
+  campaign.scenario.estimation.method = EstimationMethod{2};  // joint
   campaign.scenario.sessions[3].name = "A_C12";
   campaign.scenario.sessions[4].name = "a_c12";
   const std::string definition = canonical_definition(campaign);
