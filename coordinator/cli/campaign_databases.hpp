@@ -28,9 +28,10 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
 void require_no_fewer_runs(const Store& store, const Campaign& wanted,
                            const std::filesystem::path& database);
 
-/// @throws UsageError or ConfigError if a rule cannot end a campaign, as its draws may depend on
-/// one
-///         another; an empty rule is none.
+/// Refuses a rule that cannot end a campaign, as its draws may depend on one another.
+///
+/// @param stop_rule  May be empty: none.
+/// @throws UsageError or ConfigError
 void check_independent_until(const Campaign& wanted, const std::string& stop_rule);
 
 /// Gives a campaign's database as many runs as are wanted.

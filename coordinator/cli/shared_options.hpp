@@ -30,9 +30,9 @@ struct StopOptions {
 /// @param options  Lives as long as the command.
 void add_stop_options(CLI::App& command, StopOptions& options);
 
-/// @throws UsageError or ConfigError `until = RULE (what is wrong)` if a rule is none about the
-/// campaign, or its
-///         draws may depend on one another.
+/// Refuses a rule that is none about the campaign, or of draws that may depend on one another.
+///
+/// @throws UsageError or ConfigError `until = RULE (what is wrong)`
 void check_stop_rule(const std::string& rule, const Campaign& campaign);
 
 /// Declares --audit.
