@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <future>
 #include <map>
@@ -9,6 +8,7 @@
 
 #include "core/math/hash.hpp"
 #include "core/model.hpp"
+#include "proto/wire/conversions.hpp"
 #include "worker/execution/executor.hpp"
 
 // How an executor serves a device: runs flow through it group by group, and the thread looks after
@@ -17,21 +17,14 @@
 namespace proofmass::worker {
 namespace {
 
-/// Until the simulation that they begin says how large a group may be; any device takes so many.
-constexpr std::size_t first_group_size = 128;
-
-bool are_same(const std::vector<double>& a, const std::vector<double>& b) {
-  const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
-  return std::ranges::equal(a, b, {}, bits, bits);
-}
-
-/// To the bit.
+/// To the bit, in all that is sent of them.
 bool are_same(const RunResult& a, const RunResult& b) {
-  return a.run == b.run && a.status == b.status && a.num_draws == b.num_draws &&
-         a.num_rounds == b.num_rounds && a.loss == b.loss && are_same(a.truth, b.truth) &&
-         are_same(a.estimate, b.estimate) && are_same(a.standard_error, b.standard_error) &&
-         are_same(a.fit, b.fit) && are_same(a.correlations, b.correlations) &&
-         are_same(a.health, b.health);
+  const auto bytes_of = [](const RunResult& result) {
+    proto::ComputedRun message;
+    wire::write_run({.result = result}, message);
+    return message.SerializeAsString();
+  };
+  return bytes_of(a) == bytes_of(b);
 }
 
 /// Whether a run is one of those to be checked: as good as at random, and the same every time.
@@ -98,57 +91,21 @@ class DeviceCheck {
 
 }  // namespace
 
-void Executor::serve_device(Device& device) {
-  serve([&] {
-    std::shared_ptr<Batch> batch = next_batch_for_device();
-    const bool is_served = batch != nullptr;
-    if (is_served) compute_on(device, std::move(batch));
-    return is_served;
-  });
-}
-
-std::shared_ptr<Executor::Batch> Executor::next_batch_for_device() {
-  const auto is_ready_now = [this](wire::CampaignId campaign) {
-    return is_ready(campaign) && is_on_devices(campaign);
-  };
-  std::unique_lock lock(mutex_);
-  while (!is_ending_ && !failure_) {
-    TakenRuns assignment = queue_.take_for_device(first_group_size, is_ready_now);
-    if (!assignment.requests.empty()) return begin_batch(std::move(assignment), true);
-    changed_.wait(lock);
-  }
-  return nullptr;
-}
-
-std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
-                                                           std::size_t size_max) {
-  const wire::CampaignId campaign = batch.assignment.campaign;
-  const std::unique_lock lock(mutex_);
-  if (is_ending_ || failure_) return nullptr;
-  const auto is_ready_now = [this](wire::CampaignId other) {
-    return is_ready(other) && is_on_devices(other);
-  };
-  TakenRuns assignment = queue_.take_for_device(size_max, is_ready_now, campaign);
-  return assignment.requests.empty() ? nullptr : begin_batch(std::move(assignment), true);
-}
-
-void Executor::compute_on(Device& device, std::shared_ptr<Batch> first) {
+void Executor::compute_on(Device& device, const std::shared_ptr<Batch>& first) {
   const std::shared_ptr<const PreparedCampaign> prepared = first->prepared;
   const std::unique_ptr<DeviceSimulation> simulation = prepared->simulate_on(device);
   DeviceCheck check(prepared->simulate, config_.checked_fraction);
   std::map<std::uint64_t, std::shared_ptr<Batch>> in_flight;
-  std::shared_ptr<Batch> latest = std::move(first);
-  const auto add = [&](std::shared_ptr<Batch> batch) {
+  const auto add = [&](const std::shared_ptr<Batch>& batch) {
     simulation->add(batch->number, batch->assignment.requests);
     in_flight[batch->number] = batch;
-    latest = std::move(batch);
   };
-  add(latest);
+  add(first);
   while (std::ranges::any_of(in_flight, [](const auto& b) { return !b.second->is_dropped; })) {
     while (simulation->num_in_flight() + simulation->group_size() <= simulation->capacity()) {
-      std::shared_ptr<Batch> next = next_batch_like(*latest, simulation->group_size());
+      const std::shared_ptr<Batch> next = next_batch_like(*first, simulation->group_size());
       if (next == nullptr) break;
-      add(std::move(next));
+      add(next);
     }
     const std::size_t num_together = simulation->num_in_flight();
     for (DeviceSimulation::Ended& ended : simulation->advance()) {

@@ -11,6 +11,9 @@
 namespace proofmass::worker {
 namespace {
 
+/// Runs of a device before its simulation says how many it takes together: as many for any device.
+constexpr std::size_t first_group_size = 128;
+
 /// Leaves a simulation from within, where it reports progress.
 struct Abandoned {};
 
@@ -51,10 +54,13 @@ Executor::Executor(Prepare prepare, std::function<void()> on_change, const Execu
   PROOFMASS_EXPECT(config.num_threads >= 1 && config.batch_size_max >= 1 &&
                    config.num_campaigns_max >= 1);
   for (std::size_t i = 0; i < config.num_threads; ++i) {
-    threads_.emplace_back([this] { serve_processor(); });
+    threads_.emplace_back(
+        [this] { serve(Place::processor, [this](const auto& batch) { compute(*batch); }); });
   }
   for (const std::shared_ptr<Device>& device : config.devices) {
-    threads_.emplace_back([this, device] { serve_device(*device); });
+    threads_.emplace_back([this, device] {
+      serve(Place::device, [&](const auto& batch) { compute_on(*device, batch); });
+    });
   }
 }
 
@@ -184,19 +190,13 @@ std::optional<std::string> Executor::failure() const {
   return failure_;
 }
 
-void Executor::serve_processor() {
-  serve([this] {
-    const std::shared_ptr<Batch> batch = next_batch();
-    if (batch != nullptr) compute(*batch);
-    return batch != nullptr;
-  });
-}
-
-void Executor::serve(const std::function<bool()>& compute_next) {
+void Executor::serve(Place place,
+                     const std::function<void(const std::shared_ptr<Batch>&)>& compute) {
+  const std::size_t size_max =
+      place == Place::processor ? config_.batch_size_max : first_group_size;
   bool has_failed = false;
   try {
-    while (compute_next()) {
-    }
+    while (const std::shared_ptr<Batch> batch = next_batch(place, size_max)) compute(batch);
   } catch (const std::exception& error) {
     const std::lock_guard lock(mutex_);
     if (!failure_) failure_ = error.what();
@@ -208,14 +208,13 @@ void Executor::serve(const std::function<bool()>& compute_next) {
   changed_.notify_all();
 }
 
-std::shared_ptr<Executor::Batch> Executor::next_batch() {
-  const auto is_ready_now = [this](wire::CampaignId campaign) { return is_ready(campaign); };
-  const auto are_on_devices = [this](wire::CampaignId campaign) { return is_on_devices(campaign); };
+std::shared_ptr<Executor::Batch> Executor::next_batch(Place place, std::size_t size_max) {
+  const RunQueue::IsWanted is_wanted = wanted_by(place);
   std::unique_lock lock(mutex_);
   while (true) {
     if (is_ending_ || failure_) return nullptr;
-    TakenRuns assignment = queue_.take(config_.batch_size_max, is_ready_now, are_on_devices);
-    if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
+    TakenRuns assignment = queue_.take(size_max, is_wanted);
+    if (!assignment.requests.empty()) return begin_batch(std::move(assignment), place);
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
     } else {
@@ -224,7 +223,16 @@ std::shared_ptr<Executor::Batch> Executor::next_batch() {
   }
 }
 
-std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, bool is_on_device) {
+std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
+                                                           std::size_t size_max) {
+  const RunQueue::IsWanted is_wanted = wanted_by(batch.place);
+  const std::lock_guard lock(mutex_);
+  if (is_ending_ || failure_) return nullptr;
+  if (queue_.first_campaign(is_wanted) != batch.assignment.campaign) return nullptr;
+  return begin_batch(queue_.take(size_max, is_wanted), batch.place);
+}
+
+std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, Place place) {
   KnownCampaign& known = campaigns_.at(assignment.campaign);
   known.used = ++num_uses_;
   const auto batch = std::make_shared<Batch>();
@@ -232,21 +240,22 @@ std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, boo
   batch->assignment = std::move(assignment);
   batch->prepared = known.prepared;
   batch->started_at = now();
-  batch->is_on_device = is_on_device;
+  batch->place = place;
   return batches_[batch->number] = batch;
 }
 
-bool Executor::is_ready(wire::CampaignId campaign) const {
-  const auto found = campaigns_.find(campaign);
-  return found != campaigns_.end() && found->second.prepared != nullptr;
-}
-
-bool Executor::is_on_devices(wire::CampaignId campaign) const {
-  return !config_.devices.empty() && campaigns_.at(campaign).prepared->simulate_on != nullptr;
+RunQueue::IsWanted Executor::wanted_by(Place place) const {
+  return [this, place](wire::CampaignId campaign, bool is_for_cards) {
+    const auto known = campaigns_.find(campaign);
+    if (known == campaigns_.end() || known->second.prepared == nullptr) return false;
+    const bool is_on_device =
+        is_for_cards && !config_.devices.empty() && known->second.prepared->simulate_on != nullptr;
+    return is_on_device == (place == Place::device);
+  };
 }
 
 wire::CampaignId Executor::campaign_to_prepare() const {
-  return queue_.first_campaign([this](wire::CampaignId campaign) {
+  return queue_.first_campaign([this](wire::CampaignId campaign, bool /*is_for_cards*/) {
     const auto found = campaigns_.find(campaign);
     return found != campaigns_.end() && !found->second.prepared && !found->second.is_preparing;
   });
@@ -315,7 +324,7 @@ void Executor::finish(const Batch& batch, std::vector<RunResult> results,
                            .computed = {.result = std::move(result),
                                         .compute_s = compute_s,
                                         .elapsed_s = elapsed_s,
-                                        .is_by_card = batch.is_on_device}});
+                                        .is_by_card = batch.place == Place::device}});
     }
   }
   on_change_();

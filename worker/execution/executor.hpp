@@ -97,6 +97,8 @@ class Executor final : public Execution {
     std::optional<Duration> batch_time;  ///< Of the last one among those that were as large.
   };
 
+  enum class Place : std::uint8_t { processor, device };
+
   /// Runs that are computed together. The thread shares it with `batches_`, from which it is
   /// taken when it is dropped.
   struct Batch {
@@ -104,28 +106,26 @@ class Executor final : public Execution {
     TakenRuns assignment;
     std::shared_ptr<const PreparedCampaign> prepared;
     TimePoint started_at;
-    bool is_on_device = false;
+    Place place = Place::processor;
     std::atomic<int> num_steps_done = 0;
     std::atomic<bool> is_dropped = false;
   };
 
-  void serve(const std::function<bool()>& compute_next);
-  void serve_processor();
-  void serve_device(Device& device);
+  /// What a thread serves: takes and computes batches until the end.
+  void serve(Place place, const std::function<void(const std::shared_ptr<Batch>&)>& compute);
   /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
-  [[nodiscard]] std::shared_ptr<Batch> next_batch();
-  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment, bool is_on_device = false);
-  /// Waits for runs that are for cards; null at the end.
-  [[nodiscard]] std::shared_ptr<Batch> next_batch_for_device();
-  /// More such runs of the same campaign, if they wait; null if those of another one come first.
+  [[nodiscard]] std::shared_ptr<Batch> next_batch(Place place, std::size_t size_max);
+  /// More runs of the same campaign for a device, if they wait; null if those of another one come
+  /// first.
   [[nodiscard]] std::shared_ptr<Batch> next_batch_like(const Batch& batch, std::size_t size_max);
-  void compute_on(Device& device, std::shared_ptr<Batch> first);
-  [[nodiscard]] bool is_ready(wire::CampaignId campaign) const;
-  /// Whether devices compute the campaign's runs. @pre is_ready().
-  [[nodiscard]] bool is_on_devices(wire::CampaignId campaign) const;
+  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment, Place place);
+  /// Runs for cards are wanted by devices, unless these cannot compute the campaign; all others by
+  /// processors.
+  [[nodiscard]] RunQueue::IsWanted wanted_by(Place place) const;
   [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
   void compute(Batch& batch);
+  void compute_on(Device& device, const std::shared_ptr<Batch>& first);
   [[nodiscard]] std::vector<RunResult> simulate(Batch& batch);
   void note_steps(Batch& batch, int num_steps_now);
   /// @param num_together  Runs that shared the time of the batch.
