@@ -31,12 +31,14 @@ inline constexpr std::chrono::milliseconds kernel_time_max = std::chrono::minute
 
 /// A card as a Device. What is on it stays there until the process ends: a driver whose card hangs
 /// would wait for that for ever if it were asked to release anything.
-class CudaDevice final : public Device {
+class CudaDevice : public Device {
  public:
   /// @param time_max  A kernel that takes longer hangs. Time in which the process is stopped does
   ///                  not count.
   /// @throws DeviceError
   explicit CudaDevice(const CudaCard& card, std::chrono::milliseconds time_max = kernel_time_max);
+  CudaDevice(const CudaDevice&) = delete;
+  CudaDevice& operator=(const CudaDevice&) = delete;
 
   void begin(const char* program) override;
   [[nodiscard]] std::size_t num_resident_blocks(const char* kernel, std::size_t num_threads,
