@@ -208,8 +208,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
   config.hello.set_num_slots(static_cast<std::uint32_t>(num_processor_slots + num_card_slots));
   config.hello.set_num_card_slots(static_cast<std::uint32_t>(num_card_slots));
   config.hello.set_cards(text_of(cards));
-  // A card's thread, one that checks its runs, and those of its driver.
-  constexpr std::size_t num_threads_a_card = 6;
+  constexpr std::size_t num_threads_a_card = 5;  // Its own, and those of its driver.
   wire::require_threads(static_cast<int>(num_threads + num_threads_a_card * cards.devices.size()) +
                         num_threads_beside);
   StopSignals signals(config.signals);

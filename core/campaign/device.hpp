@@ -74,13 +74,13 @@ class DeviceSimulation {
   virtual ~DeviceSimulation() = default;
 
   /// Runs that are best added together.
-  [[nodiscard]] virtual std::size_t group_size() const = 0;
+  static constexpr std::size_t group_size = 128;
   /// Runs that keep the device busy: so many are best in flight.
   [[nodiscard]] virtual std::size_t capacity() const = 0;
   [[nodiscard]] virtual std::size_t num_in_flight() const = 0;
 
   /// @param group     A number for these runs that no others in flight have.
-  /// @param requests  At least one, at most group_size().
+  /// @param requests  At least one, at most group_size.
   virtual void add(std::uint64_t group, std::span<const RunRequest> requests) = 0;
   /// Steps that each run of a group in flight has done, as Plan::num_steps() counts them.
   [[nodiscard]] virtual int num_steps_done(std::uint64_t group) const = 0;

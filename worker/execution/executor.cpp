@@ -1,5 +1,7 @@
 #include "worker/execution/executor.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -7,12 +9,10 @@
 
 #include "core/error.hpp"
 #include "core/runs.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {
-
-/// Runs of a device before its simulation says how many it takes together: as many for any device.
-constexpr std::size_t first_group_size = 128;
 
 /// Leaves a simulation from within, where it reports progress.
 struct Abandoned {};
@@ -43,6 +43,27 @@ class Counted {
  private:
   std::atomic<std::size_t>& count_;
 };
+
+/// To the bit, in all that is sent of them.
+bool are_same(const RunResult& a, const RunResult& b) {
+  const auto bytes_of = [](const RunResult& result) {
+    proto::ComputedRun message;
+    wire::write_run({.result = result}, message);
+    return message.SerializeAsString();
+  };
+  return bytes_of(a) == bytes_of(b);
+}
+
+/// @throws DeviceError if a device found something else than a processor.
+void expect_same(const std::vector<RunResult>& results, const std::vector<RunResult>& of_device) {
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (are_same(results[i], of_device[i])) continue;
+    throw DeviceError(fmt::format(
+        "run {} differs between device and processor: the device or its driver is broken, and no "
+        "run of this worker can be trusted",
+        results[i].run.value));
+  }
+}
 
 }  // namespace
 
@@ -192,11 +213,9 @@ std::optional<std::string> Executor::failure() const {
 
 void Executor::serve(Place place,
                      const std::function<void(const std::shared_ptr<Batch>&)>& compute) {
-  const std::size_t size_max =
-      place == Place::processor ? config_.batch_size_max : first_group_size;
   bool has_failed = false;
   try {
-    while (const std::shared_ptr<Batch> batch = next_batch(place, size_max)) compute(batch);
+    while (const std::shared_ptr<Batch> batch = next_batch(place)) compute(batch);
   } catch (const std::exception& error) {
     const std::lock_guard lock(mutex_);
     if (!failure_) failure_ = error.what();
@@ -208,12 +227,17 @@ void Executor::serve(Place place,
   changed_.notify_all();
 }
 
-std::shared_ptr<Executor::Batch> Executor::next_batch(Place place, std::size_t size_max) {
+std::shared_ptr<Executor::Batch> Executor::next_batch(Place place) {
   const RunQueue::IsWanted is_wanted = wanted_by(place);
   std::unique_lock lock(mutex_);
   while (true) {
     if (is_ending_ || failure_) return nullptr;
-    TakenRuns assignment = queue_.take(size_max, is_wanted);
+    if (place == Place::processor && !checks_.empty()) {
+      std::shared_ptr<Batch> check = std::move(checks_.back());
+      checks_.pop_back();
+      return check;
+    }
+    TakenRuns assignment = queue_.take(size_max(place), is_wanted);
     if (!assignment.requests.empty()) return begin_batch(std::move(assignment), place);
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
@@ -223,13 +247,12 @@ std::shared_ptr<Executor::Batch> Executor::next_batch(Place place, std::size_t s
   }
 }
 
-std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
-                                                           std::size_t size_max) {
+std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch) {
   const RunQueue::IsWanted is_wanted = wanted_by(batch.place);
   const std::lock_guard lock(mutex_);
   if (is_ending_ || failure_) return nullptr;
   if (queue_.first_campaign(is_wanted) != batch.assignment.campaign) return nullptr;
-  return begin_batch(queue_.take(size_max, is_wanted), batch.place);
+  return begin_batch(queue_.take(size_max(batch.place), is_wanted), batch.place);
 }
 
 std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, Place place) {
@@ -242,6 +265,10 @@ std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, Pla
   batch->started_at = now();
   batch->place = place;
   return batches_[batch->number] = batch;
+}
+
+std::size_t Executor::size_max(Place place) const {
+  return place == Place::processor ? config_.batch_size_max : DeviceSimulation::group_size;
 }
 
 RunQueue::IsWanted Executor::wanted_by(Place place) const {
@@ -280,6 +307,7 @@ void Executor::prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock) 
 void Executor::compute(Batch& batch) {
   try {
     std::vector<RunResult> results = simulate(batch);
+    if (!batch.expected.empty()) return expect_same(results, batch.expected);
     const std::size_t num_together = results.size();
     finish(batch, std::move(results), num_together);
   } catch (const Abandoned&) {
@@ -290,8 +318,8 @@ void Executor::compute(Batch& batch) {
 std::vector<RunResult> Executor::simulate(Batch& batch) {
   const std::vector<RunRequest>& requests = batch.assignment.requests;
   const auto on_progress = [&](int num_steps_now) {
-    if (batch.is_dropped) throw Abandoned{};
-    note_steps(batch, num_steps_now);
+    if (batch.is_dropped || is_ending_) throw Abandoned{};
+    if (batch.expected.empty()) note_steps(batch, num_steps_now);
   };
   std::vector<RunResult> results = batch.prepared->simulate(requests, on_progress);
   PROOFMASS_EXPECT(results.size() == requests.size());

@@ -12,6 +12,8 @@
 namespace proofmass::gpu {
 namespace {
 
+static_assert(DeviceSimulation::group_size == group_lanes);
+
 constexpr std::size_t launch_samples_max = 2048;
 constexpr std::size_t fast_bytes =
     num_words<LoopConstants<double>> * group_lanes * sizeof(std::uint64_t);

@@ -26,7 +26,6 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
   /// @param plan, parts  Outlive this object.
   MicroscopeDeviceSimulation(const RunPlan& plan, const RunParts& parts, Device& device);
 
-  [[nodiscard]] std::size_t group_size() const override { return group_lanes; }
   // The short sessions of so many runs take as long as the longest session of the last ones.
   [[nodiscard]] std::size_t capacity() const override { return num_at_once_ * group_lanes / 2; }
   [[nodiscard]] std::size_t num_in_flight() const override { return num_in_flight_; }
