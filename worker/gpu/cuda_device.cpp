@@ -36,8 +36,6 @@ Symbol driver_symbol(const char* name) {
   return {symbol};
 }
 
-}  // namespace
-
 // The part of the driver's interface that is used, by the names and types of its documentation.
 // The version behind a name is the one that programs compiled today would be linked with. Addresses
 // of a card's memory, numbers there, are pointers here.
@@ -72,8 +70,6 @@ struct CudaFunctions {
 #undef PROOFMASS_CUDA
 };
 
-namespace {
-
 // Of the driver's enumerations.
 constexpr int not_ready = 600;
 constexpr int num_processors_attribute = 16;
@@ -86,34 +82,34 @@ constexpr unsigned event_without_times = 2;
 /// for none of this time.
 constexpr std::chrono::milliseconds poll_interval(1);
 
-const CudaFunctions& cuda_functions() {
+/// @throws DeviceError if there is no driver, or if it lacks one of its functions.
+const CudaFunctions& cuda() {
   static const CudaFunctions functions;
   return functions;
 }
 
-void check_call(const CudaFunctions& cuda, int result, const std::string& what) {
+void check_call(int result, const std::string& what) {
   if (result == 0) return;
   const char* name = nullptr;
-  if (cuda.cuGetErrorName(result, &name) != 0 || name == nullptr) name = "unknown error";
+  if (cuda().cuGetErrorName(result, &name) != 0 || name == nullptr) name = "unknown error";
   throw DeviceError(fmt::format("{}: {} ({})", what, name, result));
 }
 
 /// Those of this machine.
 /// @throws DeviceError if there is no driver or no card, saying which.
 std::vector<CudaCard> cuda_cards() {
-  const CudaFunctions& cuda = cuda_functions();
-  check_call(cuda, cuda.cuInit(0), "NVIDIA driver");
+  check_call(cuda().cuInit(0), "NVIDIA driver");
   int version = 0;
-  check_call(cuda, cuda.cuDriverGetVersion(&version), "version of the NVIDIA driver");
+  check_call(cuda().cuDriverGetVersion(&version), "version of the NVIDIA driver");
   int num_cards = 0;
-  check_call(cuda, cuda.cuDeviceGetCount(&num_cards), "number of NVIDIA cards");
+  check_call(cuda().cuDeviceGetCount(&num_cards), "number of NVIDIA cards");
   if (num_cards == 0) throw DeviceError("no NVIDIA card on this machine");
   std::vector<CudaCard> cards;
   for (int i = 0; i < num_cards; ++i) {
     int device = 0;
     std::array<char, 256> name{};
-    check_call(cuda, cuda.cuDeviceGet(&device, i), fmt::format("card {}", i));
-    check_call(cuda, cuda.cuDeviceGetName(name.data(), static_cast<int>(name.size()) - 1, device),
+    check_call(cuda().cuDeviceGet(&device, i), fmt::format("card {}", i));
+    check_call(cuda().cuDeviceGetName(name.data(), static_cast<int>(name.size()) - 1, device),
                fmt::format("name of card {}", i));
     cards.push_back(
         {.index = i,
@@ -156,49 +152,49 @@ std::vector<CudaCard> cuda_cards_of(std::string_view text) {
 }
 
 CudaDevice::CudaDevice(const CudaCard& card, std::chrono::milliseconds time_max)
-    : cuda_(cuda_functions()), index_(card.index), time_max_(time_max) {
-  check(cuda_.cuDeviceGet(&device_, index_), "not found");
-  check(cuda_.cuDevicePrimaryCtxRetain(&context_, device_), "cannot be opened");
-  check(cuda_.cuCtxSetCurrent(context_), "context");
+    : index_(card.index), time_max_(time_max) {
+  check(cuda().cuDeviceGet(&device_, index_), "not found");
+  check(cuda().cuDevicePrimaryCtxRetain(&context_, device_), "cannot be opened");
+  check(cuda().cuCtxSetCurrent(context_), "context");
   const auto make_stream = [&](Handle& stream, int priority) {
-    check(cuda_.cuStreamCreateWithPriority(&stream, non_blocking_stream, priority), "stream");
+    check(cuda().cuStreamCreateWithPriority(&stream, non_blocking_stream, priority), "stream");
   };
   make_stream(copies_, 0);
   make_stream(queues_[0], 0);
   make_stream(queues_[1], first_priority);
-  for (Handle& mark : marks_) check(cuda_.cuEventCreate(&mark, event_without_times), "event");
+  for (Handle& mark : marks_) check(cuda().cuEventCreate(&mark, event_without_times), "event");
 }
 
 void CudaDevice::check(int result, const char* what) const {
-  if (result != 0) check_call(cuda_, result, fmt::format("card {}: {}", index_, what));
+  if (result != 0) check_call(result, fmt::format("card {}: {}", index_, what));
 }
 
 void CudaDevice::begin(const char* program) {
-  check(cuda_.cuCtxSetCurrent(context_), "context");
+  check(cuda().cuCtxSetCurrent(context_), "context");
   for (Mark mark = 0; mark < num_marks; ++mark) wait(mark);
   for (void* const address : std::exchange(memory_, {})) {
-    check(cuda_.cuMemFree_v2(address), "memory");
+    check(cuda().cuMemFree_v2(address), "memory");
   }
   if (module_ != nullptr) return;
-  check(cuda_.cuModuleLoadData(&module_, program), "driver cannot compile the kernels");
+  check(cuda().cuModuleLoadData(&module_, program), "driver cannot compile the kernels");
 }
 
 CudaDevice::Handle CudaDevice::kernel(const char* name) const {
   Handle function = nullptr;
-  check(cuda_.cuModuleGetFunction(&function, module_, name), name);
+  check(cuda().cuModuleGetFunction(&function, module_, name), name);
   return function;
 }
 
 std::size_t CudaDevice::num_resident_blocks(const char* name, std::size_t num_threads,
                                             std::size_t shared_bytes) {
   Handle function = kernel(name);
-  check(cuda_.cuFuncSetAttribute(function, shared_bytes_attribute, static_cast<int>(shared_bytes)),
+  check(cuda().cuFuncSetAttribute(function, shared_bytes_attribute, static_cast<int>(shared_bytes)),
         "shared memory");
   int num_processors = 0;
   int num_blocks = 0;
-  check(cuda_.cuDeviceGetAttribute(&num_processors, num_processors_attribute, device_),
+  check(cuda().cuDeviceGetAttribute(&num_processors, num_processors_attribute, device_),
         "processors");
-  check(cuda_.cuOccupancyMaxActiveBlocksPerMultiprocessor(
+  check(cuda().cuOccupancyMaxActiveBlocksPerMultiprocessor(
             &num_blocks, function, static_cast<int>(num_threads), shared_bytes),
         "occupancy");
   if (num_blocks == 0) throw DeviceError(fmt::format("card {}: too small", index_));
@@ -208,43 +204,43 @@ std::size_t CudaDevice::num_resident_blocks(const char* name, std::size_t num_th
 std::size_t CudaDevice::free_bytes() {
   std::size_t num_free = 0;
   std::size_t num_total = 0;
-  check(cuda_.cuMemGetInfo_v2(&num_free, &num_total), "memory");
+  check(cuda().cuMemGetInfo_v2(&num_free, &num_total), "memory");
   return num_free;
 }
 
 void* CudaDevice::allocate(std::size_t num_bytes) {
   void* address = nullptr;
-  check(cuda_.cuMemAlloc_v2(&address, num_bytes),
+  check(cuda().cuMemAlloc_v2(&address, num_bytes),
         fmt::format("{} bytes of memory", num_bytes).c_str());
   return memory_.emplace_back(address);
 }
 
 void CudaDevice::copy_in(void* to, std::span<const std::byte> from) {
-  check(cuda_.cuMemcpyHtoDAsync_v2(to, from.data(), from.size(), copies_), "copy to it");
-  check(cuda_.cuStreamSynchronize(copies_), "copy to it");
+  check(cuda().cuMemcpyHtoDAsync_v2(to, from.data(), from.size(), copies_), "copy to it");
+  check(cuda().cuStreamSynchronize(copies_), "copy to it");
 }
 
 void CudaDevice::copy_out(std::span<std::byte> to, const void* from) {
-  check(cuda_.cuMemcpyDtoHAsync_v2(to.data(), from, to.size(), copies_), "copy from it");
-  check(cuda_.cuStreamSynchronize(copies_), "copy from it");
+  check(cuda().cuMemcpyDtoHAsync_v2(to.data(), from, to.size(), copies_), "copy from it");
+  check(cuda().cuStreamSynchronize(copies_), "copy from it");
 }
 
 void CudaDevice::launch(Queue queue, const Launch& launch) {
   Handle stream = queues_[static_cast<std::size_t>(queue)];
   const auto size = [](std::size_t n) { return static_cast<unsigned>(n); };
-  check(cuda_.cuStreamWaitEvent(stream, marks_[launch.after], 0), "event");
-  check(cuda_.cuLaunchKernel(kernel(launch.kernel), size(launch.num_blocks),
-                             size(launch.num_blocks_y), 1, size(launch.num_threads), 1, 1,
-                             size(launch.shared_bytes), stream,
-                             const_cast<void**>(launch.arguments.data()), nullptr),
+  check(cuda().cuStreamWaitEvent(stream, marks_[launch.after], 0), "event");
+  check(cuda().cuLaunchKernel(kernel(launch.kernel), size(launch.num_blocks),
+                              size(launch.num_blocks_y), 1, size(launch.num_threads), 1, 1,
+                              size(launch.shared_bytes), stream,
+                              const_cast<void**>(launch.arguments.data()), nullptr),
         "launch");
-  check(cuda_.cuEventRecord(marks_[launch.mark], stream), "event");
+  check(cuda().cuEventRecord(marks_[launch.mark], stream), "event");
 }
 
 void CudaDevice::wait(Mark mark) {
   // Counting how often it waited, and not the time, is what exempts a process that was stopped.
   for (std::chrono::milliseconds waited{0};; waited += poll_interval) {
-    const int result = cuda_.cuEventQuery(marks_[mark]);
+    const int result = cuda().cuEventQuery(marks_[mark]);
     if (result != not_ready) return check(result, "kernels");
     if (waited >= time_max_) {
       throw DeviceError(fmt::format(

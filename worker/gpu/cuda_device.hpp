@@ -10,8 +10,6 @@
 
 namespace proofmass::worker {
 
-struct CudaFunctions;
-
 /// What NVIDIA's driver says of a card.
 struct CudaCard {
   int index = 0;     ///< The driver's number, from 0.
@@ -57,7 +55,6 @@ class CudaDevice : public Device {
   void check(int result, const char* what) const;
   [[nodiscard]] Handle kernel(const char* name) const;
 
-  const CudaFunctions& cuda_;
   int index_;
   std::chrono::milliseconds time_max_;
   int device_ = 0;

@@ -137,7 +137,6 @@ void MicroscopeDeviceSimulation::make_memory() {
 void MicroscopeDeviceSimulation::add(std::uint64_t number, std::span<const RunRequest> requests) {
   PROOFMASS_EXPECT(!requests.empty() && requests.size() <= group_lanes);
   RunGroup& group = groups_[number];
-  group.number = number;
   for (const RunRequest& request : requests) {
     const AcceptedDraw draw = draw_instrument(parts_.campaign, request.run, request.table_values);
     group.records.push_back(parts_.drawn_record(request.run, draw));
@@ -146,7 +145,8 @@ void MicroscopeDeviceSimulation::add(std::uint64_t number, std::span<const RunRe
     group.record_of.push_back(group.records.size() - 1);
   }
   num_in_flight_ += requests.size();
-  if (group.instruments.empty()) return without_lanes_.push_back(&group);
+  if (group.instruments.empty()) return;
+  group.num_sessions_left = num_samples_.size();
   for (std::size_t i = 0; i < num_samples_.size(); ++i) {
     waiting_.emplace(num_samples_[i], Slot{.group = &group, .session = i});
   }
@@ -241,17 +241,15 @@ void MicroscopeDeviceSimulation::launch() {
 }
 
 std::vector<DeviceSimulation::Ended> MicroscopeDeviceSimulation::advance() {
-  std::vector<Ended> all;
-  for (const RunGroup* group : std::exchange(without_lanes_, {})) all.push_back(ended(*group));
   const std::vector<std::uint32_t> ending = std::exchange(ending_, {});
   const std::size_t num_before = num_launches_;
   launch();
   if (num_before > 0) device_.wait(loops_done(num_before - 1));
-  for (const std::uint32_t slot : ending) end_session(slot, all);
-  return all;
+  for (const std::uint32_t slot : ending) end_session(slot);
+  return take_ended();
 }
 
-void MicroscopeDeviceSimulation::end_session(std::uint32_t index, std::vector<Ended>& all) {
+void MicroscopeDeviceSimulation::end_session(std::uint32_t index) {
   Slot& slot = slots_[index];
   std::vector<std::uint64_t> words(num_words<LaneState> * group_lanes);
   device_.copy_out(std::as_writable_bytes(std::span(words)), memory_.states + index * words.size());
@@ -262,16 +260,21 @@ void MicroscopeDeviceSimulation::end_session(std::uint32_t index, std::vector<En
                                  .health = session_health(state.loop, state.monitor)};
     parts_.keep(slot.session, outcome, group.records[group.record_of[lane]]);
   }
-  if (++group.num_ended == num_samples_.size()) all.push_back(ended(group));
+  --group.num_sessions_left;
   slot.group = nullptr;
 }
 
-DeviceSimulation::Ended MicroscopeDeviceSimulation::ended(const RunGroup& group) {
-  Ended result{.group = group.number, .results = {}};
-  for (const RunRecord& record : group.records) result.results.push_back(plan_.estimate(record));
-  num_in_flight_ -= group.records.size();
-  groups_.erase(result.group);
-  return result;
+std::vector<DeviceSimulation::Ended> MicroscopeDeviceSimulation::take_ended() {
+  std::vector<Ended> all;
+  std::erase_if(groups_, [&](const auto& entry) {
+    const auto& [number, group] = entry;
+    if (group.num_sessions_left > 0) return false;
+    Ended& ended = all.emplace_back(Ended{.group = number, .results = {}});
+    for (const RunRecord& record : group.records) ended.results.push_back(plan_.estimate(record));
+    num_in_flight_ -= group.records.size();
+    return true;
+  });
+  return all;
 }
 
 }  // namespace proofmass::gpu

@@ -35,12 +35,11 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
 
  private:
   struct RunGroup {
-    std::uint64_t number = 0;
     std::vector<RunRecord> records;       ///< Of all requests, in their order.
     std::vector<Instrument> instruments;  ///< Of each lane.
     std::vector<std::size_t> record_of;   ///< Of each lane.
     std::uint64_t num_samples_done = 0;   ///< Of all sessions.
-    std::size_t num_ended = 0;            ///< Sessions.
+    std::size_t num_sessions_left = 0;    ///< None if no draw was accepted.
   };
   struct Slot {
     RunGroup* group = nullptr;  ///< Null while it is free.
@@ -53,8 +52,8 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
   void begin_session(std::uint32_t slot);
   void add_portion(std::uint32_t slot, std::vector<Portion>& portions);
   void launch();
-  void end_session(std::uint32_t slot, std::vector<Ended>& all);
-  [[nodiscard]] Ended ended(const RunGroup& group);
+  void end_session(std::uint32_t slot);
+  [[nodiscard]] std::vector<Ended> take_ended();
 
   const RunPlan& plan_;
   const RunParts& parts_;
@@ -75,7 +74,6 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
   std::size_t num_launches_ = 0;
   std::vector<std::uint32_t> ending_;         ///< Slots whose sessions end in the launch that runs.
   std::map<std::uint64_t, RunGroup> groups_;  ///< In flight, by number.
-  std::vector<const RunGroup*> without_lanes_;  ///< No draw of them was accepted.
 };
 
 /// The kernels in PTX; empty if this build has none.
