@@ -80,11 +80,10 @@ Cards open_cards(const Options& options, std::uint64_t reference_digest, const w
     log({.kind = "card_ready",
          .fields = {{"card", static_cast<std::uint64_t>(card.index)},
                     {"name", card.name},
-                    {"driver", card.driver},
                     {"slots", std::uint64_t{proof->capacity}}}});
     cards.devices.push_back(std::move(device));
     cards.capacity += proof->capacity;
-    ++cards.num_of_kind[fmt::format("{} (CUDA {})", card.name, card.driver)];
+    ++cards.num_of_kind[card.name];
   }
   return cards;
 }
@@ -164,7 +163,14 @@ ServeConfig serve_config(const Options& options, TimePoint program_start, const 
   return config;
 }
 
-/// Turns what goes wrong into a message and an exit code.
+/// Ends the process without waiting for anything.
+[[noreturn]] void exit_at_once(int exit_code) {
+  std::fflush(nullptr);
+  _exit(exit_code);
+}
+
+/// Turns what goes wrong into a message and an exit code. After an error of a card it ends the
+/// process: a driver may wait for a card that hangs as the process exits.
 int reporting_errors(const Program& program, const std::function<int()>& what) {
   const auto fail = [&](const std::exception& error, int exit_code) {
     wire::say(fmt::format("{}: error: {}\n", program.name, error.what()));
@@ -174,6 +180,8 @@ int reporting_errors(const Program& program, const std::function<int()>& what) {
     return what();
   } catch (const InvalidArgument& error) {
     return fail(error, exit_usage);
+  } catch (const DeviceError& error) {
+    exit_at_once(fail(error, exit_failed));
   } catch (const std::exception& error) {
     return fail(error, exit_failed);
   }
@@ -184,11 +192,6 @@ int say_ended(const Ending& ending, const wire::Log& log) {
   if (ending.kind == Ending::Kind::failed) throw Error(ending.reason);
   log({.kind = "worker_ended", .fields = {Field::reason(ending.reason)}});
   return 0;
-}
-
-[[noreturn]] void exit_without_threads(int exit_code) {
-  std::fflush(nullptr);
-  _exit(exit_code);
 }
 
 /// The worker itself; 0, or it throws, or it ends the process because threads do not end.
@@ -205,8 +208,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
   config.hello.set_num_slots(static_cast<std::uint32_t>(num_processor_slots + num_card_slots));
   config.hello.set_num_card_slots(static_cast<std::uint32_t>(num_card_slots));
   config.hello.set_cards(text_of(cards));
-  // A card's thread, one that checks its runs, and those of its driver.
-  constexpr std::size_t num_threads_a_card = 6;
+  constexpr std::size_t num_threads_a_card = 5;  // Its own, and those of its driver.
   wire::require_threads(static_cast<int>(num_threads + num_threads_a_card * cards.devices.size()) +
                         num_threads_beside);
   StopSignals signals(config.signals);
@@ -222,11 +224,14 @@ int work(const Options& options, const Program& program, ServeConfig config,
         {.severity = wire::Severity::error,
          .kind = "computation_hangs",
          .fields = {Field::reason(ending.reason), Field::remark("(the process ends without it)")}});
-    exit_without_threads(exit_hung);
+    exit_at_once(exit_hung);
   }
   const auto conclude = [&] { return say_ended(ending, config.log); };
-  // Nothing is lost with a preparation, which cannot be interrupted and may take minutes.
-  if (executor.is_preparing()) exit_without_threads(reporting_errors(program, conclude));
+  // Nothing is lost with a preparation, which cannot be interrupted and may take minutes, nor with
+  // a card, which may hang.
+  if (executor.is_preparing() || !cards.devices.empty()) {
+    exit_at_once(reporting_errors(program, conclude));
+  }
   return conclude();
 }
 

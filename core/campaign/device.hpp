@@ -20,51 +20,51 @@ class DeviceError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// An accelerator with memory and a queue of kernels of its own, as far as a simulation needs one.
+/// An accelerator with memory and queues of kernels of its own, as far as a simulation needs one.
 /// One thread uses it. Every function throws DeviceError if the device fails.
 class Device {
  public:
-  using Address = std::uint64_t;
-
   virtual ~Device() = default;
 
-  /// Has the kernels of a program, whose names launch() takes. They are in PTX.
-  virtual void load(std::string_view program) = 0;
+  /// Makes the device ready for a program: releases all memory once no kernel runs any more.
+  /// @param program  Its kernels in PTX, the same at every call.
+  virtual void begin(const char* program) = 0;
 
   /// Blocks of a kernel that are computed at the same time.
-  [[nodiscard]] virtual std::size_t num_resident_blocks(std::string_view kernel,
-                                                        std::size_t num_threads,
+  [[nodiscard]] virtual std::size_t num_resident_blocks(const char* kernel, std::size_t num_threads,
                                                         std::size_t shared_bytes) = 0;
   /// Memory that nobody uses, bytes.
   [[nodiscard]] virtual std::size_t free_bytes() = 0;
 
-  /// Memory that lives as long as the device, or until all is released.
-  [[nodiscard]] virtual Address allocate(std::size_t num_bytes) = 0;
-  virtual void release_all() = 0;
+  /// Memory of the device, until begin() is called again.
+  [[nodiscard]] virtual void* allocate(std::size_t num_bytes) = 0;
 
   /// Copy at once, beside the kernels that run.
-  virtual void copy_in(Address to, std::span<const std::byte> from) = 0;
-  virtual void copy_out(std::span<std::byte> to, Address from) = 0;
+  virtual void copy_in(void* to, std::span<const std::byte> from) = 0;
+  virtual void copy_out(std::span<std::byte> to, const void* from) = 0;
 
   /// Which of two queues a kernel waits in; each runs its kernels one after the other. Where both
   /// have one, blocks of that in the second queue begin first.
   enum class Queue : std::uint8_t { first, second };
 
+  /// Which kernel others wait for: the last one that was launched with this mark, if there is one.
+  using Mark = std::size_t;
+  static constexpr Mark num_marks = 4;
+
   struct Launch {
-    std::string_view kernel;
+    const char* kernel = nullptr;
     std::size_t num_blocks = 0;
     std::size_t num_blocks_y = 1;
     std::size_t num_threads = 0;       ///< Of a block.
     std::size_t shared_bytes = 0;      ///< Of a block.
     std::span<void* const> arguments;  ///< Pointers to the kernel's arguments.
+    Mark after = 0;                    ///< The kernel begins after that one has ended.
+    Mark mark = 0;                     ///< Its own.
   };
   virtual void launch(Queue queue, const Launch& launch) = 0;
 
-  /// A point in a queue, after what was launched so far.
-  using Mark = std::size_t;
-  static constexpr Mark num_marks = 8;
-  virtual void set(Mark mark, Queue queue) = 0;
-  virtual void wait_in(Queue queue, Mark mark) = 0;  ///< Before what is launched next.
+  /// Waits until the kernel has ended.
+  /// @throws DeviceError also if it has not within a time that no kernel takes: the device hangs.
   virtual void wait(Mark mark) = 0;
 };
 
@@ -74,13 +74,13 @@ class DeviceSimulation {
   virtual ~DeviceSimulation() = default;
 
   /// Runs that are best added together.
-  [[nodiscard]] virtual std::size_t group_size() const = 0;
+  static constexpr std::size_t group_size = 128;
   /// Runs that keep the device busy: so many are best in flight.
   [[nodiscard]] virtual std::size_t capacity() const = 0;
   [[nodiscard]] virtual std::size_t num_in_flight() const = 0;
 
   /// @param group     A number for these runs that no others in flight have.
-  /// @param requests  At least one, at most group_size().
+  /// @param requests  At least one, at most group_size.
   virtual void add(std::uint64_t group, std::span<const RunRequest> requests) = 0;
   /// Steps that each run of a group in flight has done, as Plan::num_steps() counts them.
   [[nodiscard]] virtual int num_steps_done(std::uint64_t group) const = 0;

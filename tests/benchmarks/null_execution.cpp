@@ -49,12 +49,11 @@ void NullExecution::advance(TimePoint now) {
 }
 
 void NullExecution::begin_batches(TimePoint now) {
-  const auto is_known = [&](wire::CampaignId campaign) { return is_defined(campaign); };
-  const auto has_cards = [](wire::CampaignId) { return false; };
+  const auto is_known = [&](wire::CampaignId campaign, bool) { return is_defined(campaign); };
   const bool takes_time = pace_.batch_time_s > 0.0;
   const std::size_t size_max = takes_time ? batch_size : std::numeric_limits<std::size_t>::max();
   while (batches_.size() < pace_.num_threads) {
-    worker::TakenRuns assignment = waiting_.take(size_max, is_known, has_cards);
+    worker::TakenRuns assignment = waiting_.take(size_max, is_known);
     if (assignment.requests.empty()) return;
     if (!takes_time) {
       finish(assignment, pace_.elapsed_s);

@@ -1,6 +1,6 @@
 #!/bin/bash
-# Checks the programs of a directory on a machine with NVIDIA cards, in some three minutes, and
-# prints what it found: `gpu_check.sh PROGRAMS`. Exits with 1 if a result differs.
+# Checks the programs of a build on a machine with NVIDIA cards, in some four minutes, and prints
+# what it found: `gpu_check.sh PROGRAMS`. Exits with 1 if a result differs.
 set -euo pipefail
 
 programs=$(cd "$1" && pwd)
@@ -68,5 +68,6 @@ run stopped --runs 20000 "${card[@]}"
 same stopped card-40000 0 20000
 run card-10000 --runs 10000 "${card[@]}"
 run card-100000 --runs 100000 "${card[@]}"
+proofmass-card-variants 20000 || failures=$((failures + 1))
 [ "$failures" = 0 ] && echo "no run differs" || echo "$failures comparisons failed"
 [ "$failures" = 0 ]

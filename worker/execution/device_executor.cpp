@@ -1,168 +1,59 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <bit>
-#include <chrono>
-#include <future>
 #include <map>
 #include <utility>
 
 #include "core/math/hash.hpp"
-#include "core/model.hpp"
 #include "worker/execution/executor.hpp"
 
 // How an executor serves a device: runs flow through it group by group, and the thread looks after
 // it every few milliseconds.
 
 namespace proofmass::worker {
-namespace {
 
-/// Until the simulation that they begin says how large a group may be; any device takes so many.
-constexpr std::size_t first_group_size = 128;
-
-bool are_same(const std::vector<double>& a, const std::vector<double>& b) {
-  const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
-  return std::ranges::equal(a, b, {}, bits, bits);
-}
-
-/// To the bit.
-bool are_same(const RunResult& a, const RunResult& b) {
-  return a.run == b.run && a.status == b.status && a.num_draws == b.num_draws &&
-         a.num_rounds == b.num_rounds && a.loss == b.loss && are_same(a.truth, b.truth) &&
-         are_same(a.estimate, b.estimate) && are_same(a.standard_error, b.standard_error) &&
-         are_same(a.fit, b.fit) && are_same(a.correlations, b.correlations) &&
-         are_same(a.health, b.health);
-}
-
-/// Whether a run is one of those to be checked: as good as at random, and the same every time.
-bool is_checked(RunIndex run, double fraction) { return fraction_of(mixed(run.value)) < fraction; }
-
-/// Computes some of a device's runs again, on a thread of its own so that the device goes on.
-class DeviceCheck {
- public:
-  DeviceCheck(const Simulate& simulate, double fraction)
-      : simulate_(simulate), fraction_(fraction) {}
-
-  void add(const std::vector<RunRequest>& requests, const std::vector<RunResult>& results) {
-    for (std::size_t i = 0; i < results.size(); ++i) {
-      if (is_checked(results[i].run, fraction_)) waiting_.push_back({requests[i], results[i]});
-    }
-  }
-
-  /// @throws DeviceError if the device was wrong.
-  void go_on() {
-    using namespace std::chrono_literals;
-    if (running_.valid()) {
-      if (running_.wait_for(0s) != std::future_status::ready) return;
-      running_.get();
-    }
-    if (waiting_.empty()) return;
-    const std::size_t count = std::min(waiting_.size(), model().batch_size());
-    std::vector<Run> runs(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
-    waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
-    running_ = std::async(std::launch::async, [this, runs = std::move(runs)] { check(runs); });
-  }
-
-  /// All that is left.
-  void end() {
-    while (running_.valid() || !waiting_.empty()) {
-      if (running_.valid()) running_.get();
-      go_on();
-    }
-  }
-
- private:
-  struct Run {
-    RunRequest request;
-    RunResult result;
-  };
-
-  void check(const std::vector<Run>& runs) const {
-    std::vector<RunRequest> requests;
-    for (const Run& run : runs) requests.push_back(run.request);
-    const std::vector<RunResult> again = simulate_(requests, [](int) {});
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-      if (are_same(again[i], runs[i].result)) continue;
-      throw DeviceError(fmt::format(
-          "run {} differs between device and processor: the device or its driver is broken, and no "
-          "run of this worker can be trusted",
-          runs[i].request.run.value));
-    }
-  }
-
-  const Simulate& simulate_;
-  double fraction_;
-  std::vector<Run> waiting_;
-  std::future<void> running_;
-};
-
-}  // namespace
-
-void Executor::serve_device(Device& device) {
-  serve([&] {
-    std::shared_ptr<Batch> batch = next_batch_for_device();
-    const bool is_served = batch != nullptr;
-    if (is_served) compute_on(device, std::move(batch));
-    return is_served;
-  });
-}
-
-std::shared_ptr<Executor::Batch> Executor::next_batch_for_device() {
-  const auto is_ready_now = [this](wire::CampaignId campaign) {
-    return is_ready(campaign) && is_on_devices(campaign);
-  };
-  std::unique_lock lock(mutex_);
-  while (!is_ending_ && !failure_) {
-    TakenRuns assignment = queue_.take_for_device(first_group_size, is_ready_now);
-    if (!assignment.requests.empty()) return begin_batch(std::move(assignment), true);
-    changed_.wait(lock);
-  }
-  return nullptr;
-}
-
-std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch,
-                                                           std::size_t size_max) {
-  const wire::CampaignId campaign = batch.assignment.campaign;
-  const std::unique_lock lock(mutex_);
-  if (is_ending_ || failure_) return nullptr;
-  const auto is_ready_now = [this](wire::CampaignId other) {
-    return is_ready(other) && is_on_devices(other);
-  };
-  TakenRuns assignment = queue_.take_for_device(size_max, is_ready_now, campaign);
-  return assignment.requests.empty() ? nullptr : begin_batch(std::move(assignment), true);
-}
-
-void Executor::compute_on(Device& device, std::shared_ptr<Batch> first) {
-  const std::shared_ptr<const PreparedCampaign> prepared = first->prepared;
-  const std::unique_ptr<DeviceSimulation> simulation = prepared->simulate_on(device);
-  DeviceCheck check(prepared->simulate, config_.checked_fraction);
+void Executor::compute_on(Device& device, const std::shared_ptr<Batch>& first) {
+  const std::unique_ptr<DeviceSimulation> simulation = first->prepared->simulate_on(device);
   std::map<std::uint64_t, std::shared_ptr<Batch>> in_flight;
-  std::shared_ptr<Batch> latest = std::move(first);
-  const auto add = [&](std::shared_ptr<Batch> batch) {
+  const auto add = [&](const std::shared_ptr<Batch>& batch) {
     simulation->add(batch->number, batch->assignment.requests);
     in_flight[batch->number] = batch;
-    latest = std::move(batch);
   };
-  add(latest);
+  add(first);
   while (std::ranges::any_of(in_flight, [](const auto& b) { return !b.second->is_dropped; })) {
-    while (simulation->num_in_flight() + simulation->group_size() <= simulation->capacity()) {
-      std::shared_ptr<Batch> next = next_batch_like(*latest, simulation->group_size());
+    while (simulation->num_in_flight() + simulation->group_size <= simulation->capacity()) {
+      const std::shared_ptr<Batch> next = next_batch_like(*first);
       if (next == nullptr) break;
-      add(std::move(next));
+      add(next);
     }
     const std::size_t num_together = simulation->num_in_flight();
     for (DeviceSimulation::Ended& ended : simulation->advance()) {
       const std::shared_ptr<Batch> batch = in_flight.extract(ended.group).mapped();
-      check.add(batch->assignment.requests, ended.results);
-      note_steps(*batch, prepared->num_steps);
+      check_some(*batch, ended.results);
+      note_steps(*batch, batch->prepared->num_steps);
       finish(*batch, std::move(ended.results), num_together);
     }
     for (const auto& [number, batch] : in_flight) {
       note_steps(*batch, simulation->num_steps_done(number));
     }
-    check.go_on();
   }
-  check.end();
+}
+
+void Executor::check_some(const Batch& batch, const std::vector<RunResult>& results) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      // As good as at random, and the same runs every time.
+      if (fraction_of(mixed(results[i].run.value)) >= config_.checked_fraction) continue;
+      const bool has_room = !checks_.empty() && checks_.back()->prepared == batch.prepared &&
+                            checks_.back()->expected.size() < config_.batch_size_max;
+      if (!has_room) {
+        checks_.push_back(std::make_shared<Batch>());
+        checks_.back()->prepared = batch.prepared;
+      }
+      checks_.back()->assignment.requests.push_back(batch.assignment.requests[i]);
+      checks_.back()->expected.push_back(results[i]);
+    }
+  }
+  changed_.notify_all();
 }
 
 }  // namespace proofmass::worker

@@ -1,5 +1,7 @@
 #include "worker/execution/executor.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -7,6 +9,7 @@
 
 #include "core/error.hpp"
 #include "core/runs.hpp"
+#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -41,6 +44,27 @@ class Counted {
   std::atomic<std::size_t>& count_;
 };
 
+/// To the bit, in all that is sent of them.
+bool are_same(const RunResult& a, const RunResult& b) {
+  const auto bytes_of = [](const RunResult& result) {
+    proto::ComputedRun message;
+    wire::write_run({.result = result}, message);
+    return message.SerializeAsString();
+  };
+  return bytes_of(a) == bytes_of(b);
+}
+
+/// @throws DeviceError if a device found something else than a processor.
+void expect_same(const std::vector<RunResult>& results, const std::vector<RunResult>& of_device) {
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (are_same(results[i], of_device[i])) continue;
+    throw DeviceError(fmt::format(
+        "run {} differs between device and processor: the device or its driver is broken, and no "
+        "run of this worker can be trusted",
+        results[i].run.value));
+  }
+}
+
 }  // namespace
 
 Executor::Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config)
@@ -51,10 +75,13 @@ Executor::Executor(Prepare prepare, std::function<void()> on_change, const Execu
   PROOFMASS_EXPECT(config.num_threads >= 1 && config.batch_size_max >= 1 &&
                    config.num_campaigns_max >= 1);
   for (std::size_t i = 0; i < config.num_threads; ++i) {
-    threads_.emplace_back([this] { serve_processor(); });
+    threads_.emplace_back(
+        [this] { serve(Place::processor, [this](const auto& batch) { compute(*batch); }); });
   }
   for (const std::shared_ptr<Device>& device : config.devices) {
-    threads_.emplace_back([this, device] { serve_device(*device); });
+    threads_.emplace_back([this, device] {
+      serve(Place::device, [&](const auto& batch) { compute_on(*device, batch); });
+    });
   }
 }
 
@@ -184,19 +211,11 @@ std::optional<std::string> Executor::failure() const {
   return failure_;
 }
 
-void Executor::serve_processor() {
-  serve([this] {
-    const std::shared_ptr<Batch> batch = next_batch();
-    if (batch != nullptr) compute(*batch);
-    return batch != nullptr;
-  });
-}
-
-void Executor::serve(const std::function<bool()>& compute_next) {
+void Executor::serve(Place place,
+                     const std::function<void(const std::shared_ptr<Batch>&)>& compute) {
   bool has_failed = false;
   try {
-    while (compute_next()) {
-    }
+    while (const std::shared_ptr<Batch> batch = next_batch(place)) compute(batch);
   } catch (const std::exception& error) {
     const std::lock_guard lock(mutex_);
     if (!failure_) failure_ = error.what();
@@ -208,14 +227,18 @@ void Executor::serve(const std::function<bool()>& compute_next) {
   changed_.notify_all();
 }
 
-std::shared_ptr<Executor::Batch> Executor::next_batch() {
-  const auto is_ready_now = [this](wire::CampaignId campaign) { return is_ready(campaign); };
-  const auto are_on_devices = [this](wire::CampaignId campaign) { return is_on_devices(campaign); };
+std::shared_ptr<Executor::Batch> Executor::next_batch(Place place) {
+  const RunQueue::IsWanted is_wanted = wanted_by(place);
   std::unique_lock lock(mutex_);
   while (true) {
     if (is_ending_ || failure_) return nullptr;
-    TakenRuns assignment = queue_.take(config_.batch_size_max, is_ready_now, are_on_devices);
-    if (!assignment.requests.empty()) return begin_batch(std::move(assignment));
+    if (place == Place::processor && !checks_.empty()) {
+      std::shared_ptr<Batch> check = std::move(checks_.back());
+      checks_.pop_back();
+      return check;
+    }
+    TakenRuns assignment = queue_.take(size_max(place), is_wanted);
+    if (!assignment.requests.empty()) return begin_batch(std::move(assignment), place);
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
     } else {
@@ -224,7 +247,15 @@ std::shared_ptr<Executor::Batch> Executor::next_batch() {
   }
 }
 
-std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, bool is_on_device) {
+std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch) {
+  const RunQueue::IsWanted is_wanted = wanted_by(batch.place);
+  const std::lock_guard lock(mutex_);
+  if (is_ending_ || failure_) return nullptr;
+  if (queue_.first_campaign(is_wanted) != batch.assignment.campaign) return nullptr;
+  return begin_batch(queue_.take(size_max(batch.place), is_wanted), batch.place);
+}
+
+std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, Place place) {
   KnownCampaign& known = campaigns_.at(assignment.campaign);
   known.used = ++num_uses_;
   const auto batch = std::make_shared<Batch>();
@@ -232,21 +263,26 @@ std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, boo
   batch->assignment = std::move(assignment);
   batch->prepared = known.prepared;
   batch->started_at = now();
-  batch->is_on_device = is_on_device;
+  batch->place = place;
   return batches_[batch->number] = batch;
 }
 
-bool Executor::is_ready(wire::CampaignId campaign) const {
-  const auto found = campaigns_.find(campaign);
-  return found != campaigns_.end() && found->second.prepared != nullptr;
+std::size_t Executor::size_max(Place place) const {
+  return place == Place::processor ? config_.batch_size_max : DeviceSimulation::group_size;
 }
 
-bool Executor::is_on_devices(wire::CampaignId campaign) const {
-  return !config_.devices.empty() && campaigns_.at(campaign).prepared->simulate_on != nullptr;
+RunQueue::IsWanted Executor::wanted_by(Place place) const {
+  return [this, place](wire::CampaignId campaign, bool is_for_cards) {
+    const auto known = campaigns_.find(campaign);
+    if (known == campaigns_.end() || known->second.prepared == nullptr) return false;
+    const bool is_on_device =
+        is_for_cards && !config_.devices.empty() && known->second.prepared->simulate_on != nullptr;
+    return is_on_device == (place == Place::device);
+  };
 }
 
 wire::CampaignId Executor::campaign_to_prepare() const {
-  return queue_.first_campaign([this](wire::CampaignId campaign) {
+  return queue_.first_campaign([this](wire::CampaignId campaign, bool /*is_for_cards*/) {
     const auto found = campaigns_.find(campaign);
     return found != campaigns_.end() && !found->second.prepared && !found->second.is_preparing;
   });
@@ -271,6 +307,7 @@ void Executor::prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock) 
 void Executor::compute(Batch& batch) {
   try {
     std::vector<RunResult> results = simulate(batch);
+    if (!batch.expected.empty()) return expect_same(results, batch.expected);
     const std::size_t num_together = results.size();
     finish(batch, std::move(results), num_together);
   } catch (const Abandoned&) {
@@ -281,8 +318,8 @@ void Executor::compute(Batch& batch) {
 std::vector<RunResult> Executor::simulate(Batch& batch) {
   const std::vector<RunRequest>& requests = batch.assignment.requests;
   const auto on_progress = [&](int num_steps_now) {
-    if (batch.is_dropped) throw Abandoned{};
-    note_steps(batch, num_steps_now);
+    if (batch.is_dropped || is_ending_) throw Abandoned{};
+    if (batch.expected.empty()) note_steps(batch, num_steps_now);
   };
   std::vector<RunResult> results = batch.prepared->simulate(requests, on_progress);
   PROOFMASS_EXPECT(results.size() == requests.size());
@@ -315,7 +352,7 @@ void Executor::finish(const Batch& batch, std::vector<RunResult> results,
                            .computed = {.result = std::move(result),
                                         .compute_s = compute_s,
                                         .elapsed_s = elapsed_s,
-                                        .is_by_card = batch.is_on_device}});
+                                        .is_by_card = batch.place == Place::device}});
     }
   }
   on_change_();

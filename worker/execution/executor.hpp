@@ -56,7 +56,8 @@ struct ExecutorConfig {
 /// when its first run is due, while the others go on.
 ///
 /// A device is given runs where many wait, since a few take it as long as many. Some of them are
-/// computed by the processor, too; a device that differs ends the executor, as one that fails does.
+/// computed by processors, too, before other runs; a device that differs ends the executor, as one
+/// that fails does.
 class Executor final : public Execution {
  public:
   /// @param prepare    Called on the threads, once for each definition.
@@ -97,35 +98,39 @@ class Executor final : public Execution {
     std::optional<Duration> batch_time;  ///< Of the last one among those that were as large.
   };
 
+  enum class Place : std::uint8_t { processor, device };
+
   /// Runs that are computed together. The thread shares it with `batches_`, from which it is
-  /// taken when it is dropped.
+  /// taken when it is dropped; a check is not listed there.
   struct Batch {
     std::uint64_t number = 0;
     TakenRuns assignment;
     std::shared_ptr<const PreparedCampaign> prepared;
     TimePoint started_at;
-    bool is_on_device = false;
+    Place place = Place::processor;
+    std::vector<RunResult> expected;  ///< What a device found. Empty if its results are wanted.
     std::atomic<int> num_steps_done = 0;
     std::atomic<bool> is_dropped = false;
   };
 
-  void serve(const std::function<bool()>& compute_next);
-  void serve_processor();
-  void serve_device(Device& device);
+  /// What a thread serves: takes and computes batches until the end.
+  void serve(Place place, const std::function<void(const std::shared_ptr<Batch>&)>& compute);
   /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
-  [[nodiscard]] std::shared_ptr<Batch> next_batch();
-  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment, bool is_on_device = false);
-  /// Waits for runs that are for cards; null at the end.
-  [[nodiscard]] std::shared_ptr<Batch> next_batch_for_device();
-  /// More such runs of the same campaign, if they wait; null if those of another one come first.
-  [[nodiscard]] std::shared_ptr<Batch> next_batch_like(const Batch& batch, std::size_t size_max);
-  void compute_on(Device& device, std::shared_ptr<Batch> first);
-  [[nodiscard]] bool is_ready(wire::CampaignId campaign) const;
-  /// Whether devices compute the campaign's runs. @pre is_ready().
-  [[nodiscard]] bool is_on_devices(wire::CampaignId campaign) const;
+  [[nodiscard]] std::shared_ptr<Batch> next_batch(Place place);
+  /// More runs of the same campaign for the same place, if they wait; null if those of another one
+  /// come first.
+  [[nodiscard]] std::shared_ptr<Batch> next_batch_like(const Batch& batch);
+  [[nodiscard]] std::shared_ptr<Batch> begin_batch(TakenRuns assignment, Place place);
+  /// Runs for cards are wanted by devices, unless these cannot compute the campaign; all others by
+  /// processors.
+  [[nodiscard]] RunQueue::IsWanted wanted_by(Place place) const;
   [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] std::size_t size_max(Place place) const;
   void compute(Batch& batch);
+  void compute_on(Device& device, const std::shared_ptr<Batch>& first);
+  /// Has processors compute some of a device's runs again.
+  void check_some(const Batch& batch, const std::vector<RunResult>& results);
   [[nodiscard]] std::vector<RunResult> simulate(Batch& batch);
   void note_steps(Batch& batch, int num_steps_now);
   /// @param num_together  Runs that shared the time of the batch.
@@ -142,13 +147,14 @@ class Executor final : public Execution {
 
   mutable std::mutex mutex_;  ///< Guards all that follows but the threads.
   std::condition_variable changed_;
-  bool is_ending_ = false;
-  std::size_t num_serving_ = 0;  ///< Threads that have not come to their end.
+  std::atomic<bool> is_ending_ = false;  ///< Read without the mutex, too.
+  std::size_t num_serving_ = 0;          ///< Threads that have not come to their end.
   std::uint64_t num_uses_ = 0;
   std::uint64_t num_batches_ = 0;
   std::map<wire::CampaignId, KnownCampaign> campaigns_;
   RunQueue queue_;
   std::map<std::uint64_t, std::shared_ptr<Batch>> batches_;
+  std::vector<std::shared_ptr<Batch>> checks_;  ///< Runs of devices that are to be computed again.
   std::vector<FinishedRun> finished_;
   std::optional<std::string> failure_;
 

@@ -21,16 +21,13 @@ void RunQueue::add(const proto::RunLease& lease, std::span<const RunRange> runs)
   }
 }
 
-TakenRuns RunQueue::take(std::size_t count_max, const IsReady& is_ready,
-                         const IsReady& are_on_cards) {
-  const auto is_fit = [&](const Waiting& run) {
-    return is_ready(run.campaign) && !(run.is_for_cards && are_on_cards(run.campaign));
-  };
+TakenRuns RunQueue::take(std::size_t count_max, const IsWanted& is_wanted) {
   TakenRuns assignment;
-  assignment.campaign = campaign_of_first(is_fit);
+  assignment.campaign = first_campaign(is_wanted);
   for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
     const bool can_join = assignment.requests.empty() || !run->is_alone;
-    if (run->campaign != assignment.campaign || !can_join || !is_fit(*run)) {
+    if (run->campaign != assignment.campaign || !can_join ||
+        !is_wanted(run->campaign, run->is_for_cards)) {
       ++run;
       continue;
     }
@@ -41,23 +38,6 @@ TakenRuns RunQueue::take(std::size_t count_max, const IsReady& is_ready,
     assignment.requests.push_back(std::move(run->request));
     run = runs_.erase(run);
     if (is_alone) break;
-  }
-  return assignment;
-}
-
-TakenRuns RunQueue::take_for_device(std::size_t count_max, const IsReady& is_ready,
-                                    std::optional<wire::CampaignId> wanted) {
-  TakenRuns assignment;
-  assignment.campaign = campaign_of_first(
-      [&](const Waiting& run) { return run.is_for_cards && is_ready(run.campaign); });
-  if (wanted && assignment.campaign != *wanted) return assignment;
-  for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
-    if (run->campaign != assignment.campaign || !run->is_for_cards) {
-      ++run;
-      continue;
-    }
-    assignment.requests.push_back(std::move(run->request));
-    run = runs_.erase(run);
   }
   return assignment;
 }
@@ -86,13 +66,9 @@ bool RunQueue::has(wire::CampaignId campaign) const {
   return std::ranges::any_of(runs_, [&](const Waiting& run) { return run.campaign == campaign; });
 }
 
-wire::CampaignId RunQueue::first_campaign(const IsReady& is_wanted) const {
-  return campaign_of_first([&](const Waiting& run) { return is_wanted(run.campaign); });
-}
-
-wire::CampaignId RunQueue::campaign_of_first(
-    const std::function<bool(const Waiting&)>& is_fit) const {
-  const auto found = std::ranges::find_if(runs_, is_fit);
+wire::CampaignId RunQueue::first_campaign(const IsWanted& is_wanted) const {
+  const auto found = std::ranges::find_if(
+      runs_, [&](const Waiting& run) { return is_wanted(run.campaign, run.is_for_cards); });
   return found == runs_.end() ? wire::CampaignId{} : found->campaign;
 }
 

@@ -1,8 +1,7 @@
 #pragma once
 
 #include <array>
-#include <map>
-#include <memory>
+#include <chrono>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,13 +10,10 @@
 
 namespace proofmass::worker {
 
-struct CudaFunctions;
-
 /// What NVIDIA's driver says of a card.
 struct CudaCard {
-  int index = 0;       ///< The driver's number, from 0.
-  std::string name;    ///< `NVIDIA H100 80GB HBM3`.
-  std::string driver;  ///< The CUDA version that the driver knows: `13.0`.
+  int index = 0;     ///< The driver's number, from 0.
+  std::string name;  ///< `NVIDIA H100 80GB HBM3 (CUDA 13.0)`: the version that its driver knows.
 };
 
 /// The cards of an option's value: `all`, or numbers such as `0,1`; none for `none`. The driver,
@@ -25,26 +21,31 @@ struct CudaCard {
 /// @throws InvalidArgument reading `gpu = 7 (must be ...)`, or what is missing here.
 [[nodiscard]] std::vector<CudaCard> cuda_cards_of(std::string_view text);
 
-/// A card as a Device. Everything on it is released with this object.
-class CudaDevice final : public Device {
+/// A launch takes 9 ms on an H100. As each processor of a card has the same number of runs, it
+/// takes in proportion longer the fewer units for double precision a processor has: 0.3 s where
+/// there are 2 of them, as in cards for games, instead of 64. This is 200 times as long, for cards
+/// that several programs share.
+inline constexpr std::chrono::milliseconds kernel_time_max = std::chrono::minutes(1);
+
+/// A card as a Device. What is on it stays there until the process ends: a driver whose card hangs
+/// would wait for that for ever if it were asked to release anything.
+class CudaDevice : public Device {
  public:
+  /// @param time_max  A kernel that takes longer hangs. Time in which the process is stopped does
+  ///                  not count.
   /// @throws DeviceError
-  explicit CudaDevice(const CudaCard& card);
-  ~CudaDevice() override;
+  explicit CudaDevice(const CudaCard& card, std::chrono::milliseconds time_max = kernel_time_max);
   CudaDevice(const CudaDevice&) = delete;
   CudaDevice& operator=(const CudaDevice&) = delete;
 
-  void load(std::string_view program) override;
-  [[nodiscard]] std::size_t num_resident_blocks(std::string_view kernel, std::size_t num_threads,
+  void begin(const char* program) override;
+  [[nodiscard]] std::size_t num_resident_blocks(const char* kernel, std::size_t num_threads,
                                                 std::size_t shared_bytes) override;
   [[nodiscard]] std::size_t free_bytes() override;
-  [[nodiscard]] Address allocate(std::size_t num_bytes) override;
-  void release_all() override;
-  void copy_in(Address to, std::span<const std::byte> from) override;
-  void copy_out(std::span<std::byte> to, Address from) override;
+  [[nodiscard]] void* allocate(std::size_t num_bytes) override;
+  void copy_in(void* to, std::span<const std::byte> from) override;
+  void copy_out(std::span<std::byte> to, const void* from) override;
   void launch(Queue queue, const Launch& launch) override;
-  void set(Mark mark, Queue queue) override;
-  void wait_in(Queue queue, Mark mark) override;
   void wait(Mark mark) override;
 
  private:
@@ -52,19 +53,17 @@ class CudaDevice final : public Device {
   using Handle = void*;
 
   void check(int result, const char* what) const;
-  [[nodiscard]] Handle kernel(std::string_view name);
-  void make_current() const;
+  [[nodiscard]] Handle kernel(const char* name) const;
 
-  const CudaFunctions& cuda_;
-  CudaCard card_;
+  int index_;
+  std::chrono::milliseconds time_max_;
   int device_ = 0;
   Handle context_ = nullptr;
   Handle module_ = nullptr;
   Handle copies_ = nullptr;
   std::array<Handle, 2> queues_{};
   std::array<Handle, num_marks> marks_{};
-  std::map<std::string, Handle, std::less<>> kernels_;
-  std::vector<Address> memory_;
+  std::vector<void*> memory_;
 };
 
 }  // namespace proofmass::worker

@@ -23,8 +23,9 @@ void add(RunQueue& queue, const proto::RunLease& lease) {
   queue.add(lease, std::array{wire::runs_of(lease)});
 }
 
-bool always(wire::CampaignId) { return true; }
-bool never(wire::CampaignId) { return false; }
+bool all(wire::CampaignId, bool) { return true; }
+bool those_for_cards(wire::CampaignId, bool is_for_cards) { return is_for_cards; }
+bool those_for_processors(wire::CampaignId, bool is_for_cards) { return !is_for_cards; }
 
 Indices indices(const TakenRuns& assignment) {
   Indices runs;
@@ -37,9 +38,9 @@ TEST(RunQueue, HandsOutRunsAcrossLeasesInTheOrderInWhichTheyCame) {
   add(queue, lease(1, 10, 3));
   add(queue, lease(1, 40, 1));
   add(queue, lease(1, 5, 2));
-  EXPECT_EQ(indices(queue.take(5, always, never)), (Indices{10, 11, 12, 40, 5}));
-  EXPECT_EQ(indices(queue.take(16, always, never)), Indices{6});
-  EXPECT_TRUE(queue.take(16, always, never).requests.empty());
+  EXPECT_EQ(indices(queue.take(5, all)), (Indices{10, 11, 12, 40, 5}));
+  EXPECT_EQ(indices(queue.take(16, all)), Indices{6});
+  EXPECT_TRUE(queue.take(16, all).requests.empty());
 }
 
 TEST(RunQueue, PutsRunsOfOneCampaignTogether) {
@@ -47,20 +48,20 @@ TEST(RunQueue, PutsRunsOfOneCampaignTogether) {
   add(queue, lease(1, 0, 2));
   add(queue, lease(2, 0, 2));
   add(queue, lease(1, 7, 1));
-  const TakenRuns first = queue.take(4, always, never);
+  const TakenRuns first = queue.take(4, all);
   EXPECT_EQ(first.campaign, wire::CampaignId{1});
   EXPECT_EQ(indices(first), (Indices{0, 1, 7}));
-  EXPECT_EQ(queue.take(4, always, never).campaign, wire::CampaignId{2});
+  EXPECT_EQ(queue.take(4, all).campaign, wire::CampaignId{2});
 }
 
 TEST(RunQueue, PassesOverACampaignThatIsNotReady) {
   RunQueue queue;
   add(queue, lease(1, 0, 2));
   add(queue, lease(2, 5, 1));
-  const auto is_ready = [](wire::CampaignId campaign) { return campaign.value == 2; };
-  EXPECT_EQ(queue.take(4, is_ready, never).campaign, wire::CampaignId{2});
-  EXPECT_TRUE(queue.take(4, is_ready, never).requests.empty());
-  EXPECT_EQ(queue.first_campaign(always), wire::CampaignId{1});
+  const auto is_ready = [](wire::CampaignId campaign, bool) { return campaign.value == 2; };
+  EXPECT_EQ(queue.take(4, is_ready).campaign, wire::CampaignId{2});
+  EXPECT_TRUE(queue.take(4, is_ready).requests.empty());
+  EXPECT_EQ(queue.first_campaign(all), wire::CampaignId{1});
   EXPECT_EQ(queue.first_campaign(is_ready), wire::CampaignId{});
 }
 
@@ -72,10 +73,10 @@ TEST(RunQueue, LeavesARunThatIsToBeAloneAlone) {
   add(queue, alone(1, 5));
   add(queue, alone(1, 6));
   add(queue, lease(1, 2, 1));
-  EXPECT_EQ(indices(queue.take(16, always, never)), Indices{9});
-  EXPECT_EQ(indices(queue.take(16, always, never)), (Indices{0, 1, 2}));
-  EXPECT_EQ(indices(queue.take(16, always, never)), Indices{5});
-  EXPECT_EQ(indices(queue.take(16, always, never)), Indices{6});
+  EXPECT_EQ(indices(queue.take(16, all)), Indices{9});
+  EXPECT_EQ(indices(queue.take(16, all)), (Indices{0, 1, 2}));
+  EXPECT_EQ(indices(queue.take(16, all)), Indices{5});
+  EXPECT_EQ(indices(queue.take(16, all)), Indices{6});
 }
 
 TEST(RunQueue, MakesSmallerBatchesOfALeaseThatWantsThem) {
@@ -84,13 +85,12 @@ TEST(RunQueue, MakesSmallerBatchesOfALeaseThatWantsThem) {
   last.set_batch_runs_max(2);
   add(queue, last);
   add(queue, lease(1, 7, 6));
-  EXPECT_EQ(indices(queue.take(4, always, never)), (Indices{0, 1}));
-  EXPECT_EQ(indices(queue.take(1, always, never)), Indices{2});
-  EXPECT_EQ(indices(queue.take(4, always, never)), (Indices{3, 4}));
-  EXPECT_EQ(indices(queue.take(4, always, never)), (Indices{7, 8, 9, 10}));
+  EXPECT_EQ(indices(queue.take(4, all)), (Indices{0, 1}));
+  EXPECT_EQ(indices(queue.take(1, all)), Indices{2});
+  EXPECT_EQ(indices(queue.take(4, all)), (Indices{3, 4}));
+  EXPECT_EQ(indices(queue.take(4, all)), (Indices{7, 8, 9, 10}));
   add(queue, last);
-  EXPECT_EQ(indices(queue.take(4, always, never)), (Indices{11, 12, 0, 1}))
-      << "as the first run's lease";
+  EXPECT_EQ(indices(queue.take(4, all)), (Indices{11, 12, 0, 1})) << "as the first run's lease";
 }
 
 TEST(RunQueue, LeavesToCardsWhatIsForThem) {
@@ -99,22 +99,23 @@ TEST(RunQueue, LeavesToCardsWhatIsForThem) {
   for_cards.set_is_for_cards(true);
   add(queue, for_cards);
   add(queue, lease(1, 7, 2));
-  EXPECT_EQ(indices(queue.take_for_device(2, always)), (Indices{0, 1}));
-  EXPECT_EQ(indices(queue.take(16, always, always)), (Indices{7, 8}));
-  EXPECT_TRUE(queue.take(16, always, always).requests.empty());
-  EXPECT_EQ(indices(queue.take(16, always, never)), Indices{2}) << "cards cannot compute it";
+  EXPECT_EQ(indices(queue.take(2, those_for_cards)), (Indices{0, 1}));
+  EXPECT_EQ(indices(queue.take(16, those_for_processors)), (Indices{7, 8}));
+  EXPECT_TRUE(queue.take(16, those_for_processors).requests.empty());
+  EXPECT_EQ(indices(queue.take(16, all)), Indices{2}) << "cards cannot compute it";
 }
 
-TEST(RunQueue, GivesACardOneCampaignAfterTheOther) {
+TEST(RunQueue, SaysWhichCampaignComesFirstForCards) {
   RunQueue queue;
-  for (const std::uint64_t campaign : {1U, 2U}) {
+  add(queue, lease(1, 0, 3));
+  for (const std::uint64_t campaign : {2U, 3U}) {
     proto::RunLease for_cards = lease(campaign, 0, 3);
     for_cards.set_is_for_cards(true);
     add(queue, for_cards);
   }
-  EXPECT_TRUE(queue.take_for_device(2, always, wire::CampaignId{2}).requests.empty());
-  EXPECT_EQ(queue.take_for_device(9, always, wire::CampaignId{1}).requests.size(), 3U);
-  EXPECT_EQ(queue.take_for_device(9, always, wire::CampaignId{2}).requests.size(), 3U);
+  EXPECT_EQ(queue.first_campaign(those_for_cards), wire::CampaignId{2});
+  EXPECT_EQ(queue.take(9, those_for_cards).requests.size(), 3U);
+  EXPECT_EQ(queue.first_campaign(those_for_cards), wire::CampaignId{3});
 }
 
 TEST(RunQueue, MakesNoLargerBatchesThanTheWorkerCanWhateverALeaseWants) {
@@ -122,7 +123,7 @@ TEST(RunQueue, MakesNoLargerBatchesThanTheWorkerCanWhateverALeaseWants) {
   proto::RunLease hostile = lease(1, 0, 5);
   hostile.set_batch_runs_max(0xffffffff);
   add(queue, hostile);
-  EXPECT_EQ(indices(queue.take(4, always, never)), (Indices{0, 1, 2, 3}));
+  EXPECT_EQ(indices(queue.take(4, all)), (Indices{0, 1, 2, 3}));
 }
 
 // The worker has run 8 already.
@@ -130,7 +131,7 @@ TEST(RunQueue, HandsEachRunItsTableValues) {
   RunQueue queue;
   const auto three = test::make_lease({1}, {{7}, 3}, {1}, {1.5, -1.0, 2.5, -2.0, 3.5, -3.0});
   queue.add(three, std::array{RunRange{{7}, 1}, RunRange{{9}, 1}});
-  const TakenRuns assignment = queue.take(3, always, never);
+  const TakenRuns assignment = queue.take(3, all);
   ASSERT_EQ(indices(assignment), (Indices{7, 9}));
   EXPECT_EQ(assignment.requests[0].table_values, (std::vector<double>{1.5, -1.0}));
   EXPECT_EQ(assignment.requests[1].table_values, (std::vector<double>{3.5, -3.0}));
@@ -141,12 +142,12 @@ TEST(RunQueue, DropsWhatIsHereOfTheRangesOfACampaign) {
   add(queue, lease(1, 5, 5));
   add(queue, lease(1, 0, 2));
   add(queue, lease(2, 0, 10));
-  (void)queue.take(2, always, never);
+  (void)queue.take(2, all);
   const std::vector<RunIndex> dropped =
       queue.drop({1}, std::array{RunRange{{0}, 1}, RunRange{{4}, 5}});
   EXPECT_EQ(dropped, (std::vector<RunIndex>{{0}, {7}, {8}}));
-  EXPECT_EQ(indices(queue.take(16, always, never)), (Indices{9, 1}));
-  EXPECT_EQ(indices(queue.take(16, always, never)).size(), 10U);
+  EXPECT_EQ(indices(queue.take(16, all)), (Indices{9, 1}));
+  EXPECT_EQ(indices(queue.take(16, all)).size(), 10U);
 }
 
 TEST(RunQueue, DropsACampaign) {
@@ -156,7 +157,7 @@ TEST(RunQueue, DropsACampaign) {
   queue.drop({1});
   EXPECT_FALSE(queue.has({1}));
   EXPECT_TRUE(queue.has({2}));
-  EXPECT_EQ(indices(queue.take(16, always, never)), Indices{7});
+  EXPECT_EQ(indices(queue.take(16, all)), Indices{7});
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ TEST(Cards, AreRefusedIfTheyAreNone) {
 
 TEST(CudaDevice, SaysWhatFails) {
   const auto prove = [] {
-    CudaDevice device(cuda_cards_of("0").front());
+    CudaDevice device(cuda_cards_of("0").front(), std::chrono::milliseconds(0));
     (void)model().prove(device);
   };
   EXPECT_THAT(failure_with("no_memory", prove), HasSubstr("card 0: "));
@@ -68,6 +68,9 @@ TEST(CudaDevice, SaysWhatFails) {
               HasSubstr(" bytes of memory: CUDA_ERROR_OF_THE_TEST (999)"));
   EXPECT_EQ(failure_with("broken_launch", prove), "card 0: launch: CUDA_ERROR_OF_THE_TEST (999)");
   EXPECT_EQ(failure_with("lost_device", prove), "card 0: kernels: CUDA_ERROR_OF_THE_TEST (999)");
+  EXPECT_THAT(failure_with("hang", prove),
+              HasSubstr("card 0: a kernel has not ended within 0 s (the card hangs: "));
+  EXPECT_EQ(failure_with("", prove), "") << "a card that was reset";
 }
 
 }  // namespace

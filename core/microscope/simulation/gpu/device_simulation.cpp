@@ -12,21 +12,22 @@
 namespace proofmass::gpu {
 namespace {
 
+static_assert(DeviceSimulation::group_size == group_lanes);
+
 constexpr std::size_t launch_samples_max = 2048;
 constexpr std::size_t fast_bytes =
     num_words<LoopConstants<double>> * group_lanes * sizeof(std::uint64_t);
 
 template <typename T>
-Device::Address upload(Device& device, const std::vector<T>& values) {
-  const auto bytes = std::as_bytes(std::span(values));
-  const Device::Address address = device.allocate(bytes.size());
-  device.copy_in(address, bytes);
-  return address;
+T* allocate(Device& device, std::size_t count) {
+  return static_cast<T*>(device.allocate(count * sizeof(T)));
 }
 
 template <typename T>
-T* pointer(Device::Address address) {
-  return reinterpret_cast<T*>(address);
+const T* upload(Device& device, const std::vector<T>& values) {
+  T* const address = allocate<T>(device, values.size());
+  device.copy_in(address, std::as_bytes(std::span(values)));
+  return address;
 }
 
 /// All samples of a session, settling included.
@@ -48,17 +49,9 @@ std::vector<double> all_weights(const LineWeights& weights) {
   return all;
 }
 
-/// Marks of a launch; those of the next one are others.
-enum class LaunchMark : std::size_t { noise_made, loops_done };
-Device::Mark mark_of(LaunchMark mark, std::size_t launch) {
-  return 2 * static_cast<std::size_t>(mark) + launch % 2;
-}
-
-/// Words of a state in the memory of a group of lanes.
-template <typename State>
-void put_lane(const State& state, std::size_t lane, std::span<std::uint64_t> words) {
-  store_words(state, words.data(), lane);
-}
+/// The mark of a launch's loops. The last one but one has the same, and wrote over the noise that
+/// those have read.
+Device::Mark loops_done(std::size_t launch) { return 2 + launch % 2; }
 
 }  // namespace
 
@@ -66,7 +59,7 @@ bool can_simulate(const RunParts& parts) {
   const auto is_short = [](const NoiseFilter& filter) {
     return filter.num_real <= num_device_poles_max;
   };
-  return !program().empty() && !parts.campaign.scenario.has_tests() &&
+  return *program() != '\0' && !parts.campaign.scenario.has_tests() &&
          is_short(parts.noise.linear_x) && is_short(parts.noise.linear_yz) &&
          is_short(parts.noise.angular) &&
          std::ranges::all_of(parts.groups, [](const auto& further) { return further.empty(); });
@@ -75,8 +68,7 @@ bool can_simulate(const RunParts& parts) {
 MicroscopeDeviceSimulation::MicroscopeDeviceSimulation(const RunPlan& plan, const RunParts& parts,
                                                        Device& device)
     : plan_(plan), parts_(parts), device_(device) {
-  device_.release_all();
-  device_.load(program());
+  device_.begin(program());
   make_tables();
   make_memory();
 }
@@ -91,30 +83,24 @@ void MicroscopeDeviceSimulation::make_tables() {
     RunParts::Readers readers(parts_, i);
     const SessionSetup setup = parts_.setup(i, readers);
     const bool is_monitored = parts_.is_quiet(i);
-    tables.push_back(
-        {.samples = pointer<const SharedSample>(upload(device_, samples)),
-         .weights = pointer<const double>(upload(device_, all_weights(parts_.weights[i]))),
-         .residual = is_monitored ? pointer<const double>(
-                                        upload(device_, all_weights(*parts_.residual_weights[i])))
-                                  : nullptr,
-         .num_settling = static_cast<std::uint64_t>(signals.num_settling()),
-         .reference = signals.reference_at_start(),
-         .streams = noise_streams(session.name),
-         .num_lines = static_cast<std::uint32_t>(parts_.weights[i].num_fit_lines()),
-         .kind = static_cast<std::uint32_t>(
-             sample_kind_for(setup.masses, setup.signals, setup.product,
-                             is_monitored ? Monitoring::on : Monitoring::off)),
-         .product = setup.product,
-         .signals = setup.signals});
+    tables.push_back({.samples = upload(device_, samples),
+                      .weights = upload(device_, all_weights(parts_.weights[i])),
+                      .residual = is_monitored
+                                      ? upload(device_, all_weights(*parts_.residual_weights[i]))
+                                      : nullptr,
+                      .num_settling = static_cast<std::uint64_t>(signals.num_settling()),
+                      .reference = signals.reference_at_start(),
+                      .streams = noise_streams(session.name),
+                      .num_lines = static_cast<std::uint32_t>(parts_.weights[i].num_fit_lines()),
+                      .kind = static_cast<std::uint32_t>(
+                          sample_kind_for(setup.masses, setup.signals, setup.product,
+                                          is_monitored ? Monitoring::on : Monitoring::off)),
+                      .product = setup.product,
+                      .signals = setup.signals});
     num_samples_.push_back(samples.size());
     starts_.push_back(start_streams(session.name));
   }
   tables_ = upload(device_, tables);
-  sessions_by_length_.resize(tables.size());
-  std::iota(sessions_by_length_.begin(), sessions_by_length_.end(), 0U);
-  std::ranges::stable_sort(sessions_by_length_, std::greater<>(),
-                           [&](std::size_t i) { return num_samples_[i]; });
-  waiting_.resize(tables.size());
   shared_ = {.filter = {parts_.noise.linear_x, parts_.noise.linear_yz, parts_.noise.angular},
              .star_tracker_factor = parts_.noise.star_tracker_factor,
              .thrust_deviation = parts_.noise.thrust_deviation,
@@ -128,59 +114,53 @@ void MicroscopeDeviceSimulation::make_memory() {
   num_at_once_ = device_.num_resident_blocks("proofmass_loop", group_lanes, fast_bytes);
   // While the sums of a slot are fetched, another one takes its place.
   const std::size_t num_slots = num_at_once_ + num_at_once_ / 8 + 1;
-  constexpr std::size_t word = sizeof(std::uint64_t) * group_lanes;
-  const auto allocate = [&](std::size_t words_a_slot) {
-    return device_.allocate(num_slots * words_a_slot * word);
+  const auto words = [&](std::size_t words_a_lane) {
+    return allocate<std::uint64_t>(device_, num_slots * words_a_lane * group_lanes);
   };
-  memory_.runs = pointer<const std::uint64_t>(allocate(1));
-  memory_.constants = pointer<const std::uint64_t>(allocate(num_words<LoopConstants<double>>));
-  memory_.noise_states =
-      pointer<std::uint64_t>(allocate(num_coloured_channels * num_words<NoiseState<double>>));
-  memory_.states = pointer<std::uint64_t>(allocate(num_words<LaneState>));
+  memory_.runs = words(1);
+  memory_.constants = words(num_words<LoopConstants<double>>);
+  memory_.noise_states = words(num_coloured_channels * num_words<NoiseState<double>>);
+  memory_.states = words(num_words<LaneState>);
   const std::size_t for_noise = device_.free_bytes() / 2;
   const std::size_t samples = for_noise / (2 * num_at_once_ * noise_sample_bytes);
   memory_.launch_samples = static_cast<std::uint32_t>(
       std::min(launch_samples_max, samples / samples_per_noise_block * samples_per_noise_block));
   if (memory_.launch_samples == 0) throw DeviceError("too little memory for the noise of a launch");
   for (std::size_t i = 0; i < 2; ++i) {
-    noise_[i] = device_.allocate(num_at_once_ * memory_.launch_samples * noise_sample_bytes);
-    portions_[i] = device_.allocate(num_at_once_ * sizeof(Portion));
+    noise_[i] =
+        allocate<std::byte>(device_, num_at_once_ * memory_.launch_samples * noise_sample_bytes);
+    portions_[i] = allocate<Portion>(device_, num_at_once_);
   }
   slots_.resize(num_slots);
 }
 
 void MicroscopeDeviceSimulation::add(std::uint64_t number, std::span<const RunRequest> requests) {
   PROOFMASS_EXPECT(!requests.empty() && requests.size() <= group_lanes);
-  auto group = std::make_shared<RunGroup>();
-  group->number = number;
+  RunGroup& group = groups_[number];
   for (const RunRequest& request : requests) {
     const AcceptedDraw draw = draw_instrument(parts_.campaign, request.run, request.table_values);
-    group->records.push_back(parts_.drawn_record(request.run, draw));
+    group.records.push_back(parts_.drawn_record(request.run, draw));
     if (!draw.instrument) continue;
-    group->instruments.push_back(*draw.instrument);
-    group->record_of.push_back(group->records.size() - 1);
+    group.instruments.push_back(*draw.instrument);
+    group.record_of.push_back(group.records.size() - 1);
   }
   num_in_flight_ += requests.size();
-  groups_[number] = group;
-  if (group->instruments.empty()) return without_lanes_.push_back(std::move(group));
-  for (auto& groups : waiting_) groups.push_back(group);
+  if (group.instruments.empty()) return;
+  group.num_sessions_left = num_samples_.size();
+  for (std::size_t i = 0; i < num_samples_.size(); ++i) {
+    waiting_.emplace(num_samples_[i], Slot{.group = &group, .session = i});
+  }
 }
 
 int MicroscopeDeviceSimulation::num_steps_done(std::uint64_t group) const {
   const auto num_all = std::accumulate(num_samples_.begin(), num_samples_.end(), 0.0);
-  const auto num_done = static_cast<double>(groups_.at(group)->num_samples_done);
+  const auto num_done = static_cast<double>(groups_.at(group).num_samples_done);
   return static_cast<int>(num_done / num_all * plan_.num_steps());
 }
 
-/// Gives a free slot to the next session; false if there is none.
-bool MicroscopeDeviceSimulation::begin_session(std::uint32_t index) {
-  const auto longest =
-      std::ranges::find_if(waiting_, [](const auto& groups) { return !groups.empty(); });
-  if (longest == waiting_.end()) return false;
-  Slot& slot = slots_[index];
-  slot = {.group = std::move(longest->front()),
-          .session = sessions_by_length_[static_cast<std::size_t>(longest - waiting_.begin())]};
-  longest->pop_front();
+/// Gives a free slot to the longest session that waits.
+void MicroscopeDeviceSimulation::begin_session(std::uint32_t index) {
+  const Slot& slot = slots_[index] = waiting_.extract(waiting_.begin()).mapped();
   const RunGroup& group = *slot.group;
 
   const Scenario& scenario = parts_.campaign.scenario;
@@ -194,88 +174,85 @@ bool MicroscopeDeviceSimulation::begin_session(std::uint32_t index) {
     const std::size_t i = std::min(lane, group.instruments.size() - 1);
     const RunIndex run = group.records[group.record_of[i]].run;
     runs[lane] = run.value;
-    put_lane(make_loop_constants(group.instruments[i], scenario, session), lane, constants);
+    store_words(make_loop_constants(group.instruments[i], scenario, session), constants.data(),
+                lane);
     const NoiseStates<double> states =
         stationary_states(parts_.noise, parts_.campaign.seed, run, starts_[slot.session]);
     for (std::size_t c = 0; c < states.size(); ++c) {
-      put_lane(states[c], lane, std::span(noise).subspan(c * noise_words, noise_words));
+      store_words(states[c], noise.data() + c * noise_words, lane);
     }
   }
-  const auto put = [&](const std::uint64_t* memory, const std::vector<std::uint64_t>& words) {
-    device_.copy_in(
-        reinterpret_cast<Device::Address>(memory) + index * words.size() * sizeof(std::uint64_t),
-        std::as_bytes(std::span(words)));
+  const auto put = [&](std::uint64_t* memory, const std::vector<std::uint64_t>& words) {
+    device_.copy_in(memory + index * words.size(), std::as_bytes(std::span(words)));
   };
   put(memory_.runs, runs);
   put(memory_.constants, constants);
   put(memory_.noise_states, noise);
-  return true;
+}
+
+/// Adds the next samples of a slot to a launch.
+void MicroscopeDeviceSimulation::add_portion(std::uint32_t index, std::vector<Portion>& portions) {
+  Slot& slot = slots_[index];
+  const std::uint64_t left = num_samples_[slot.session] - slot.next;
+  if (left == 0) return;  // Its sums are to be fetched.
+  const auto count =
+      static_cast<std::uint32_t>(std::min<std::uint64_t>(left, memory_.launch_samples));
+  portions.push_back({.session = static_cast<std::uint32_t>(slot.session),
+                      .slot = index,
+                      .num_lanes = static_cast<std::uint32_t>(slot.group->instruments.size()),
+                      .first = slot.next,
+                      .count = count});
+  slot.next += count;
+  slot.group->num_samples_done += count;
+  if (count == left) ending_.push_back(index);
 }
 
 void MicroscopeDeviceSimulation::launch() {
   std::vector<Portion> portions;
-  const auto advance = [&](std::uint32_t i) {
-    Slot& slot = slots_[i];
-    const std::uint64_t left = num_samples_[slot.session] - slot.next;
-    if (left == 0) return;  // Its sums are to be fetched.
-    const auto count =
-        static_cast<std::uint32_t>(std::min<std::uint64_t>(left, memory_.launch_samples));
-    portions.push_back({.session = static_cast<std::uint32_t>(slot.session),
-                        .slot = i,
-                        .num_lanes = static_cast<std::uint32_t>(slot.group->instruments.size()),
-                        .first = slot.next,
-                        .count = count});
-    slot.next += count;
-    slot.group->num_samples_done += count;
-    if (count == left) ending_.push_back(i);
-  };
   const auto num_slots = static_cast<std::uint32_t>(slots_.size());
   for (std::uint32_t i = 0; i < num_slots; ++i) {
-    if (slots_[i].group != nullptr) advance(i);
+    if (slots_[i].group != nullptr) add_portion(i, portions);
   }
   for (std::uint32_t i = 0; i < num_slots && portions.size() < num_at_once_; ++i) {
-    if (slots_[i].group == nullptr && begin_session(i)) advance(i);
+    if (slots_[i].group != nullptr || waiting_.empty()) continue;
+    begin_session(i);
+    add_portion(i, portions);
   }
   if (portions.empty()) return;
   const std::size_t turn = num_launches_++ % 2;
   device_.copy_in(portions_[turn], std::as_bytes(std::span(portions)));
-  memory_.noise = pointer<std::byte>(noise_[turn]);
+  memory_.noise = noise_[turn];
   std::array<void*, 4> arguments{&shared_, &tables_, &memory_, &portions_[turn]};
-  const Device::Mark noise_made = mark_of(LaunchMark::noise_made, turn);
-  const Device::Mark loops_done = mark_of(LaunchMark::loops_done, turn);
-  if (num_launches_ > 2) device_.wait_in(Device::Queue::first, loops_done);
+  const Device::Mark noise_made = turn;
   device_.launch(Device::Queue::first, {.kernel = "proofmass_noise",
                                         .num_blocks = portions.size(),
                                         .num_blocks_y = num_noise_channels,
                                         .num_threads = group_lanes,
-                                        .arguments = arguments});
-  device_.set(noise_made, Device::Queue::first);
-  device_.wait_in(Device::Queue::second, noise_made);
+                                        .arguments = arguments,
+                                        .after = loops_done(turn),
+                                        .mark = noise_made});
   device_.launch(Device::Queue::second, {.kernel = "proofmass_loop",
                                          .num_blocks = portions.size(),
                                          .num_threads = group_lanes,
                                          .shared_bytes = fast_bytes,
-                                         .arguments = arguments});
-  device_.set(loops_done, Device::Queue::second);
+                                         .arguments = arguments,
+                                         .after = noise_made,
+                                         .mark = loops_done(turn)});
 }
 
 std::vector<DeviceSimulation::Ended> MicroscopeDeviceSimulation::advance() {
-  std::vector<Ended> all;
-  for (const auto& group : std::exchange(without_lanes_, {})) all.push_back(ended(*group));
   const std::vector<std::uint32_t> ending = std::exchange(ending_, {});
   const std::size_t num_before = num_launches_;
   launch();
-  if (num_before > 0) device_.wait(mark_of(LaunchMark::loops_done, num_before - 1));
-  for (const std::uint32_t slot : ending) end_session(slot, all);
-  return all;
+  if (num_before > 0) device_.wait(loops_done(num_before - 1));
+  for (const std::uint32_t slot : ending) end_session(slot);
+  return take_ended();
 }
 
-void MicroscopeDeviceSimulation::end_session(std::uint32_t index, std::vector<Ended>& all) {
+void MicroscopeDeviceSimulation::end_session(std::uint32_t index) {
   Slot& slot = slots_[index];
   std::vector<std::uint64_t> words(num_words<LaneState> * group_lanes);
-  device_.copy_out(std::as_writable_bytes(std::span(words)),
-                   reinterpret_cast<Device::Address>(memory_.states) +
-                       index * words.size() * sizeof(std::uint64_t));
+  device_.copy_out(std::as_writable_bytes(std::span(words)), memory_.states + index * words.size());
   RunGroup& group = *slot.group;
   for (std::size_t lane = 0; lane < group.instruments.size(); ++lane) {
     const auto state = load_words<LaneState>(words.data(), lane);
@@ -283,16 +260,21 @@ void MicroscopeDeviceSimulation::end_session(std::uint32_t index, std::vector<En
                                  .health = session_health(state.loop, state.monitor)};
     parts_.keep(slot.session, outcome, group.records[group.record_of[lane]]);
   }
-  if (++group.num_ended == num_samples_.size()) all.push_back(ended(group));
+  --group.num_sessions_left;
   slot.group = nullptr;
 }
 
-DeviceSimulation::Ended MicroscopeDeviceSimulation::ended(const RunGroup& group) {
-  Ended result{.group = group.number, .results = {}};
-  for (const RunRecord& record : group.records) result.results.push_back(plan_.estimate(record));
-  num_in_flight_ -= group.records.size();
-  groups_.erase(result.group);
-  return result;
+std::vector<DeviceSimulation::Ended> MicroscopeDeviceSimulation::take_ended() {
+  std::vector<Ended> all;
+  std::erase_if(groups_, [&](const auto& entry) {
+    const auto& [number, group] = entry;
+    if (group.num_sessions_left > 0) return false;
+    Ended& ended = all.emplace_back(Ended{.group = number, .results = {}});
+    for (const RunRecord& record : group.records) ended.results.push_back(plan_.estimate(record));
+    num_in_flight_ -= group.records.size();
+    return true;
+  });
+  return all;
 }
 
 }  // namespace proofmass::gpu

@@ -2,10 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <functional>
 #include <map>
-#include <memory>
-#include <string_view>
 #include <vector>
 
 #include "core/campaign/device.hpp"
@@ -28,7 +26,6 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
   /// @param plan, parts  Outlive this object.
   MicroscopeDeviceSimulation(const RunPlan& plan, const RunParts& parts, Device& device);
 
-  [[nodiscard]] std::size_t group_size() const override { return group_lanes; }
   // The short sessions of so many runs take as long as the longest session of the last ones.
   [[nodiscard]] std::size_t capacity() const override { return num_at_once_ * group_lanes / 2; }
   [[nodiscard]] std::size_t num_in_flight() const override { return num_in_flight_; }
@@ -38,51 +35,49 @@ class MicroscopeDeviceSimulation final : public DeviceSimulation {
 
  private:
   struct RunGroup {
-    std::uint64_t number = 0;
     std::vector<RunRecord> records;       ///< Of all requests, in their order.
     std::vector<Instrument> instruments;  ///< Of each lane.
     std::vector<std::size_t> record_of;   ///< Of each lane.
     std::uint64_t num_samples_done = 0;   ///< Of all sessions.
-    std::size_t num_ended = 0;            ///< Sessions.
+    std::size_t num_sessions_left = 0;    ///< None if no draw was accepted.
   };
   struct Slot {
-    std::shared_ptr<RunGroup> group;  ///< Null while it is free.
+    RunGroup* group = nullptr;  ///< Null while it is free.
     std::size_t session = 0;
     std::uint64_t next = 0;  ///< The first sample that no launch has.
   };
 
   void make_tables();
   void make_memory();
-  [[nodiscard]] bool begin_session(std::uint32_t slot);
+  void begin_session(std::uint32_t slot);
+  void add_portion(std::uint32_t slot, std::vector<Portion>& portions);
   void launch();
-  void end_session(std::uint32_t slot, std::vector<Ended>& all);
-  [[nodiscard]] Ended ended(const RunGroup& group);
+  void end_session(std::uint32_t slot);
+  [[nodiscard]] std::vector<Ended> take_ended();
 
   const RunPlan& plan_;
   const RunParts& parts_;
   Device& device_;
-  std::vector<std::size_t> sessions_by_length_;
   std::vector<std::uint64_t> num_samples_;  ///< Of each session, settling included.
   std::vector<NoiseStreams> starts_;        ///< Of each session.
   Shared shared_{};
-  Device::Address tables_ = 0;
+  const SessionTable* tables_ = nullptr;
   std::size_t num_at_once_ = 0;  ///< Slots of a launch.
   GroupMemory memory_{};
-  std::array<Device::Address, 2> noise_{};
-  std::array<Device::Address, 2> portions_{};
+  std::array<std::byte*, 2> noise_{};   ///< Of every second launch.
+  std::array<Portion*, 2> portions_{};  ///< Of every second launch.
 
   std::vector<Slot> slots_;
-  /// Groups whose session i waits, at the place of i in sessions_by_length_.
-  std::vector<std::deque<std::shared_ptr<RunGroup>>> waiting_;
+  /// Sessions without a slot, by their length.
+  std::multimap<std::uint64_t, Slot, std::greater<>> waiting_;
   std::size_t num_in_flight_ = 0;
   std::size_t num_launches_ = 0;
-  std::vector<std::uint32_t> ending_;  ///< Slots whose sessions end in the launch that runs.
-  std::map<std::uint64_t, std::shared_ptr<RunGroup>> groups_;  ///< In flight, by number.
-  std::vector<std::shared_ptr<RunGroup>> without_lanes_;       ///< No draw of them was accepted.
+  std::vector<std::uint32_t> ending_;         ///< Slots whose sessions end in the launch that runs.
+  std::map<std::uint64_t, RunGroup> groups_;  ///< In flight, by number.
 };
 
 /// The kernels in PTX; empty if this build has none.
-[[nodiscard]] std::string_view program();
+[[nodiscard]] const char* program();
 
 /// Whether the kernels compute what a campaign needs; otherwise its runs are left to processors.
 [[nodiscard]] bool can_simulate(const RunParts& parts);

@@ -33,9 +33,15 @@ PROOFMASS_KERNEL __attribute__((launch_bounds(128, 2))) void proofmass_loop(
   for (std::size_t i = 0; i < words; ++i) {
     fast_memory[i * group_lanes + lane] = constants[i * group_lanes + lane];
   }
-  advance_lane_of(shared, sessions[portion.session], memory, portion, position,
-                  {.constants = fast_memory, .stage = reinterpret_cast<Stage*>(stage_memory)},
-                  {.index = lane, .count = portion.num_lanes}, lane);
+  advance_lane_of({.shared = shared,
+                   .session = sessions[portion.session],
+                   .memory = memory,
+                   .portion = portion,
+                   .position = position,
+                   .constants = fast_memory,
+                   .stage = reinterpret_cast<Stage*>(stage_memory),
+                   .threads = {.index = lane, .count = portion.num_lanes}},
+                  lane);
 }
 
 }  // namespace proofmass::gpu

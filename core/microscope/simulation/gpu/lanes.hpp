@@ -16,32 +16,23 @@ namespace proofmass::gpu {
 
 inline constexpr std::size_t group_lanes = 128;
 
-/// A state in eight-byte words.
+/// A state, which consists of doubles or is padded to them, in eight-byte words.
 template <typename State>
 inline constexpr std::size_t num_words = sizeof(State) / sizeof(std::uint64_t);
-
-/// Words of a struct that consists of doubles, or is padded to them.
 template <typename State>
-struct Words {
-  static_assert(std::is_trivially_copyable_v<State> && sizeof(State) % sizeof(std::uint64_t) == 0);
-  std::array<std::uint64_t, num_words<State>> word;
-};
+using Words = std::array<std::uint64_t, num_words<State>>;
 
 template <typename State>
 PROOFMASS_INLINE State load_words(const std::uint64_t* memory, std::size_t lane) {
   Words<State> words;
-  for (std::size_t i = 0; i < num_words<State>; ++i) {
-    words.word[i] = memory[i * group_lanes + lane];
-  }
+  for (std::size_t i = 0; i < words.size(); ++i) words[i] = memory[i * group_lanes + lane];
   return __builtin_bit_cast(State, words);
 }
 
 template <typename State>
 PROOFMASS_INLINE void store_words(const State& state, std::uint64_t* memory, std::size_t lane) {
-  const Words<State> words = __builtin_bit_cast(Words<State>, state);
-  for (std::size_t i = 0; i < num_words<State>; ++i) {
-    memory[i * group_lanes + lane] = words.word[i];
-  }
+  const auto words = __builtin_bit_cast(Words<State>, state);
+  for (std::size_t i = 0; i < words.size(); ++i) memory[i * group_lanes + lane] = words[i];
 }
 
 /// Filters with more real poles are left to processors.
@@ -96,11 +87,11 @@ inline constexpr std::size_t noise_sample_bytes =
 
 /// Memory of the groups, by slot.
 struct GroupMemory {
-  const std::uint64_t* runs;       ///< [slot][lane]: numbers of the runs.
-  const std::uint64_t* constants;  ///< [slot]: words of LoopConstants<double>.
-  std::uint64_t* noise_states;     ///< [slot][channel]: words of NoiseState<double>.
-  std::uint64_t* states;           ///< [slot]: words of LaneState.
-  std::byte* noise;                ///< [portion of the launch][sample]: noise_sample_bytes.
+  std::uint64_t* runs;          ///< [slot][lane]: numbers of the runs.
+  std::uint64_t* constants;     ///< [slot]: words of LoopConstants<double>.
+  std::uint64_t* noise_states;  ///< [slot][channel]: words of NoiseState<double>.
+  std::uint64_t* states;        ///< [slot]: words of LaneState.
+  std::byte* noise;             ///< [portion of the launch][sample]: noise_sample_bytes.
   std::uint32_t launch_samples;
 };
 

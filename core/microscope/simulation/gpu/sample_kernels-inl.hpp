@@ -100,19 +100,15 @@ PROOFMASS_INLINE void make_noise(const Shared& shared, const SessionTable* sessi
 }
 
 /// Reads what is read once, so that it takes no place of what is read again.
-PROOFMASS_INLINE double load_once(const double* address) {
+template <typename T>
+PROOFMASS_INLINE T load_once(const T* address) {
 #ifdef __CUDA_ARCH__
-  double value;
-  asm volatile("ld.global.cg.f64 %0, [%1];" : "=d"(value) : "l"(address));
-  return value;
-#else
-  return *address;
-#endif
-}
-PROOFMASS_INLINE float load_once(const float* address) {
-#ifdef __CUDA_ARCH__
-  float value;
-  asm volatile("ld.global.cg.f32 %0, [%1];" : "=f"(value) : "l"(address));
+  T value;
+  if constexpr (std::is_same_v<T, double>) {
+    asm volatile("ld.global.cg.f64 %0, [%1];" : "=d"(value) : "l"(address));
+  } else {
+    asm volatile("ld.global.cg.f32 %0, [%1];" : "=f"(value) : "l"(address));
+  }
   return value;
 #else
   return *address;
@@ -183,10 +179,16 @@ struct Threads {
   }
 };
 
-/// Memory of a block that is read fast.
-struct FastMemory {
-  std::uint64_t* constants;  ///< Words of LoopConstants<double>, as in a group's memory.
-  Stage* stage;
+/// What a block of threads works on.
+struct Block {
+  const Shared& shared;
+  const SessionTable& session;
+  const GroupMemory& memory;
+  const Portion& portion;
+  std::size_t position;      ///< Of the portion in its launch.
+  std::uint64_t* constants;  ///< Words of LoopConstants<double> in fast memory.
+  Stage* stage;              ///< In fast memory, too.
+  Threads threads;
 };
 
 /// Fills the stage with the samples from `first` on, at most `count`, and their weights.
@@ -212,10 +214,8 @@ PROOFMASS_INLINE void stage_samples(const SessionTable& session, std::uint64_t f
 
 /// Advances one lane by the samples of a portion.
 template <SampleKind kind, std::size_t num_lines>
-PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& session,
-                                   const GroupMemory& memory, const Portion& portion,
-                                   std::size_t position, const FastMemory& fast,
-                                   const Threads& threads, std::size_t lane) {
+PROOFMASS_INLINE void advance_lane(const Block& block, std::size_t lane) {
+  const auto& [shared, session, memory, portion, position, constants, stage, threads] = block;
   constexpr std::size_t slot_words = num_words<LaneState> * group_lanes;
   std::uint64_t* const loop_words = memory.states + portion.slot * slot_words;
   std::uint64_t* const sum_words = loop_words + num_words<Loop<double>> * group_lanes;
@@ -253,22 +253,21 @@ PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& ses
     if (k + 1 < portion.count) next.load(noise, lane);
     const std::uint64_t n = portion.first + k;
     if (k % staged_samples == 0) {
-      stage_samples<kind, num_lines>(session, n, portion.count - k, threads, *fast.stage);
+      stage_samples<kind, num_lines>(session, n, portion.count - k, threads, *stage);
     }
     const bool is_recorded = n >= num_settling;
     const std::uint64_t i = is_recorded ? n - num_settling : n;
     if (is_recorded && i == 0) loop.begin_record();
-    const SharedSample& sample = fast.stage->samples[k % staged_samples];
-    auto own = load_words<LoopConstants<double>>(fast.constants, lane);
+    const SharedSample& sample = stage->samples[k % staged_samples];
+    auto own = load_words<LoopConstants<double>>(constants, lane);
     const Observation<double> observation =
         loop.template advance<kind.masses>(own, shared.drag_free, shared.attitude, sample,
                                            raw.shaped(shared), i % 4 == 0 ? Watch::yes : Watch::no);
     if (!is_recorded) continue;
     const auto values = ground_signals(observation, sample, product);
-    add_sample(values, fast.stage->weights[k % staged_samples], 2 * num_lines, product, recorded,
-               sums);
+    add_sample(values, stage->weights[k % staged_samples], 2 * num_lines, product, recorded, sums);
     if (kind.monitoring == Monitoring::on) {
-      monitor.add(own.sensors, observation, fast.stage->residual[k % staged_samples]);
+      monitor.add(own.sensors, observation, stage->residual[k % staged_samples]);
       if ((i + 1) % LineWeights::block_size == 0) {
         monitor.end_block(i + 1 == LineWeights::block_size);
       }
@@ -283,20 +282,13 @@ PROOFMASS_INLINE void advance_lane(const Shared& shared, const SessionTable& ses
 
 /// advance_lane() of the session's kind.
 template <std::size_t kind = 0>
-PROOFMASS_INLINE void advance_lane_of(const Shared& shared, const SessionTable& session,
-                                      const GroupMemory& memory, const Portion& portion,
-                                      std::size_t position, const FastMemory& fast,
-                                      const Threads& threads, std::size_t lane) {
-  if (session.kind != kind) {
-    if constexpr (kind + 1 < sample_kinds.size()) {
-      advance_lane_of<kind + 1>(shared, session, memory, portion, position, fast, threads, lane);
-    }
-  } else if (session.num_lines == 1) {
-    advance_lane<sample_kinds[kind], 1>(shared, session, memory, portion, position, fast, threads,
-                                        lane);
+PROOFMASS_INLINE void advance_lane_of(const Block& block, std::size_t lane) {
+  if (block.session.kind != kind) {
+    if constexpr (kind + 1 < sample_kinds.size()) advance_lane_of<kind + 1>(block, lane);
+  } else if (block.session.num_lines == 1) {
+    advance_lane<sample_kinds[kind], 1>(block, lane);
   } else {
-    advance_lane<sample_kinds[kind], 2>(shared, session, memory, portion, position, fast, threads,
-                                        lane);
+    advance_lane<sample_kinds[kind], 2>(block, lane);
   }
 }
 
