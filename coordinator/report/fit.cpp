@@ -78,6 +78,7 @@ Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit
               .notes = {"χ²: its mean over the runs; degrees of freedom: what is expected of it"}};
   if (has_p_values) {
     table.columns.insert(table.columns.end(), {{"±", false, 9}, {"p", false, 9}, {"", false, 14}});
+    table.notes.push_back("±: standard error of the ratio, from its scatter over the runs");
     table.notes.push_back(fmt::format(
         "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
         "takes it for, to {:.2g} %",
