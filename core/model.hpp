@@ -117,9 +117,16 @@ class Model {
   [[nodiscard]] virtual std::string_view example_file() const = 0;
 };
 
-/// The model that this program runs campaigns of. It is chosen where the program is linked: each
-/// program is linked with exactly one library that defines this function.
+/// The model that is chosen where a program is linked: each program is linked with exactly one
+/// library that defines this function.
+[[nodiscard]] const Model& built_in_model();
+
+/// The model that this program runs campaigns of: the built-in one unless another is used.
 [[nodiscard]] const Model& model();
+
+/// Replaces the built-in model, before anything asks for model().
+/// @param other  Lives as long as the program.
+void use_model(const Model& other);
 
 /// The results of the campaign that Model::example() describes, for help texts and for limits that
 /// are needed before a campaign is known.

@@ -8,20 +8,25 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "core/campaign/device.hpp"
 #include "core/campaign/name.hpp"
+#include "core/campaign/simulation_crash.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/surroundings.hpp"
+#include "proto/model_program/model_choice.hpp"
+#include "proto/text/visible_text.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/gpu/cuda_device.hpp"
@@ -194,6 +199,24 @@ int say_ended(const Ending& ending, const wire::Log& log) {
   return 0;
 }
 
+/// A crash of what simulates ends the worker as its own would.
+Prepare ending_on_crashes(const Prepare& prepare, const std::string& name) {
+  return [prepare, name](const Campaign& campaign) {
+    PreparedCampaign prepared = prepare(campaign);
+    prepared.simulate = [simulate = std::move(prepared.simulate), name](
+                            std::span<const RunRequest> requests,
+                            const std::function<void(int)>& progress) {
+      try {
+        return simulate(requests, progress);
+      } catch (const SimulationCrash& error) {
+        wire::say(fmt::format("{}: error: {}\n", name, wire::visible_text(error.what())));
+        std::abort();
+      }
+    };
+    return prepared;
+  };
+}
+
 /// The worker itself; 0, or it throws, or it ends the process because threads do not end.
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
@@ -213,7 +236,8 @@ int work(const Options& options, const Program& program, ServeConfig config,
                         num_threads_beside);
   StopSignals signals(config.signals);
   const wire::Wake progress;
-  Executor executor(program.prepare, [&progress] { progress.notify(); },
+  Executor executor(ending_on_crashes(program.prepare, program.name),
+                    [&progress] { progress.notify(); },
                     {.num_threads = num_threads,
                      .batch_size_max = model().batch_size(),
                      .devices = cards.devices,
@@ -275,9 +299,11 @@ int run_worker(int argc, char** argv, const Program& program) {
       "  3    a computation hangs");
   add_options(app, options);
   program.add_options(app);
+  wire::add_model_program_option(app);
   app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
   return reporting_errors(program, [&] {
     wire::settle_surroundings();
+    wire::choose_model(argc, argv);
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& wish) {

@@ -30,6 +30,7 @@
 #include "proto/link/log.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/link/surroundings.hpp"
+#include "proto/model_program/model_choice.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -265,6 +266,7 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 }  // namespace
 
 int run_proofmass_coordinator(int argc, char** argv) {
+  if (const auto refused = refused_model(argc, argv, "proofmass-coordinator")) return *refused;
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
       "On SIGTERM it first lets workers deliver their results; on SIGINT or a second\n"
@@ -279,6 +281,7 @@ int run_proofmass_coordinator(int argc, char** argv) {
   add_service(app, options, ends_when_done);
   add_addresses(app, options);
   add_page_options(app, options.page);
+  wire::add_model_program_option(app);
   return run_program(app, argc, argv, [&] {
     if (ends_when_done) options.end = ServiceEnd::when_done;
     return serve_campaigns(options);

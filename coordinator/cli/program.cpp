@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -19,6 +20,8 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/surroundings.hpp"
+#include "proto/model_program/model_choice.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 
@@ -67,12 +70,26 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   }
 }
 
+std::optional<int> refused_model(int argc, char** argv, std::string_view program) {
+  try {
+    wire::settle_surroundings();
+    wire::choose_model(argc, argv);
+    return std::nullopt;
+  } catch (const Error& error) {
+    wire::say(fmt::format("{}: error: {}\n", program, wire::visible_text(error.what())));
+    return exit_wrong_usage;
+  }
+}
+
 int run_proofmass(int argc, char** argv) {
+  if (const std::optional<int> refused = refused_model(argc, argv, "proofmass")) return *refused;
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
   app.require_subcommand(1);
   wire::add_option_file(app, "TOML file with options, a section a command", "PROOFMASS_CONFIG");
+  wire::add_model_program_option(app);
+  app.fallthrough();  // Behind the command, too.
   Command chosen;
   // As `--help` lists them: the usual ones first.
   const std::vector<std::pair<const char*, std::vector<std::function<void(CLI::App&, Command&)>>>>

@@ -2,7 +2,9 @@
 
 #include <functional>
 #include <initializer_list>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/error.hpp"
 
@@ -36,6 +38,11 @@ using Command = std::function<int()>;
 
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 [[nodiscard]] int run_program(CLI::App& app, int argc, char** argv, const Command& work);
+
+/// Chooses the model, which is to be done first.
+/// @param program  For the message.
+/// @return The exit code if the program that is to simulate cannot be used, which it has said.
+[[nodiscard]] std::optional<int> refused_model(int argc, char** argv, std::string_view program);
 
 /// All of `proofmass`, from its arguments to its exit code.
 [[nodiscard]] int run_proofmass(int argc, char** argv);

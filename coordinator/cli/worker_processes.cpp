@@ -13,6 +13,7 @@
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
+#include "proto/model_program/model_choice.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -47,11 +48,22 @@ WorkerProcesses::~WorkerProcesses() {
 }
 
 void WorkerProcesses::start(const std::string& name) {
+  std::vector<std::string> arguments{executable_.string(),
+                                     "--connect",
+                                     endpoint_,
+                                     "--name",
+                                     name,
+                                     "--threads",
+                                     "1",
+                                     "--gpu",
+                                     name == first_name ? gpus_ : "none",
+                                     "--parent",
+                                     std::to_string(getpid())};
+  if (const auto program = wire::chosen_model_program()) {
+    arguments.insert(arguments.end(), {"--model-program", program->string()});
+  }
   const pid_t process_id = wire::start_program(
-      {.arguments = {executable_.string(), "--connect", endpoint_, "--name", name, "--threads", "1",
-                     "--gpu", name == first_name ? gpus_ : "none", "--parent",
-                     std::to_string(getpid())},
-       .environment = wire::environment_without_settings()});
+      {.arguments = std::move(arguments), .environment = wire::environment_without_settings()});
   processes_.push_back({.name = name, .process_id = process_id});
 }
 

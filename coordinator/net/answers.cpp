@@ -26,6 +26,7 @@
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
+#include "proto/model_program/model_choice.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -94,6 +95,9 @@ Order order_for(const proto::AnswerRequest& request, const ServiceConfig& config
   for (const std::string& option : request.options()) {
     require_option(command, option);
     order.arguments.push_back(option);
+  }
+  if (const auto program = wire::chosen_model_program()) {
+    order.arguments.insert(order.arguments.end(), {"--model-program", program->string()});
   }
   order.arguments.insert(order.arguments.end(),
                          {"--", std::filesystem::absolute(database).string()});

@@ -201,7 +201,7 @@ class MicroscopeModel final : public Model {
 
 }  // namespace
 
-const Model& model() {
+const Model& built_in_model() {
   static const MicroscopeModel microscope;
   return microscope;
 }

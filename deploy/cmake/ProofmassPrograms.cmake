@@ -1,6 +1,6 @@
 # proofmass_add_programs(NAME name MODEL target)
 #
-# The three programs with a model: `target` is an object library that defines proofmass::model()
+# The three programs with a model: `target` is an object library that defines proofmass::built_in_model()
 # (core/model.hpp). They have the names proofmass, proofmass-coordinator and proofmass-worker, as
 # `proofmass run` finds its worker beside itself, and are built in a directory of their own, `name`
 # below the current binary directory. Their targets are name_proofmass, name_proofmass-coordinator

@@ -359,7 +359,7 @@ class OscillatorModel final : public Model {
 
 }  // namespace
 
-const Model& model() {
+const Model& built_in_model() {
   static const OscillatorModel oscillator;
   return oscillator;
 }

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/campaign/law_keys.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 
 namespace proofmass::detail {
@@ -39,13 +40,8 @@ struct Entry {
 /// `{ law = "uniform", minimum = -0.01, maximum = 0.01 }`.
 [[nodiscard]] std::string dispersion_text(const Dispersion& dispersion);
 
-/// Keys that a law has in a campaign file beside `law`, each named like its field of Dispersion.
-[[nodiscard]] std::span<const std::string_view> keys_of(Law law);
-
 [[nodiscard]] std::string_view name_of(Law law);
 
-/// The field of a key, null unless the key has a number.
-[[nodiscard]] double* number_at(Dispersion& dispersion, std::string_view key);
 /// The field of a key, null unless the key has a text.
 [[nodiscard]] std::string* text_at(Dispersion& dispersion, std::string_view key);
 /// The field of a key, null unless the key has a list of numbers.

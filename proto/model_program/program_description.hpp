@@ -1,0 +1,65 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/dispersion.hpp"
+#include "core/campaign/run_result.hpp"
+
+namespace proofmass::wire {
+
+/// A number that the runs of a campaign share, and that a campaign file may change.
+struct ProgramParameter {
+  std::string name;
+  double value = 0.0;  ///< Unless the campaign file has another one.
+};
+
+/// Whether runs of programs may be drawn by a law: its values need no file and no other quantity.
+[[nodiscard]] bool is_law_of_programs(Law law);
+inline constexpr std::string_view laws_of_programs_rule =
+    "must be uniform, normal, truncated_normal, truncated or fixed";
+
+/// Most runs that a program is asked for together.
+inline constexpr std::size_t runs_at_once_max = 64;
+
+/// What a model program draws for each run.
+struct ProgramDraw {
+  std::string name;
+  std::string unit;
+  Dispersion law;  ///< Unless the campaign file has another one.
+};
+
+/// What a model program estimates in each run. The engine knows the true value: an expression of
+/// drawn quantities and parameters, see evaluate_expression().
+struct ProgramQuantity {
+  std::string name;
+  std::string symbol;  ///< For people; the name by default.
+  std::string unit;    ///< SI; `1` by default.
+  double display_scale = 1.0;
+  std::string display_unit;  ///< That of `unit` by default.
+  std::string truth;
+  double objective = std::numeric_limits<double>::infinity();
+  bool has_standard_error = false;
+};
+
+/// What a model program says of itself when it is asked.
+struct ProgramDescription {
+  std::string version;  ///< NAME-VERSION, as Model::version().
+  std::string purpose;
+  std::vector<ProgramParameter> parameters;
+  std::vector<ProgramDraw> drawn;
+  std::vector<ProgramQuantity> quantities;
+  std::vector<std::string> streams;  ///< Of random numbers, each with a seed of its own in a run.
+  std::size_t runs_at_once = 1;      ///< That it is asked for together.
+  std::chrono::seconds run_time_max{600};
+};
+
+/// @param answer  A line of JSON.
+/// @throws ModelProgramError naming field, value and rule.
+[[nodiscard]] ProgramDescription description_in(std::string_view answer);
+
+}  // namespace proofmass::wire

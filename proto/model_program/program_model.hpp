@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "core/model.hpp"
+
+namespace proofmass::wire {
+
+/// The model of a program in any language, which is asked what it is and then not kept.
+/// README.md has what is asked and answered.
+/// @throws ModelProgramError if it cannot be started, or answers what it must not.
+[[nodiscard]] std::unique_ptr<const Model> model_of(const std::filesystem::path& program);
+
+}  // namespace proofmass::wire

@@ -1,0 +1,132 @@
+#include "proto/model_program/program_process.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <optional>
+#include <system_error>
+#include <thread>
+
+#include "proto/link/machine.hpp"
+#include "proto/link/start_program.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+/// Both ends are closed in programs that are started, but for what they are given.
+std::array<int, 2> connected_pair() {
+  std::array<int, 2> ends{};
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) return ends;
+  throw ModelProgramError(
+      fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
+}
+
+}  // namespace
+
+ProgramProcess::ProgramProcess(const std::filesystem::path& program,
+                               std::chrono::milliseconds time_max)
+    : name_(program.string()), time_max_(time_max) {
+  const std::array<int, 2> in = connected_pair();
+  const std::array<int, 2> out = connected_pair();
+  questions_ = in[0];
+  answers_ = out[0];
+  try {
+    process_id_ = start_program({.arguments = {name_},
+                                 .descriptors = {in[1], out[1], STDERR_FILENO},
+                                 .environment = environment_without_settings()});
+  } catch (const Error& error) {
+    for (const int end : {in[0], in[1], out[0], out[1]}) close(end);
+    throw ModelProgramError(fmt::format("model program = {}", error.what()));
+  }
+  close(in[1]);
+  close(out[1]);
+  fcntl(questions_, F_SETFL, O_NONBLOCK);
+  fcntl(answers_, F_SETFL, O_NONBLOCK);
+}
+
+ProgramProcess::~ProgramProcess() {
+  close(questions_);
+  close(answers_);
+  if (process_id_ == 0) return;
+  kill(process_id_, SIGKILL);
+  (void)wait_for_end(process_id_);
+}
+
+std::string ProgramProcess::how_it_ended() {
+  // It has closed its output, which it does just before it ends unless it means to stay.
+  constexpr int attempts_max = 100;
+  for (int i = 0; i < attempts_max; ++i) {
+    if (const std::optional<int> status = status_if_ended(process_id_)) {
+      process_id_ = 0;
+      return end_text(*status);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return "it closed its output";
+}
+
+void ProgramProcess::fail(std::string_view reason) const {
+  throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
+}
+
+void ProgramProcess::write_some(std::string_view& text) const {
+  const ssize_t size = send(questions_, text.data(), text.size(), MSG_NOSIGNAL);
+  if (size >= 0) {
+    text.remove_prefix(static_cast<std::size_t>(size));
+  } else if (errno != EAGAIN && errno != EINTR) {
+    text = {};  // It has closed its input; that it has ended is seen where it should answer.
+  }
+}
+
+void ProgramProcess::read_some() {
+  std::array<char, 65536> part;  // NOLINT: read() fills it.
+  const ssize_t size = read(answers_, part.data(), part.size());
+  if (size > 0) {
+    received_.append(part.data(), static_cast<std::size_t>(size));
+  } else if (size == 0 || (errno != EAGAIN && errno != EINTR)) {
+    fail(fmt::format("gave no answer: {}", how_it_ended()));
+  }
+}
+
+void ProgramProcess::ask(std::span<const std::string> questions,
+                         const std::function<void(std::string_view answer)>& on_answer) {
+  using Clock = std::chrono::steady_clock;
+  std::string all;
+  for (const std::string& question : questions) all += question + '\n';
+  std::string_view unsent = all;
+  std::size_t num_answered = 0;
+  Clock::time_point deadline = Clock::now() + time_max_;
+  while (num_answered < questions.size()) {
+    std::array<pollfd, 2> ends{{{answers_, POLLIN, 0}, {questions_, POLLOUT, 0}}};
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    if (left.count() <= 0) {
+      fail(fmt::format("no answer within {} s",
+                       std::chrono::duration_cast<std::chrono::seconds>(time_max_).count()));
+    }
+    poll(ends.data(), unsent.empty() ? 1 : 2, static_cast<int>(left.count()));
+    if (ends[1].revents != 0) write_some(unsent);
+    if (ends[0].revents != 0) read_some();
+    std::size_t begin = 0;
+    for (std::size_t end = 0; (end = received_.find('\n', begin)) != std::string::npos;) {
+      if (num_answered == questions.size()) break;
+      on_answer(std::string_view(received_).substr(begin, end - begin));
+      begin = end + 1;
+      ++num_answered;
+      deadline = Clock::now() + time_max_;
+    }
+    received_.erase(0, begin);
+    if (received_.size() > answer_size_max) {
+      fail(fmt::format("answers with a line of more than {} bytes", answer_size_max));
+    }
+  }
+  if (!received_.empty()) fail("answers what it was not asked");
+}
+
+}  // namespace proofmass::wire

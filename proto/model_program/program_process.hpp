@@ -1,0 +1,61 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "core/error.hpp"
+
+namespace proofmass::wire {
+
+/// A model program cannot be started, ended, is silent, or answers what it must not.
+class ModelProgramError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Most bytes of a line that a model program answers.
+inline constexpr std::size_t answer_size_max = std::size_t{1} << 20;
+
+/// A model program that runs as a child of this process: it reads questions from its standard
+/// input, a line each, and answers each with a line, in their order. What it prints as standard
+/// error is that of this process.
+class ProgramProcess {
+ public:
+  /// @param time_max  For each answer.
+  /// @throws ModelProgramError if it cannot be started.
+  ProgramProcess(const std::filesystem::path& program, std::chrono::milliseconds time_max);
+  /// Kills it.
+  ~ProgramProcess();
+  ProgramProcess(const ProgramProcess&) = delete;
+  ProgramProcess& operator=(const ProgramProcess&) = delete;
+
+  /// Asks all questions and passes each answer on, without its end of line. Questions and answers
+  /// pass one another, so that neither side waits for the other with more than one of them.
+  ///
+  /// @param on_answer  What it throws leaves answers behind: the process is of no further use.
+  /// @throws ModelProgramError, after which the process is of no further use either.
+  void ask(std::span<const std::string> questions,
+           const std::function<void(std::string_view answer)>& on_answer);
+
+ private:
+  void write_some(std::string_view& text) const;
+  void read_some();
+  [[nodiscard]] std::string how_it_ended();
+  [[noreturn]] void fail(std::string_view reason) const;
+
+  std::string name_;
+  std::chrono::milliseconds time_max_;
+  pid_t process_id_ = 0;  // 0 once it has ended.
+  int questions_ = -1;
+  int answers_ = -1;
+  std::string received_;  // Behind the last line that was taken.
+};
+
+}  // namespace proofmass::wire
