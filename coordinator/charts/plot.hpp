@@ -18,7 +18,8 @@ struct AxisMap {
   double begin = 0.0;  ///< Coordinate of the axis' lower end.
   double end = 0.0;    ///< Coordinate of the upper end.
 
-  /// Also beyond the ends. On a logarithmic axis what is not above 0 is at the lower end.
+  /// Coordinate of a value, also of one beyond the axis' ends. On a logarithmic axis a value that
+  /// is not above 0 is at the lower end.
   [[nodiscard]] double at(double value) const;
   /// True if the value is between the ends.
   [[nodiscard]] bool contains(double value) const;

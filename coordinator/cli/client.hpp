@@ -80,8 +80,8 @@ void read_answer(const Ask& ask, const proto::AnswerReply& answer,
 
 /// How the answer to a question is printed.
 enum class AnswerText : std::uint8_t {
-  lines,  ///< As print_lines() does.
-  bytes,  ///< As it is.
+  lines,  ///< By print_lines().
+  bytes,  ///< Every byte unchanged.
 };
 
 /// Asks a coordinator and prints what its command writes, to standard output and standard error.

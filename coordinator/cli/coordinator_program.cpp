@@ -187,7 +187,7 @@ int serve_campaigns(const ServeOptions& options) {
     if (page) page->on_turn(service);
     notices.on_tick(std::chrono::steady_clock::now(), [&] { return status_of(service); });
   });
-  notices.stopping();               // Also if it ended between two turns.
+  notices.stopping();               // The service may have ended between two turns.
   page.reset();                     // It may be reading files, too.
   commands.wait(command_wait_max);  // Before the files are closed, which they may be reading.
   const bool is_done = service.is_done();

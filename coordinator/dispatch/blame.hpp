@@ -14,7 +14,8 @@ namespace proofmass::coordinator::detail {
 /// @return The runs against which the crash counts.
 RunsByCampaign blame_crash(State& state, WorkerId worker, Outbox& outbox);
 
-/// As blame_crash(), for a batch that hangs.
+/// A batch hangs: counts that as a crash against its runs, and against the host of its worker.
+/// @return The runs against which it counts.
 RunsByCampaign blame_batch(State& state, WorkerId worker, const Progress& batch, Outbox& outbox);
 
 /// True if a run crashed so often, on two hosts at least while it ran alone, that it must be the

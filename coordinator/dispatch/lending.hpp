@@ -10,7 +10,7 @@ namespace proofmass::coordinator::detail {
 /// Lends the worker as many runs as its share allows, if it has few left.
 void lend(State& state, WorkerId worker, TimePoint now, Outbox& outbox);
 
-/// As lend(), for all workers that would take more, while there are runs to lend.
+/// Lends runs, while there are any, to all workers that would take more.
 void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 
 /// True if nothing is lent to the worker: it is silent, its host is under quarantine and it has

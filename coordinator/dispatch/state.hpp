@@ -252,9 +252,9 @@ struct CampaignState {
   std::map<RunIndex, Suspicion> suspects;           ///< Open runs that were blamed for a crash.
   std::map<RunIndex, Copies> copies;                ///< Of runs in `lent`, once there was one.
   std::map<AuditKey, RunSet> to_audit;              ///< Committed, and not lent for audit yet.
-  std::uint64_t num_to_audit = 0;                   ///< Runs in that.
+  std::uint64_t num_to_audit = 0;                   ///< Runs in `to_audit`.
   std::map<RunIndex, LeaseId> audits;               ///< Runs on audit leases.
-  std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in the two above.
+  std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in `to_audit` or `audits`.
   std::uint64_t num_comparing = 0;                  ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
   std::string storage_failure;             ///< Why nothing can be stored; empty if all is well.

@@ -48,9 +48,9 @@ class MemoryBound {
   ///                  so that what arrives meanwhile finds room.
   explicit MemoryBound(std::size_t size_max) : alarm_size_(size_max / 4 * 3), limit_(alarm_size_) {}
 
-  /// True if the sockets are to be closed at this size. If closing them did not bring the process
-  /// below its alarm, something else needs the memory: then they are closed again only when the
-  /// process has grown by a further quarter.
+  /// True if the sockets are to be closed at this size. Where closing the sockets did not bring the
+  /// process below three quarters of `size_max`, something else needs the memory, and the sockets
+  /// are closed again only when the process has grown by a further quarter.
   [[nodiscard]] bool is_exceeded(std::size_t size);
 
   /// @param size  After the sockets were closed and memory was given back.

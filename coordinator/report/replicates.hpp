@@ -104,7 +104,7 @@ class RunningReplicates {
 [[nodiscard]] Table replicate_table(const ResultSchema& schema,
                                     const ReplicateStatistics& statistics);
 
-/// The same for programs.
+/// The rows of replicate_table() as JSON, for programs.
 [[nodiscard]] nlohmann::ordered_json json_of(const ResultSchema& schema,
                                              const ReplicateStatistics& statistics);
 

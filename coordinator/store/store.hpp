@@ -190,7 +190,7 @@ class Store {
   /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
   /// whole without it until the next change. Waits for nobody.
   /// @return Why the log is still needed: somebody reads an old state of the file, or writes to it.
-  ///         Or nothing.
+  ///         Empty if the log is folded in.
   /// @throws StoreError as check_place() does; if the disk does not take it. What was stored
   ///         is in the file and its log then.
   std::optional<std::string> rest();

@@ -20,7 +20,7 @@ enum class Paint : std::uint8_t { no, yes };
 struct TerminalStyle {
   std::size_t line_width_max = std::numeric_limits<std::size_t>::max();
   Paint paint = Paint::no;
-  bool cuts_remarks = false;  ///< As cells are; else they take what they need.
+  bool cuts_remarks = false;  ///< Remarks are cut to the line, else they take what they need.
 };
 
 /// Number of a tone's colour among the 256 of a terminal, or 0 for the terminal's own. Blue and

@@ -192,7 +192,7 @@ double draw_truncated(const Dispersion& law, const RandomStream& stream,
         law.mean + law.standard_deviation * inverse_normal(uniform(stream.block(first_block + i)));
     if (value >= law.minimum && value <= law.maximum) return value;
   }
-  // All trials failed: the bound on the probability stands above.
+  // All trials failed, which Dispersion::validate() keeps improbable.
   return std::fmin(std::fmax(law.mean, law.minimum), law.maximum);
 }
 

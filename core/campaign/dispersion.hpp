@@ -48,8 +48,8 @@ struct Dispersion {
   std::string column;  ///< For `table`: heading of the column.
   /// For `table`: the values are independent draws of one law, and not those of a design.
   bool is_independent = false;
-  std::vector<double> values = {};         ///< For `discrete`; so is the next one.
-  std::vector<double> probabilities = {};  ///< Of `values`; their sum is 1.
+  std::vector<double> values = {};         ///< For `discrete`: what may be drawn.
+  std::vector<double> probabilities = {};  ///< For `discrete`: of `values`; their sum is 1.
   std::string expression = {};             ///< For `derived`, see evaluate_expression().
   std::vector<std::string> with = {};      ///< For `correlated`: other quantities.
   std::vector<double> correlations = {};   ///< For `correlated`: with each of `with`.

@@ -28,10 +28,10 @@ struct PercentileStatistic {
 /// estimate − truth of one quantity, signed, over the completed runs. SI.
 struct ErrorStatistic {
   double bias = 0.0;                      ///< Mean.
-  std::optional<Interval> bias_interval;  ///< Empty for a single run; so is the other.
+  std::optional<Interval> bias_interval;  ///< Empty for a single run.
   double rms = 0.0;
   double standard_deviation = 0.0;             ///< With n − 1; 0 for a single run.
-  std::optional<Interval> deviation_interval;  ///< By the errors' kurtosis.
+  std::optional<Interval> deviation_interval;  ///< By the kurtosis. Empty for a single run.
   double skewness = 0.0;                       ///< Adjusted, see Moments.
 };
 
@@ -84,8 +84,8 @@ struct CampaignStatistics {
 /// else their mean.
 struct BudgetColumns {
   Budget before;
-  std::optional<Budget> after_worst;  ///< Empty while no run has an estimate; so is the other.
-  std::optional<Budget> after_mean;
+  std::optional<Budget> after_worst;  ///< Empty while no run has an estimate.
+  std::optional<Budget> after_mean;   ///< Empty while no run has an estimate.
 };
 [[nodiscard]] BudgetColumns budget_columns(const ErrorBudget& budget,
                                            const CampaignStatistics& statistics);

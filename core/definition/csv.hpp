@@ -18,9 +18,11 @@ class CsvReader {
   bool next_row();
   [[nodiscard]] const std::vector<std::string_view>& cells() const { return cells_; }
   /// The number in a cell of the line.
-  /// @throws DefinitionError naming file, line, heading and rule; so do the next two.
+  /// @throws DefinitionError naming file, line, heading and rule.
   [[nodiscard]] double number(std::size_t position, std::string_view heading) const;
+  /// @throws DefinitionError naming file and line if the line has another number of cells.
   void expect_cells(std::size_t num_cells) const;
+  /// @throws DefinitionError naming file and line, with this reason.
   [[noreturn]] void refuse(std::string_view reason) const;
 
  private:

@@ -55,7 +55,7 @@ inline constexpr std::size_t num_resamples = 1000;
 inline constexpr std::size_t num_bootstrap_groups_max = 1024;
 
 /// Of the standard deviation for values of any law with a fourth moment: bootstrap, bias-corrected
-/// and accelerated (BCa) [Efron1987]. README.md tabulates the measured coverage; use it from 200
+/// and accelerated (BCa) [Efron1987]. README.md has the measured coverage; use it from 200
 /// values on.
 ///
 /// Above num_bootstrap_groups_max values it is groups of consecutive ones that are drawn, of equal

@@ -111,11 +111,11 @@ enum class RequirementVerdict {
 
 struct RequirementCheck {
   RequirementVerdict verdict = RequirementVerdict::undecided;
-  bool is_of_fixed_size = false;  ///< By the binomial law, else sequential; see decide().
-  std::uint64_t num_runs = 0;     ///< As in ExceedanceCount; so are the next two.
-  std::uint64_t num_exceedances = 0;
-  std::uint64_t num_without_estimate = 0;
-  std::uint64_t num_allowed = 0;  ///< Exceedances with which so many runs would meet it.
+  bool is_of_fixed_size = false;           ///< By the binomial law, else sequential; see decide().
+  std::uint64_t num_runs = 0;              ///< Of ExceedanceCount.
+  std::uint64_t num_exceedances = 0;       ///< Of ExceedanceCount.
+  std::uint64_t num_without_estimate = 0;  ///< Of ExceedanceCount.
+  std::uint64_t num_allowed = 0;           ///< Exceedances with which so many runs would meet it.
   /// Order, from the largest error, of the one below which at least `coverage` of all errors are
   /// with this confidence; 0 if runs are too few. The requirement is met if and only if that error
   /// is below the limit.

@@ -14,11 +14,11 @@ namespace proofmass {
 /// Stops a campaign once a statistic is known well enough, or once a requirement is decided.
 struct StopRule {
   enum class Statistic {
-    mean,  ///< Of |estimate − truth| of the parameter; so are the next two.
-    standard_deviation,
-    percentile,
-    success,  ///< Probability that all objectives hold.
-    verdict,  ///< Of `requirement`: met or not met.
+    mean,                ///< Of |estimate − truth| of the parameter.
+    standard_deviation,  ///< Of |estimate − truth| of the parameter.
+    percentile,          ///< Of |estimate − truth| of the parameter.
+    success,             ///< Probability that all objectives hold.
+    verdict,             ///< Of `requirement`: met or not met.
   };
 
   Statistic statistic = Statistic::standard_deviation;

@@ -160,8 +160,8 @@ class Campaign:
 
     def statistics(self):
         """The view `parameter_accuracy`: what the program computed of each quantity when the
-        campaign ended or was stopped, with 95 % intervals; coordinator/store/README.md names the
-        columns. NaN before that."""
+        campaign ended or was stopped, with 95 % intervals (`_lower`, `_upper`), as
+        coordinator/store/README.md describes it. NaN before that."""
         return self.query("SELECT * FROM parameter_accuracy", "parameter")
 
     def draws(self, program="proofmass"):

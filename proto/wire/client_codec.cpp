@@ -68,7 +68,8 @@ void make_field_sendable(google::protobuf::Message& message, const Field& field)
   }
 }
 
-/// Also the messages in it. Bytes stay as they are.
+/// Applies sendable() to every text and double of a message and of the messages in it. Fields of
+/// bytes stay as they are.
 void make_sendable(google::protobuf::Message& message) {
   const google::protobuf::Descriptor& type = *message.GetDescriptor();
   for (int i = 0; i < type.field_count(); ++i) make_field_sendable(message, *type.field(i));

@@ -19,7 +19,7 @@ inline constexpr std::uint32_t protocol_version = 7;
 
 // Limits. The comments of proofmass.proto name them.
 
-inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
+inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Of a lease or a batch of results.
 inline constexpr std::size_t ranges_per_message_max = 4096;
 inline constexpr std::uint32_t slots_max = 65'536;             ///< Of a worker with cards.
 inline constexpr std::uint32_t runs_held_max = 2 * slots_max;  ///< By a worker, not finished.

@@ -30,8 +30,8 @@ struct ReplayOptions {
   std::filesystem::path database;
   std::optional<std::uint64_t> run;
   std::optional<std::size_t> num_worst;
-  std::vector<std::string> sessions;  ///< None for all; so are groups.
-  std::vector<std::string> groups;
+  std::vector<std::string> sessions;  ///< Empty: all.
+  std::vector<std::string> groups;    ///< Empty: all.
   SeriesFormat format = SeriesFormat::hdf5;
   std::filesystem::path output;  ///< Empty: nothing is written.
   wire::IfThere if_there = wire::IfThere::keep;

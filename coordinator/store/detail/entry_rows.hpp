@@ -114,7 +114,7 @@ class EntryRows {
   std::int64_t now_unix_s_ = 0;
   bool has_failures_ = false;                ///< Of runs that are given up, which is rare.
   std::optional<std::uint64_t> num_audits_;  ///< Rows; counted when the first is written.
-  bool is_audit_full_ = false;               ///< As was said.
+  bool is_audit_full_ = false;               ///< `audit_history_full` was written.
   CommitSummary summary_;
 };
 

@@ -59,12 +59,12 @@ struct OpenFile {
   WaitingEntries waiting;
   std::vector<Entry> writing;         ///< Taken from `waiting`; kept if the last attempt failed.
   std::optional<TimePoint> retry_at;  ///< If the last attempt failed.
-  std::string failure;                ///< Why it failed, as was said last.
-  bool has_large_log = false;         ///< As was said last.
+  std::string failure;                ///< Why the last attempt failed, as the log last said.
+  bool has_large_log = false;         ///< As the log of the program last said.
   std::set<wire::SessionId> known;    ///< Workers of which the file has no end yet.
   bool is_rest_wanted = false;        ///< Nothing more is expected.
   std::optional<TimePoint> rest_at;   ///< When to fold the log in, once nothing waits.
-  bool is_log_kept = false;           ///< As was said last: a reader keeps it from that.
+  bool is_log_kept = false;           ///< A reader keeps the log from that, as was last said.
 };
 
 /// When the file wants to be written to or brought to rest; nothing if nothing waits.

@@ -13,7 +13,7 @@ namespace {
 
 // Every column of every table: what changes in a finished campaign is found, or is known not to be.
 
-/// Why no check can hold a column. The README of this folder has the same table.
+/// Why no check can hold a column. coordinator/archive/README.md sums them up.
 const std::map<std::string, std::string> unheld{
     {"campaign.phase", "how the campaign is served; may be changed at any time"},
     {"campaign.priority", "how the campaign is served; may be changed at any time"},

@@ -308,7 +308,7 @@ TEST(BatchTimes, LeaveNoWorkerIdleForLong) {
   }
 }
 
-// The table of coordinator/dispatch/README.md.
+// Parts of the time of a full batch, as coordinator/dispatch/README.md cites them.
 TEST(BatchTimes, AreShorterThanOfFullBatchesIfThereAreFewRuns) {
   struct Row {
     Plan plan;

@@ -148,7 +148,7 @@ TEST(Decide, KeepsItsErrorRatesOverAllLooks) {
   RecordProperty("fixed_not_met_percent", std::to_string(100.0 * unsound.not_met));
 }
 
-// The table of README.md: rates in allowed ones.
+// The rates of README.md in allowed ones.
 TEST(Decide, ComesToAnEndWhereThereIsSomethingToTell) {
   struct Case {
     double ratio;
