@@ -26,8 +26,8 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
   for (const Table& table :
        {accuracy_table(schema, campaign.objectives(), statistics),
         interval_table(schema, statistics, num_given_up),
-        error_table(schema, statistics, num_given_up, campaign.interpretation(),
-                    why_not_independent(campaign)),
+        error_table(schema, campaign.objectives(), statistics, num_given_up,
+                    campaign.interpretation(), why_not_independent(campaign)),
         standard_error_table(schema, results.standard_errors),
         fit_table(schema, results.standard_errors.fit), variance_table(schema, instruments),
         instrument_table(schema, instruments),

@@ -62,7 +62,9 @@ Row accuracy_row(const Quantity& quantity, double objective, const AccuracyStati
     row.push_back(count_cell(accuracy->worst_run.value, Tone::plain));
     row.push_back(figure_cell(accuracy->mean, scale));
     row.push_back(num_runs < 2 ? no_figure() : figure_cell(accuracy->standard_deviation, scale));
-    row.push_back(count_cell(beyond, beyond > 0 ? Tone::bad : Tone::plain));
+    row.push_back(std::isfinite(objective)
+                      ? count_cell(beyond, beyond > 0 ? Tone::bad : Tone::plain)
+                      : no_figure());
   }
   add_published(quantity, row);
   return row;
@@ -113,7 +115,7 @@ std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_est
   return text + " (one parameter by itself, not all together)";
 }
 
-Row error_row(const Quantity& quantity, const AccuracyStatistic& accuracy) {
+Row error_row(const Quantity& quantity, double objective, const AccuracyStatistic& accuracy) {
   const double scale = quantity.display_scale;
   const std::optional<Interval>& bias = accuracy.error.bias_interval;
   Row row{quantity.symbol, bias ? figure_cell(bias->lower, scale) : no_figure(),
@@ -122,7 +124,7 @@ Row error_row(const Quantity& quantity, const AccuracyStatistic& accuracy) {
     row.push_back(figure_cell(percentile.value, scale));
   }
   for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
-    row.push_back(figure_cell(share, 0.01));
+    row.push_back(std::isfinite(objective) ? figure_cell(share, 0.01) : no_figure());
   }
   return row;
 }
@@ -207,8 +209,8 @@ Table dependent_error_table(const ResultSchema& schema, const CampaignStatistics
 // Published totals, too, add up the worst errors of all parameters, which no single run has.
 std::string totals_sentence(const RunTotals& totals) {
   return fmt::format(
-      "worst adds up the worst errors of different runs, as the paper does; totals of single runs: "
-      "median {:.1e}, 95 % below {:.1e}, worst {:.1e} (run {})",
+      "worst adds up the worst errors of different runs, as the paper does; totals of single runs "
+      "that have an estimate: median {:.1e}, 95 % below {:.1e}, worst {:.1e} (run {})",
       totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
 }
 
@@ -310,9 +312,9 @@ Table interval_table(const ResultSchema& schema, const CampaignStatistics& stati
   return table;
 }
 
-Table error_table(const ResultSchema& schema, const CampaignStatistics& statistics,
-                  std::uint64_t num_given_up, Interpretation interpretation,
-                  const std::string& why_not_independent) {
+Table error_table(const ResultSchema& schema, const std::vector<double>& objectives,
+                  const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                  Interpretation interpretation, const std::string& why_not_independent) {
   if (statistics.num_estimated == 0) return {};
   if (!why_not_independent.empty()) {
     return dependent_error_table(schema, statistics, num_given_up, interpretation,
@@ -332,7 +334,7 @@ Table error_table(const ResultSchema& schema, const CampaignStatistics& statisti
                           {"from", false, 7, "beyond, %", true},
                           {"to", false, 8, "beyond, %"}}};
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(error_row(schema.quantities[i], statistics.accuracy[i]));
+    table.rows.push_back(error_row(schema.quantities[i], objectives[i], statistics.accuracy[i]));
   }
   table.notes.push_back(bias_sentence(schema, statistics));
   table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));

@@ -83,8 +83,12 @@ std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
   if (answer.is_joint()) return "";
   if (!answer.bound) {
-    return fmt::format("Bound        none of so few draws, for {} with {}\n",
-                       given_percent(tolerance.coverage), given_percent(tolerance.confidence));
+    return fmt::format(
+        "Bound        none of {}, for {} with {}\n",
+        answer.check.num_without_estimate == 0
+            ? std::string("so few draws")
+            : fmt::format("draws of which {} have no estimate", answer.check.num_without_estimate),
+        given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
   const Quantity& quantity = answer.subject;
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",

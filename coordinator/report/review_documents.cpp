@@ -186,7 +186,7 @@ std::vector<Section> sections_of(const Review& review) {
            flow(table_part(accuracy_table(schema, review.objectives, statistics)) +
                 characteristics_markup(review)) +
                table_part(interval_table(schema, statistics, review.num_given_up)) +
-               table_part(error_table(schema, statistics, review.num_given_up,
+               table_part(error_table(schema, review.objectives, statistics, review.num_given_up,
                                       review.interpretation, review.why_not_independent))},
           {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
           {"instruments-section", groups_heading(review), instruments_markup(review)},
@@ -307,7 +307,7 @@ std::string review_markdown(const Review& review) {
       section("Verification matrix", {matrix_table(review)}) +
       section("Accuracy", {accuracy_table(schema, review.objectives, statistics),
                            interval_table(schema, statistics, review.num_given_up),
-                           error_table(schema, statistics, review.num_given_up,
+                           error_table(schema, review.objectives, statistics, review.num_given_up,
                                        review.interpretation, review.why_not_independent)}) +
       section("Standard errors", {standard_error_table(schema, review.results.standard_errors),
                                   fit_table(schema, review.results.standard_errors.fit)}) +

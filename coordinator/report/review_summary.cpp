@@ -148,9 +148,14 @@ SummarySentence consequence(const Review& review) {
                     budget, before),
         "Budget"};
   }
+  const CampaignStatistics& statistics = review.results.statistics;
+  const bool is_of_all = statistics.num_estimated == statistics.num_runs;
+  const std::string those =
+      is_of_all ? std::string(unit_of(review))
+                : fmt::format("{} {} with an estimate", statistics.num_estimated, unit_of(review));
   return {fmt::format("Calibration takes the {} from {} m/s² to at most {} m/s² in half of the "
                       "{}, {} m/s² in 95 % of them, and {} m/s² in the worst, run {}.",
-                      budget, before, figure_text(totals->median), unit_of(review),
+                      budget, before, figure_text(totals->median), those,
                       figure_text(totals->percentile_95), figure_text(totals->worst),
                       totals->worst_run.value),
           "Budget"};

@@ -116,7 +116,8 @@ Table execution_table(const Review& review) {
       {{"time of processor cores", hours(execution.compute_s)},
        {"first and last result", execution.first_result_utc.value_or("none") + " to " +
                                      execution.last_result_utc.value_or("none")},
-       {"workers", fmt::format("{} on {} machines", execution.num_workers, execution.num_hosts)},
+       {"workers", fmt::format("{} on {} {}", execution.num_workers, execution.num_hosts,
+                               execution.num_hosts == 1 ? "machine" : "machines")},
        {"starts of a coordinator", std::to_string(execution.num_coordinators)},
        {"results of a later attempt than the first", std::to_string(execution.num_retried)},
        {"results computed a second time",

@@ -159,10 +159,12 @@ RunIndex worst_run_of(const DrawnRuns& drawn, std::size_t quantity) {
   return drawn.runs[static_cast<std::size_t>(worst - errors.begin())];
 }
 
-/// Which run is the worst, and how to ask why.
-std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity) {
-  return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n",
-                     worst_run_of(drawn, quantity).value, drawn.quantities[quantity].name);
+/// Which run is the worst, and how to ask why if there is an answer.
+std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity, bool has_rows) {
+  const std::uint64_t run = worst_run_of(drawn, quantity).value;
+  if (!has_rows) return fmt::format("Largest |error|: run {}\n", run);
+  return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n", run,
+                     drawn.quantities[quantity].name);
 }
 
 /// The rows to name: as many as were asked for, else the first five, but none where no quantity has
@@ -286,7 +288,7 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
       limit_line(drawn), left_out(drawn),
       terminal_text(driver_table(drawn, of_magnitude, "|error|", std::nullopt), style),
       terminal_text(drivers, style), terminal_text(term_table(drawn, quantity), style),
-      worst_run_text(drawn, quantity));
+      worst_run_text(drawn, quantity, !of_error.empty() || !of_magnitude.empty()));
 }
 
 std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,

@@ -55,6 +55,8 @@ class PlanStudy {
   [[nodiscard]] virtual std::vector<std::string> session_names() const = 0;
   /// Steps of each session in the campaign.
   [[nodiscard]] virtual std::vector<int> num_steps() const = 0;
+  /// Steps of a run in sessions that the study is not about: it leaves them as they are.
+  [[nodiscard]] virtual int num_steps_beside() const { return 0; }
   /// Most steps that a session may have.
   [[nodiscard]] virtual int num_steps_max() const = 0;
   /// Drawn instruments that a bound is the mean over.

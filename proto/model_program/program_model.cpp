@@ -419,7 +419,7 @@ class ProgramModel final : public Model {
   }
   [[nodiscard]] std::span<const DataTableSchema> tables() const override { return {}; }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return program_->drawn; }
-  [[nodiscard]] std::string_view step_name() const override { return "runs"; }
+  [[nodiscard]] std::string_view step_name() const override { return "steps"; }
   [[nodiscard]] std::size_t batch_size() const override {
     return program_->description.runs_at_once;
   }

@@ -42,7 +42,7 @@ std::string differences_text(const Campaign& campaign) {
 
 /// What can be said of the first runs without computing many.
 struct Outlook {
-  std::uint64_t num_drawn = 0;  ///< Runs.
+  std::uint64_t num_drawn = 0;  ///< Instruments, one for all realisations of its noise.
   std::uint64_t num_draws = 0;  ///< Of these.
   std::uint64_t num_without_draw = 0;
   double batch_s = 0.0;
@@ -51,12 +51,17 @@ struct Outlook {
 };
 
 Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
-  constexpr std::uint64_t runs_max = 1000, draws_max = 20'000;  // Some hundredths of a second.
+  constexpr std::uint64_t instruments_max = 1000,
+                          draws_max = 20'000;  // Some hundredths of a second.
   const FirstBatch batch = try_first_batch(campaign, plan);
   Outlook outlook{.batch_s = batch.time_s, .num_simulated = batch.results.size(), .missing = {}};
   for (const RunResult& result : batch.results) outlook.missing.add(result);
-  std::uint64_t& run = outlook.num_drawn;
-  for (; run < std::min(campaign.num_runs, runs_max) && outlook.num_draws < draws_max; ++run) {
+  const std::uint64_t each = campaign.num_realisations();
+  const std::uint64_t num_instruments = (campaign.num_runs + each - 1) / each;
+  for (; outlook.num_drawn < std::min(num_instruments, instruments_max) &&
+         outlook.num_draws < draws_max;
+       ++outlook.num_drawn) {
+    const std::uint64_t run = outlook.num_drawn * each;
     const RunDraw draw = campaign.draw(RunIndex{run});
     outlook.num_draws += draw.num_draws;
     if (draw.values.empty()) ++outlook.num_without_draw;
@@ -66,12 +71,13 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
 
 std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
                          const Outlook& outlook) {
-  std::string text = fmt::format("Draws     {} of {} accepted, for the first {} runs\n",
-                                 outlook.num_drawn - outlook.num_without_draw, outlook.num_draws,
-                                 outlook.num_drawn);
+  std::string text =
+      fmt::format("Draws     {} of {} accepted, for the first {} {}\n",
+                  outlook.num_drawn - outlook.num_without_draw, outlook.num_draws,
+                  outlook.num_drawn, campaign.num_realisations() > 1 ? "instruments" : "runs");
   if (outlook.num_without_draw > 0) {
     text += fmt::format(
-        "Warning   {} of these runs find none in {} draws and end without an estimate:\n"
+        "Warning   {} of these find none in {} draws and end without an estimate:\n"
         "          widen the bounds or narrow the laws\n",
         outlook.num_without_draw, campaign.results().num_draws_max);
   }

@@ -92,7 +92,8 @@ std::string missing_text(const Store& store, const MergeOptions& options) {
   const RunSet missing = runs_missing_in(store);
   if (missing.empty()) return {};
   return fmt::format(
-      "{} of {} runs are in no part: {}\n`proofmass run FILE --db {}` computes them\n",
+      "{0} of {1} runs are in no part: {2}\n`proofmass run FILE --db {3} --runs {1}` computes "
+      "them\n",
       missing.size(), store.num_runs(), to_text(missing), options.whole.string());
 }
 

@@ -43,6 +43,7 @@ struct Planned {
   std::vector<std::string> sessions;
   std::vector<int> num_steps;
   int num_steps_in_all;
+  int num_steps_beside;
   PlanBound bound;
   std::vector<Quantity> quantities;
   std::vector<double> objectives;
@@ -55,14 +56,20 @@ struct Planned {
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
   const int in_all = std::accumulate(num_steps.begin(), num_steps.end(), 0);
   PlanBound bound = study.bound(num_steps);
+  // Sessions beside those of the study may add further ones.
+  std::vector<Quantity> quantities = campaign.results().quantities;
+  std::vector<double> objectives = campaign.objectives();
+  quantities.resize(bound.misses.size());
+  objectives.resize(bound.misses.size());
   std::vector<std::string> remedies;
   for (std::size_t i = 0; i < bound.misses.size(); ++i) remedies.push_back(study.remedy(i));
   return {.sessions = study.session_names(),
           .num_steps = std::move(num_steps),
           .num_steps_in_all = in_all,
+          .num_steps_beside = study.num_steps_beside(),
           .bound = std::move(bound),
-          .quantities = campaign.results().quantities,
-          .objectives = campaign.objectives(),
+          .quantities = std::move(quantities),
+          .objectives = std::move(objectives),
           .num_instruments = study.num_instruments(),
           .num_probed = study.num_probed(),
           .method = study.method(),
@@ -148,6 +155,11 @@ Table session_table(const Planned& plan) {
     table.rows.push_back({plan.sessions[i], fmt::to_string(plan.num_steps[i])});
   }
   table.rows.push_back({"all", fmt::to_string(plan.num_steps_in_all)});
+  if (plan.num_steps_beside > 0) {
+    table.notes.push_back(
+        fmt::format("{} {} of sessions that calibrate nothing are left as they are",
+                    plan.num_steps_beside, model().step_name()));
+  }
   return table;
 }
 

@@ -13,6 +13,8 @@
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
+#include "core/microscope/estimation/joint/joint.hpp"
+#include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/instrument/magnitude.hpp"
 #include "core/model.hpp"
 #include "core/statistics/independence.hpp"
@@ -215,6 +217,9 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     check_magnitudes(campaign);
     check_regressors(campaign.scenario);
     check_independence(campaign);
+    if (estimation_method(campaign.scenario.estimation.method).name == joint_method.name) {
+      check_joint_orbit(campaign.scenario.orbit.eccentricity);
+    }
   } catch (const ConfigError& error) {
     throw document.located(error);
   }

@@ -201,8 +201,11 @@ MissChance miss_chance(const ParameterArray& objectives, const ParameterArray& e
 
 class JointStudy final : public PlanStudy {
  public:
-  explicit JointStudy(const MicroscopeCampaign& campaign) : campaign_(campaign) {
-    campaign_.scenario.estimation.method = method_named(joint_method.name);
+  explicit JointStudy(const MicroscopeCampaign& campaign) : whole_(campaign), campaign_(campaign) {
+    whole_.scenario.estimation.method = method_named(joint_method.name);
+    campaign_.scenario.estimation.method = whole_.scenario.estimation.method;
+    std::erase_if(campaign_.scenario.sessions, is_test);
+    check_joint_orbit(campaign_.scenario.orbit.eccentricity);
     campaign_.scenario.validate();
     const Scenario& scenario = campaign_.scenario;
     const MicroscopeCampaign brief = short_campaign(campaign_);
@@ -231,6 +234,13 @@ class JointStudy final : public PlanStudy {
   [[nodiscard]] std::vector<int> num_steps() const override {
     std::vector<int> orbits;
     for (const Session& session : campaign_.scenario.sessions) orbits.push_back(session.num_orbits);
+    return orbits;
+  }
+  [[nodiscard]] int num_steps_beside() const override {
+    int orbits = 0;
+    for (const Session& session : whole_.scenario.sessions) {
+      if (is_test(session)) orbits += session.num_orbits;
+    }
     return orbits;
   }
   [[nodiscard]] int num_steps_max() const override { return num_session_orbits_max; }
@@ -277,8 +287,11 @@ class JointStudy final : public PlanStudy {
   }
 
   [[nodiscard]] std::string campaign_file(std::span<const int> num_orbits) const override {
-    MicroscopeCampaign campaign = campaign_;
-    campaign.scenario = scenario_of(num_orbits);
+    MicroscopeCampaign campaign = whole_;
+    std::size_t i = 0;
+    for (Session& session : campaign.scenario.sessions) {
+      if (!is_test(session)) session.num_orbits = num_orbits[i++];
+    }
     campaign.validate();
     return commented_campaign(campaign);
   }
@@ -395,7 +408,8 @@ class JointStudy final : public PlanStudy {
                       fmt::format("must determine {}", fmt::join(texts, ", and ")));
   }
 
-  MicroscopeCampaign campaign_;
+  MicroscopeCampaign whole_;          ///< With its sessions that test.
+  MicroscopeCampaign campaign_;       ///< Of those that calibrate.
   std::vector<int> measured_orbits_;  ///< Of each session: what `instruments_` is of.
   std::vector<JointInformation> instruments_;
   std::vector<RunRecord> probes_;  ///< Of the first instruments.
@@ -406,12 +420,6 @@ class JointStudy final : public PlanStudy {
 std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign) {
   if (campaign.scenario.noise.scale == 0.0) {
     throw ConfigError("noise.scale", "0", "must be > 0: without noise estimates have no errors");
-  }
-  const std::vector<Session>& sessions = campaign.scenario.sessions;
-  for (std::size_t i = 0; i < sessions.size(); ++i) {
-    if (!is_test(sessions[i])) continue;
-    throw ConfigError(fmt::format("session[{}].target", i), "ep_test",
-                      "a plan is of calibration sessions: leave this one out");
   }
   return std::make_unique<JointStudy>(campaign);
 }

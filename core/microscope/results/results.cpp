@@ -56,7 +56,7 @@ const std::array<Quantity, num_test_parameters>& test_quantities() {
       {"eotvos_parameter", "", "δ", "1", 1e-15, "1e-15", 1e-15, {}, true},
       {"test_a_c11_delta_x", "_m", "Δx, test", "m", 1e-9, "nm", 0.1e-6},
       {"test_a_c11_delta_z", "_m", "Δz, test", "m", 1e-9, "nm", 0.1e-6},
-      {"eotvos_parameter_uncorrected", "", "δ, as it is", "1", 1e-15, "1e-15"},
+      {"eotvos_parameter_uncorrected", "", "δ, raw", "1", 1e-15, "1e-15"},
   }};
   return quantities;
 }

@@ -160,4 +160,13 @@ void check_joint(const std::vector<Session>& sessions) {
                     fmt::format("estimation.method = \"joint\" needs {}", fmt::join(lacks, ", ")));
 }
 
+void check_joint_orbit(double eccentricity) {
+  constexpr double eccentricity_max = 0.1;
+  if (eccentricity <= eccentricity_max) return;
+  throw ConfigError("orbit.eccentricity", fmt::format("{}", eccentricity),
+                    fmt::format("must be <= {} for estimation.method = \"joint\", whose equations "
+                                "leave out its square",
+                                eccentricity_max));
+}
+
 }  // namespace proofmass
