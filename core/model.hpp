@@ -111,6 +111,19 @@ class Model {
     return nullptr;
   }
 
+  /// The text of a data file that campaigns name and that follows from physics, for the sessions of
+  /// one campaign.
+  ///
+  /// @param campaign  The campaign file; the data files that it names are not read.
+  /// @param physics   What differs from the nominal physics.
+  /// @param session   The session that the file is for; empty: all of them.
+  /// @return Empty if the model has no such file.
+  /// @throws DefinitionError, or ConfigError about `session`
+  [[nodiscard]] virtual std::string environment_file(Document& /*campaign*/, Document& /*physics*/,
+                                                     const std::string& /*session*/) const {
+    return {};
+  }
+
   /// A campaign file with every key at its nominal value, its meaning and its rule.
   [[nodiscard]] virtual std::string example() const = 0;
   /// The file that the example is written to unless the user names another: `hardy2013.toml`.

@@ -102,6 +102,17 @@ std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
   return campaign;
 }
 
+std::string environment_file(const std::filesystem::path& file, const Overrides& overrides,
+                             const EnvironmentRequest& request) {
+  Document campaign(file.string(), read_campaign_text(file), assignments_of(overrides));
+  std::string text;
+  if (!request.physics.empty()) {
+    text = detail::read_toml_text(request.physics, campaign_file_size_max);
+  }
+  Document physics(request.physics.string(), text, {});
+  return model().environment_file(campaign, physics, request.session);
+}
+
 std::unique_ptr<Campaign> example_campaign() {
   Document document("example", model().example(), {});
   DataFilesIn files(document, {});

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "core/campaign/definition.hpp"
 #include "proto/text/byte_order_mark.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -86,6 +87,14 @@ std::string read_text_file(const std::filesystem::path& file, std::size_t size_m
   text.erase(0, text.size() - wire::without_byte_order_mark(text).size());
   text.shrink_to_fit();
   return text;
+}
+
+std::string read_toml_text(const std::filesystem::path& file, std::size_t size_max) {
+  try {
+    return read_text_file(file, size_max, Pipes::refused);
+  } catch (const UnreadableFile& error) {
+    throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
+  }
 }
 
 }  // namespace proofmass::coordinator::detail

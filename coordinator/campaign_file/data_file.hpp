@@ -31,4 +31,8 @@ enum class Pipes : std::uint8_t {
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& file, std::size_t size_max,
                                          Pipes pipes);
 
+/// read_text_file() of a file that is no pipe, for files in TOML.
+/// @throws DefinitionError `file: reason`.
+[[nodiscard]] std::string read_toml_text(const std::filesystem::path& file, std::size_t size_max);
+
 }  // namespace proofmass::coordinator::detail

@@ -16,14 +16,6 @@ constexpr std::size_t id_size_max = 64;
 constexpr std::size_t text_size_max = 1000;
 constexpr std::size_t requirement_size_max = 200;
 
-std::string read_requirements_text(const std::filesystem::path& file) {
-  try {
-    return detail::read_text_file(file, requirements_file_size_max, detail::Pipes::refused);
-  } catch (const detail::UnreadableFile& error) {
-    throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
-  }
-}
-
 void read_bounded(Document& document, const std::string& path, std::size_t size_max,
                   std::string& value) {
   if (document.read(path, value) && value.size() > size_max) {
@@ -65,7 +57,7 @@ void check_requirement_of(const std::filesystem::path& file, std::size_t positio
 
 std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file,
                                                  const ResultSchema& results) {
-  Document document(file.string(), read_requirements_text(file), {});
+  Document document(file.string(), detail::read_toml_text(file, requirements_file_size_max), {});
   const std::optional<std::size_t> count =
       document.num_tables("requirements", num_requirements_max);
   if (!count) document.refuse_absence("requirements", "must be a list of tables [[requirements]]");

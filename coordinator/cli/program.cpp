@@ -93,13 +93,14 @@ int run_proofmass(int argc, char** argv) {
   Command chosen;
   // As `--help` lists them: the usual ones first.
   const std::vector<std::pair<const char*, std::vector<std::function<void(CLI::App&, Command&)>>>>
-      groups{{"Run a campaign", {add_run, add_init, add_check, add_plan, add_sweep}},
-             {"Look at its results", {add_report, add_plot, add_list}},
-             {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
-             {"Serve campaigns to other machines",
-              {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
-               add_release, add_factory}},
-             {"Keep databases", {add_verify, add_backup, add_export, add_merge}}};
+      groups{
+          {"Run a campaign", {add_run, add_init, add_check, add_plan, add_sweep, add_environment}},
+          {"Look at its results", {add_report, add_plot, add_list}},
+          {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
+          {"Serve campaigns to other machines",
+           {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
+            add_release, add_factory}},
+          {"Keep databases", {add_verify, add_backup, add_export, add_merge}}};
   for (const auto& [title, commands] : groups) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);

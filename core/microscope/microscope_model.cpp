@@ -10,6 +10,7 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/definition/made_environment.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/planning/plan_study.hpp"
@@ -190,6 +191,11 @@ class MicroscopeModel final : public Model {
     const auto* const own = dynamic_cast<const MicroscopeCampaign*>(&campaign);
     PROOFMASS_EXPECT(own != nullptr);
     return study_plan(*own);
+  }
+
+  [[nodiscard]] std::string environment_file(Document& campaign, Document& physics,
+                                             const std::string& session) const override {
+    return csv_text(made_environment(campaign, physics, session));
   }
 
   [[nodiscard]] std::string example() const override {
