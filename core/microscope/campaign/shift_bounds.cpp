@@ -91,7 +91,7 @@ double least_noise_density(const Scenario& scenario) {
   for (const Session& session : scenario.sessions) {
     for (const LineMultiple& line : session.fit_lines) {
       const double frequency_hz = line_frequency_hz(session, line, scenario.orbit.period_s);
-      least = std::min(least, 0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
+      least = std::min(least, differential_x_psd(scenario.noise, frequency_hz));
     }
   }
   const double scale = scenario.noise.scale;
@@ -139,7 +139,8 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
     : objectives_(scenario.objectives),
       least_density_(least_noise_density(scenario)),
       block_s_(LineWeights::block_size * scenario.simulation.sample_period_s),
-      white_density_(0.5 * square(scenario.noise.linear_x.white_asd)),
+      white_density_(differential_x_density(
+          scenario.noise, [](const SensorNoise& x) { return square(x.white_asd); })),
       duration_s_(0.0),
       has_noise_(scenario.noise.scale > 0.0) {
   if (has_noise_) white_density_ *= square(scenario.noise.scale);
@@ -177,7 +178,7 @@ void ShiftBounds::add_session(const Scenario& scenario, const Session& session) 
   const double frequency_hz =
       line_frequency_hz(session, session.fit_lines.front(), scenario.orbit.period_s);
   total.sensor_sigma = total.of_noise * scenario.noise.scale *
-                       std::sqrt(0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
+                       std::sqrt(differential_x_psd(scenario.noise, frequency_hz));
 }
 
 // A fit with the weights W of its lines and the Jacobian J moves by C Jᵀ W δ if its lines move by

@@ -64,7 +64,9 @@ TestRecord test_record(const SessionPhasors& record, const Session& session,
   of.mean_gradient << mean(gradient_xx), mean(gradient_xy), mean(gradient_xz);
   const double f = test_frequency_hz(session, input.orbit_period_s);
   const auto density = [&](double frequency_hz) {
-    return window_noise_psd(input.noise.linear_x, frequency_hz, input.sample_period_s);
+    return differential_x_density(input.noise, [&](const SensorNoise& x) {
+      return 2.0 * window_noise_psd(x, frequency_hz, input.sample_period_s);
+    });
   };
   of.density << density(f), density(2.0 * f), density(2.0 * f);
   return of;

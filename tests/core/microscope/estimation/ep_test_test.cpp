@@ -238,9 +238,10 @@ struct Coverage {
 };
 
 /// Of the Eötvös parameter.
-Coverage coverage(double spin, int num_orbits) {
+Coverage coverage(double spin, int num_orbits, const NoiseConfig& noise = {}) {
   constexpr std::uint64_t num_runs = 208;
   MicroscopeCampaign campaign;
+  campaign.scenario.noise = noise;
   campaign.scenario.sessions = {test_session("ep", num_orbits, spin)};
   const RunPlan plan(campaign, no_calibration);
   Coverage found;
