@@ -144,10 +144,24 @@ void visit_control(Config& scenario, Visitor& visit) {
 }
 
 template <typename Config, typename Visitor>
-void visit_limits(Config& scenario, Visitor& visit) {
+void visit_sensor(Config& sensor, Visitor& visit) {
   visit(FieldInfo{"sensor.range_m_s2", "Largest acceleration that a sensor reports.",
                   range::positive},
-        scenario.sensor.range_m_s2);
+        sensor.range_m_s2);
+  constexpr std::array<std::string_view, 3> positions{"sensor.position_x_m", "sensor.position_y_m",
+                                                      "sensor.position_z_m"};
+  for (std::size_t axis = 0; axis < positions.size(); ++axis) {
+    visit(FieldInfo{positions[axis], "Of the unit, from the centre of mass.",
+                    range::between(-10.0, 10.0)},
+          sensor.position_m[axis]);
+  }
+  constexpr std::array<std::string_view, 2> stiffnesses{"sensor.sensor_1_radial_stiffness_s2",
+                                                        "sensor.sensor_2_radial_stiffness_s2"};
+  for (std::size_t k = 0; k < stiffnesses.size(); ++k) {
+    visit(FieldInfo{stiffnesses[k], "k/m along Y and Z, where a mass moves.",
+                    range::between(-10.0, 10.0)},
+          sensor.radial_stiffness_s2[k]);
+  }
 }
 
 template <typename Config, typename Visitor>
@@ -224,7 +238,7 @@ void for_each_field(Config& scenario, Visitor&& visit) {
   detail::visit_environment(scenario.environment, visit);
   detail::visit_noise(scenario.noise, visit);
   detail::visit_control(scenario, visit);
-  detail::visit_limits(scenario, visit);
+  detail::visit_sensor(scenario.sensor, visit);
   detail::visit_estimation(scenario.estimation, visit);
   detail::visit_tables(scenario, visit);
 }

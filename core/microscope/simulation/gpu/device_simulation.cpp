@@ -64,9 +64,9 @@ bool can_simulate(const RunParts& parts) {
   const auto is_short = [](const NoiseFilter& filter) {
     return filter.num_real <= num_device_poles_max;
   };
-  return *program() != '\0' && !parts.campaign.scenario.has_tests() &&
-         is_short(parts.noise.linear_x) && is_short(parts.noise.linear_yz) &&
-         is_short(parts.noise.angular) &&
+  return *program() != '\0' && !parts.campaign.scenario.has_tests() && !parts.has_stiffness() &&
+         are_alike(parts.campaign.scenario.noise) && is_short(parts.noise.linear_x[0]) &&
+         is_short(parts.noise.linear_yz[0]) && is_short(parts.noise.angular) &&
          std::ranges::all_of(parts.groups, [](const auto& further) { return further.empty(); });
 }
 
