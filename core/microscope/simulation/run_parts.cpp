@@ -112,8 +112,7 @@ RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {
   record.phasors.resize(scenario.sessions.size());
   record.health.resize(scenario.sessions.size());
   if (draw.instrument) {
-    record.truth =
-        true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+    record.truth = true_parameters(*draw.instrument, common_offset_x(scenario, *draw.instrument));
     record.eotvos_parameter = draw.instrument->eotvos_parameter;
   }
   return record;

@@ -223,9 +223,11 @@ class JointFit {
 
   /// Of each session's lines, about these values.
   [[nodiscard]] std::vector<NormalEquations> of_sessions(const UnknownArray& unknowns) const {
+    const DragFreeSource found = drag_free_of_a_d11_prime(input_.sessions);
     std::vector<LineCoefficients> coefficients;
     for (std::size_t i = 0; i < records_.size(); ++i) {
-      coefficients.push_back(line_coefficients(input_.sessions[i], records_[i].means, unknowns));
+      coefficients.push_back(
+          line_coefficients(input_.sessions[i], records_[i].means, unknowns, found));
     }
     std::vector<NormalEquations> equations(records_.size());
     for (const Line& line : lines_) {

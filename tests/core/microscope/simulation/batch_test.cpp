@@ -178,6 +178,33 @@ TEST(Batch, EqualsTheScalarReferenceWithComplexPolesInTheNoise) {
   expect_batch_equals_scalar(campaign, requests_from(0, 3));
 }
 
+TEST(Batch, EqualsTheScalarReferenceWithNoiseOfEachSensor) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.noise = noise_preset(NoisePreset::wire_suep);
+  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
+  campaign.scenario.noise = {};
+  campaign.scenario.noise.linear_factor = {1.0, 2.0};
+  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
+  campaign.scenario.noise.linear_factor = {2.0, 2.0};
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
+TEST(Batch, EqualsTheScalarReferenceWithStiffness) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
+  campaign.scenario.sensor.radial_stiffness_s2 = {-0.05, 0.0};
+  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
+}
+
+TEST(Batch, EqualsTheScalarReferenceOnOneSensorAwayFromTheCentreOfMass) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
+  for (std::size_t i = 0; i < 9; ++i) {
+    campaign.scenario.sessions[i].drag_free = DragFreeSource::sensor_2;
+  }
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
 TEST(Batch, EqualsTheScalarReferenceWithoutNoise) {
   MicroscopeCampaign campaign = short_campaign();
   campaign.scenario.noise.scale = 0.0;
