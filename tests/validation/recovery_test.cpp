@@ -269,10 +269,15 @@ TEST_P(RecoveryOfADraw, IsWithinOneFiftiethFarFromTheCentreOfMass) {
 }
 
 // The radial electrodes of SUEP. Masses that move 5 µm feel up to 1.5e-6 m/s², 78 times what moves
-// them; it is at f_TM, not at its sidebands.
-TEST_P(RecoveryOfADraw, IsWithinOneFiftiethWithStiffness) {
+// them, at f_TM and not at the sidebands that a_c1j is found at. K2 makes sidebands of it, which
+// core/microscope/instrument/README.md derives: up to 2e-4 rad at all bounds, and a tenth of the
+// objective in these draws.
+TEST_P(RecoveryOfADraw, IsWithinAnEighthOfAC1jWithStiffness) {
   auto [campaign, allowance] = silent_draw(GetParam());
   campaign.scenario.sensor.radial_stiffness_s2 = {-0.0503, -0.302};
+  for (const Parameter parameter : {Parameter::a_c12, Parameter::a_c13}) {
+    allowance[index(parameter)] = campaign.scenario.objectives[index(parameter)] / 8.0;
+  }
   expect_recovery(campaign, allowance);
 }
 
