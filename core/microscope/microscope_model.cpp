@@ -88,7 +88,7 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
   RunDraw draw{.num_draws = accepted.num_draws};
   if (!accepted.instrument) return draw;
   const ParameterArray truth =
-      true_parameters(*accepted.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+      true_parameters(*accepted.instrument, common_offset_x(scenario, *accepted.instrument));
   draw.values.assign(accepted.values.begin(), accepted.values.end());
   draw.truth = run_truth(scenario, truth, accepted.instrument->eotvos_parameter);
   return draw;

@@ -107,6 +107,19 @@ bool are_in_range(const DispersionSet& dispersions, const DrawnValues& values) {
 
 }  // namespace
 
+double common_offset_x(const Scenario& scenario, const Instrument& instrument) {
+  const double error_m_s2 = scenario.drag_free.bias_compensation_error_x_m_s2;
+  switch (drag_free_of_a_d11_prime(scenario.sessions)) {
+    case DragFreeSource::sensor_1:
+      return error_m_s2 - differential_bias_x(instrument);
+    case DragFreeSource::sensor_2:
+      return error_m_s2 + differential_bias_x(instrument);
+    case DragFreeSource::common:
+      break;
+  }
+  return error_m_s2;
+}
+
 AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
                              std::span<const double> table_values) {
   const RunIndex of_instrument{run.value / campaign.realisations};

@@ -59,6 +59,11 @@ inline constexpr std::uint64_t realisations_max = 4096;
 /// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
 [[nodiscard]] MicroscopeCampaign hardy2013_campaign();
 
+/// Constant of Γ_App,cx that the loop leaves in the sessions that find a_d11', m/s², as
+/// true_parameters() wants it: the error of the bias that it subtracts and, where it nulls one
+/// sensor, b_1d with the sign of that sensor.
+[[nodiscard]] double common_offset_x(const Scenario& scenario, const Instrument& instrument);
+
 /// The instrument of a run.
 struct AcceptedDraw {
   std::optional<Instrument> instrument;  ///< Empty if all num_draws_max were rejected.

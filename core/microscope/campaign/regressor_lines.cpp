@@ -243,7 +243,7 @@ double fit_duration_s(const Scenario& scenario, const Session& session) {
 
 double line_sigma(const Scenario& scenario, const Session& session, double frequency_hz,
                   double amplitude) {
-  const double density = 0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz);
+  const double density = differential_x_psd(scenario.noise, frequency_hz);
   return std::abs(target_info(session.target).scale) *
          std::sqrt(density / fit_duration_s(scenario, session)) / amplitude;
 }

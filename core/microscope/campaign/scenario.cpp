@@ -94,6 +94,33 @@ void check_sensor_noise(std::string_view axis, std::string_view unit, const Sens
   }
 }
 
+// Beyond the first bound shape_noise() has no room for the poles of the 1/f part.
+void check_wire(const NoiseConfig& noise) {
+  constexpr double corner_max_hz = 50.0;
+  for (std::size_t k = 0; k < noise.wire.factor.size(); ++k) {
+    const double corner_hz = linear_x_of(noise, k).pink_corner_hz;
+    if (corner_hz <= corner_max_hz) continue;
+    throw ConfigError("noise.wire.damping_n_m", fmt::format("{}", noise.wire.damping_n_m),
+                      fmt::format("must leave the 1/f noise of sensor {} along x below the white "
+                                  "level from {} Hz on, not {:.3g} Hz",
+                                  k + 1, corner_max_hz, corner_hz));
+  }
+}
+
+void check_stiffness(const Scenario& scenario) {
+  const std::array<double, 2>& stiffness = scenario.sensor.radial_stiffness_s2;
+  const std::size_t k = stiffness[0] == 0.0 ? 1 : 0;
+  if (stiffness[k] == 0.0) return;
+  for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
+    if (mass_excitations(scenario.sessions[i])[1] == nullptr) continue;
+    throw ConfigError(fmt::format("sensor.sensor_{}_radial_stiffness_s2", k + 1),
+                      fmt::format("{}", stiffness[k]),
+                      fmt::format("must be 0 where two excitations of a session, session[{}], "
+                                  "move test masses",
+                                  i));
+  }
+}
+
 void check_transient(const Scenario& scenario) {
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
     const double duration_s = scenario.sessions[i].num_orbits * scenario.orbit.period_s;
@@ -162,6 +189,8 @@ void Scenario::validate() const {
   check_sensor_noise("linear_x", "_m_s2", noise.linear_x);
   check_sensor_noise("linear_yz", "_m_s2", noise.linear_yz);
   check_sensor_noise("angular", "_rad_s2", noise.angular);
+  check_wire(noise);
+  check_stiffness(*this);
   check_loop("drag_free", drag_free.bandwidth_hz, drag_free.integral_hz,
              simulation.sample_period_s);
   check_loop("attitude", attitude.bandwidth_hz, attitude.integral_hz, simulation.sample_period_s);

@@ -62,9 +62,31 @@ void visit_sensor_noise(Noise& noise, std::array<std::string_view, 5> paths, Vis
   }
 
 template <typename Config, typename Visitor>
+void visit_wire(Config& wire, Visitor& visit) {
+  visit(
+      FieldInfo{"noise.wire.damping_n_m", "k/Q along X; 0 for no such noise.", range::not_negative},
+      wire.damping_n_m);
+  visit(FieldInfo{"noise.wire.temperature_k", "Of the wires.", range::positive},
+        wire.temperature_k);
+  visit(FieldInfo{"noise.wire.sensor_1_mass_kg", "Test mass of sensor 1.", range::positive},
+        wire.mass_kg[0]);
+  visit(FieldInfo{"noise.wire.sensor_2_mass_kg", "Test mass of sensor 2.", range::positive},
+        wire.mass_kg[1]);
+  visit(FieldInfo{"noise.wire.sensor_1_factor", "Multiplies the wire's noise in sensor 1.",
+                  range::not_negative},
+        wire.factor[0]);
+  visit(FieldInfo{"noise.wire.sensor_2_factor", "Multiplies the wire's noise in sensor 2.",
+                  range::not_negative},
+        wire.factor[1]);
+}
+
+template <typename Config, typename Visitor>
 void visit_noise(Config& noise, Visitor& visit) {
-  visit(FieldInfo{"noise.preset", "\"design_2013\" or \"flight_suref\"; sets what follows."},
-        noise.preset);
+  visit(
+      FieldInfo{
+          "noise.preset",
+          "\"design_2013\", \"flight_suref\", \"wire_suref\" or \"wire_suep\"; sets what follows."},
+      noise.preset);
   visit(FieldInfo{"noise.scale", "Multiplies every noise; 0 is off.", range::not_negative},
         noise.scale);
   visit_sensor_noise(noise.linear_x, PROOFMASS_SENSOR_NOISE("linear_x", "_m_s2"), visit);
@@ -82,6 +104,13 @@ void visit_noise(Config& noise, Visitor& visit) {
   visit(FieldInfo{"noise.torque_asd_rad_s2", "Attitude actuation, each axis, (rad/s²)/√Hz.",
                   range::not_negative},
         noise.torque_asd_rad_s2);
+  visit(FieldInfo{"noise.sensor_1_factor", "Multiplies the linear noise of sensor 1.",
+                  range::between(1e-3, 1e3)},
+        noise.linear_factor[0]);
+  visit(FieldInfo{"noise.sensor_2_factor", "Multiplies the linear noise of sensor 2.",
+                  range::between(1e-3, 1e3)},
+        noise.linear_factor[1]);
+  visit_wire(noise.wire, visit);
 }
 
 #undef PROOFMASS_SENSOR_NOISE
@@ -115,10 +144,24 @@ void visit_control(Config& scenario, Visitor& visit) {
 }
 
 template <typename Config, typename Visitor>
-void visit_limits(Config& scenario, Visitor& visit) {
+void visit_sensor(Config& sensor, Visitor& visit) {
   visit(FieldInfo{"sensor.range_m_s2", "Largest acceleration that a sensor reports.",
                   range::positive},
-        scenario.sensor.range_m_s2);
+        sensor.range_m_s2);
+  constexpr std::array<std::string_view, 3> positions{"sensor.position_x_m", "sensor.position_y_m",
+                                                      "sensor.position_z_m"};
+  for (std::size_t axis = 0; axis < positions.size(); ++axis) {
+    visit(FieldInfo{positions[axis], "Of the unit, from the centre of mass.",
+                    range::between(-10.0, 10.0)},
+          sensor.position_m[axis]);
+  }
+  constexpr std::array<std::string_view, 2> stiffnesses{"sensor.sensor_1_radial_stiffness_s2",
+                                                        "sensor.sensor_2_radial_stiffness_s2"};
+  for (std::size_t k = 0; k < stiffnesses.size(); ++k) {
+    visit(FieldInfo{stiffnesses[k], "k/m along Y and Z, where a mass moves.",
+                    range::between(-10.0, 10.0)},
+          sensor.radial_stiffness_s2[k]);
+  }
 }
 
 template <typename Config, typename Visitor>
@@ -195,7 +238,7 @@ void for_each_field(Config& scenario, Visitor&& visit) {
   detail::visit_environment(scenario.environment, visit);
   detail::visit_noise(scenario.noise, visit);
   detail::visit_control(scenario, visit);
-  detail::visit_limits(scenario, visit);
+  detail::visit_sensor(scenario.sensor, visit);
   detail::visit_estimation(scenario.estimation, visit);
   detail::visit_tables(scenario, visit);
 }

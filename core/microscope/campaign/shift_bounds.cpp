@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/microscope/campaign/regressor_lines.hpp"
+#include "core/microscope/instrument/stiffness.hpp"
 #include "core/signal/line_weights.hpp"
 #include "core/signal/noise_shape.hpp"
 
@@ -24,7 +25,7 @@ constexpr double quiet_asd_m_s2 = 3e-13;
 
 // Bounds of construction, [Hardy2013] tab:Budget and core/microscope/instrument.
 constexpr double differential_bias_max_m_s2 = 1.4e-8;  // b_1d.
-constexpr double centre_offset_max_m = 1e-3;           // Of the centre of mass, each axis.
+constexpr double centre_offset_max_m = 1e-3;           // Of the unit from its place, each axis.
 constexpr double coupling_max_rad = 1e-4;              // η.
 
 /// The parameter that a session of each target helps to find; the two slopes of K2c have one.
@@ -48,10 +49,12 @@ double mean_motion_rad_s(const Scenario& scenario) { return turn_rad / scenario.
 /// Γ_mes,cx at 2 f_EP that the loop leaves of [T] r_c, with r_c at its bound along X and Z, m/s².
 double gradient_residual(const Scenario& scenario, const Session& session) {
   const double n = mean_motion_rad_s(scenario);
+  const std::array<double, 3>& place = scenario.sensor.position_m;
   const double frequency_hz =
       std::max(2.0 * test_frequency_hz(session, scenario.orbit.period_s), 1e-9);
   return std::abs(drag_free_sensitivity(scenario.drag_free, frequency_hz)) * 1.5 * n * n *
-         std::numbers::sqrt2 * centre_offset_max_m;
+         std::numbers::sqrt2 *
+         (centre_offset_max_m + std::max(std::abs(place[0]), std::abs(place[2])));
 }
 
 /// What is left of a disturbance that is a quarter of a turn away from the regressor at two lines,
@@ -64,6 +67,13 @@ double asymmetry(const Scenario& scenario, const Session& session) {
         line_frequency_hz(session, session.fit_lines[i], scenario.orbit.period_s));
   };
   return std::abs(weight(0) - weight(1)) / (weight(0) + weight(1));
+}
+
+/// |k/m| of the sensor that has the larger one, where a session feels it.
+double stiffness_s2(const Scenario& scenario, const Session& session) {
+  if (!feels_stiffness(scenario.sensor, session)) return 0.0;
+  const auto& [first, second] = scenario.sensor.radial_stiffness_s2;
+  return std::max(std::abs(first), std::abs(second));
 }
 
 const Session* first_of(const Scenario& scenario, SessionTarget target) {
@@ -91,7 +101,7 @@ double least_noise_density(const Scenario& scenario) {
   for (const Session& session : scenario.sessions) {
     for (const LineMultiple& line : session.fit_lines) {
       const double frequency_hz = line_frequency_hz(session, line, scenario.orbit.period_s);
-      least = std::min(least, 0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
+      least = std::min(least, differential_x_psd(scenario.noise, frequency_hz));
     }
   }
   const double scale = scenario.noise.scale;
@@ -139,7 +149,8 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
     : objectives_(scenario.objectives),
       least_density_(least_noise_density(scenario)),
       block_s_(LineWeights::block_size * scenario.simulation.sample_period_s),
-      white_density_(0.5 * square(scenario.noise.linear_x.white_asd)),
+      white_density_(differential_x_density(
+          scenario.noise, [](const SensorNoise& x) { return square(x.white_asd); })),
       duration_s_(0.0),
       has_noise_(scenario.noise.scale > 0.0) {
   if (has_noise_) white_density_ *= square(scenario.noise.scale);
@@ -149,7 +160,9 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
     for (const Excitation* const motion : mass_excitations(session)) {
       if (motion == nullptr) continue;
       double& largest = mass_acceleration_m_s2_[index(motion->axis)];
-      largest = std::max(largest, square(turn_rad * motion->frequency_hz) * motion->amplitude);
+      const double per_metre =
+          square(turn_rad * motion->frequency_hz) + stiffness_s2(scenario, session);
+      largest = std::max(largest, per_metre * motion->amplitude);
     }
     if (session.target == SessionTarget::no_target) continue;
     add_session(scenario, session);
@@ -177,7 +190,7 @@ void ShiftBounds::add_session(const Scenario& scenario, const Session& session) 
   const double frequency_hz =
       line_frequency_hz(session, session.fit_lines.front(), scenario.orbit.period_s);
   total.sensor_sigma = total.of_noise * scenario.noise.scale *
-                       std::sqrt(0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
+                       std::sqrt(differential_x_psd(scenario.noise, frequency_hz));
 }
 
 // A fit with the weights W of its lines and the Jacobian J moves by C Jᵀ W δ if its lines move by

@@ -222,15 +222,30 @@ class CommentedWriter {
   }
 };
 
+bool is_later_key(std::string_view path) {
+  static constexpr std::array<std::string_view, 3> later_keys{
+      "budget.test_spin_rate_rad_s", "noise.sensor_1_factor", "noise.sensor_2_factor"};
+  static constexpr std::array<std::string_view, 4> later_stems{
+      "noise.wire.", "sensor.position_", "sensor.sensor_1_", "sensor.sensor_2_"};
+  return std::ranges::find(later_keys, path) != later_keys.end() ||
+         std::ranges::any_of(later_stems,
+                             [&](std::string_view stem) { return path.starts_with(stem); });
+}
+
 // What came after the first release is left out where it is nominal, so that the text of a campaign
-// remains the one that it was stored with.
+// remains the one that it was stored with. Where a preset sets another value, even the nominal one
+// is stated, because the preset of a text applies first.
 std::vector<detail::Entry> canonical_entries(const MicroscopeCampaign& campaign) {
-  static constexpr std::array<std::string_view, 1> later_keys{"budget.test_spin_rate_rad_s"};
+  MicroscopeCampaign preset;
+  preset.scenario.noise = noise_preset(campaign.scenario.noise.preset);
   const std::vector<detail::Entry> nominal = detail::scenario_entries(MicroscopeCampaign{});
+  const std::vector<detail::Entry> of_preset = detail::scenario_entries(preset);
+  const auto has = [](const std::vector<detail::Entry>& all, const detail::Entry& entry) {
+    return std::ranges::find(all, entry.path, &Entry::path)->text == entry.text;
+  };
   std::vector<detail::Entry> entries = detail::scenario_entries(campaign);
   std::erase_if(entries, [&](const detail::Entry& entry) {
-    return std::ranges::find(later_keys, entry.path) != later_keys.end() &&
-           std::ranges::find(nominal, entry.path, &Entry::path)->text == entry.text;
+    return is_later_key(entry.path) && has(nominal, entry) && has(of_preset, entry);
   });
   return entries;
 }

@@ -117,14 +117,19 @@ bool is_accepted(const Instrument& instrument, const AcceptanceConfig& acceptanc
          std::abs(a_c(0, 2)) <= acceptance.a_c1j_max_rad;
 }
 
-ParameterArray true_parameters(const Instrument& instrument, double bias_error_x_m_s2) {
+double differential_bias_x(const Instrument& instrument) {
+  return -0.5 *
+         (instrument.sensors[0].parasitic_K_m_s2.x() - instrument.sensors[1].parasitic_K_m_s2.x());
+}
+
+ParameterArray true_parameters(const Instrument& instrument, double common_offset_x_m_s2) {
   const auto [a_c, a_d] = sensitivity_matrices(instrument);
   const Sensor& inner = instrument.sensors[0];
   const Sensor& outer = instrument.sensors[1];
   const double k1c = 0.5 * (inner.scale_factor.x() + outer.scale_factor.x());
   const double k2c = 0.5 * (inner.quadratic_s2_m.x() + outer.quadratic_s2_m.x());
   const double k2d = 0.5 * (inner.quadratic_s2_m.x() - outer.quadratic_s2_m.x());
-  const double b1d = -0.5 * (inner.parasitic_K_m_s2.x() - outer.parasitic_K_m_s2.x());
+  const double b1d = differential_bias_x(instrument);
 
   ParameterArray truth{};
   const auto at = [&truth](Parameter parameter) -> double& { return truth[index(parameter)]; };
@@ -134,7 +139,7 @@ ParameterArray true_parameters(const Instrument& instrument, double bias_error_x
   at(Parameter::a_c12) = a_c(0, 1);
   at(Parameter::a_c13) = a_c(0, 2);
   at(Parameter::a_d11_prime) =
-      a_d(0, 0) + 2.0 * (k2c / k1c) * b1d + 2.0 * (k2d / k1c) * bias_error_x_m_s2;
+      a_d(0, 0) + 2.0 * (k2c / k1c) * b1d + 2.0 * (k2d / k1c) * common_offset_x_m_s2;
   at(Parameter::a_d12) = a_d(0, 1);
   at(Parameter::a_d13) = a_d(0, 2);
   at(Parameter::k2d) = k2d / (k1c * k1c);

@@ -62,9 +62,12 @@ struct SensitivityMatrices {
 /// True values of the ten parameters, SI, from exact matrices.
 ///
 /// a_d11' = a_d11 + 2(K2c/K1c) b_1d + 2(K2d/K1c)(C_0x − b_0c,x) ([Hardy2013] section 4.2), with
-/// b_1d = −½(p_1 − p_2) along X.
-/// @param bias_error_x_m_s2  C_0x − b_0c,x: error of the read-out bias that the loop subtracts.
+/// b_1d = differential_bias_x() along X.
+/// @param common_offset_x_m_s2  C_0x − b_0c,x: constant of Γ_App,cx that the loop leaves.
 [[nodiscard]] ParameterArray true_parameters(const Instrument& instrument,
-                                             double bias_error_x_m_s2);
+                                             double common_offset_x_m_s2);
+
+/// b_1d = −½(p_1 − p_2) along X, m/s²: the constant of Γ_App,d.
+[[nodiscard]] double differential_bias_x(const Instrument& instrument);
 
 }  // namespace proofmass

@@ -376,13 +376,13 @@ class JointStudy final : public PlanStudy {
         campaign_.table_quantities().empty()
             ? num_instruments_max
             : std::min((campaign_.num_runs + each - 1) / each, num_instruments_max);
-    const double bias_m_s2 = campaign_.scenario.drag_free.bias_compensation_error_x_m_s2;
     std::vector<RunIndex> runs;
     for (std::uint64_t i = 0; i < num_drawn; ++i) {
       const RunIndex run{i * each};
       const AcceptedDraw draw = draw_instrument(campaign_, run, campaign_.table_values(run));
       if (!draw.instrument) continue;
-      instruments_.emplace_back(phasors, input, true_unknowns(*draw.instrument, bias_m_s2));
+      const double offset_m_s2 = common_offset_x(campaign_.scenario, *draw.instrument);
+      instruments_.emplace_back(phasors, input, true_unknowns(*draw.instrument, offset_m_s2));
       runs.push_back(run);
     }
     if (instruments_.empty()) throw Error("no bound: no instrument is accepted");

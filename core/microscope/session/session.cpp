@@ -19,7 +19,6 @@ using enum ExcitationKind;
 using enum MassMotion;
 
 constexpr auto no_product = Product::none;
-constexpr auto common_drag_free = DragFreeSource::common;
 constexpr std::optional<DragFreeSource> any_drag_free;
 
 constexpr auto quiet = ExcitationRule::none;
@@ -42,23 +41,23 @@ constexpr Stimulus pushed_along(Axis axis) { return {drag_free, axis}; }
 // a_c1j multiplies the element jj less the element xx because the masses move along axes of their
 // sensors, which are turned against the satellite's by θ, the larger part of a_c1j.
 constexpr std::array<TargetInfo, num_session_targets> targets{{
-    {a_c11_delta_x, "a_c11_delta_x", quiet, no_stimulus, common_drag_free, Signal::gradient_xx,
+    {a_c11_delta_x, "a_c11_delta_x", quiet, no_stimulus, any_drag_free, Signal::gradient_xx,
      no_product, 2.0, SignalSet::all},
-    {a_c11_delta_z, "a_c11_delta_z", quiet, no_stimulus, common_drag_free, Signal::gradient_xz,
+    {a_c11_delta_z, "a_c11_delta_z", quiet, no_stimulus, any_drag_free, Signal::gradient_xz,
      no_product, 2.0, SignalSet::all},
-    {a_c11_delta_y, "a_c11_delta_y", shaken, turned_about_z, common_drag_free, Signal::gradient_xy,
+    {a_c11_delta_y, "a_c11_delta_y", shaken, turned_about_z, any_drag_free, Signal::gradient_xy,
      no_product, 2.0, SignalSet::all},
-    {a_c12, "a_c12", shaken, moved_along(Axis::y), common_drag_free, Signal::product,
+    {a_c12, "a_c12", shaken, moved_along(Axis::y), any_drag_free, Signal::product,
      Product::modulated_yy, 1.0, SignalSet::common},
-    {a_c13, "a_c13", shaken, moved_along(Axis::z), common_drag_free, Signal::product,
+    {a_c13, "a_c13", shaken, moved_along(Axis::z), any_drag_free, Signal::product,
      Product::modulated_zz, 1.0, SignalSet::common},
-    {a_d11_prime, "a_d11_prime", shaken, pushed_along(Axis::x), common_drag_free, Signal::common_x,
+    {a_d11_prime, "a_d11_prime", shaken, pushed_along(Axis::x), any_drag_free, Signal::common_x,
      no_product, 1.0, SignalSet::common},
-    {a_d12, "a_d12", shaken, pushed_along(Axis::y), common_drag_free, Signal::common_y, no_product,
+    {a_d12, "a_d12", shaken, pushed_along(Axis::y), any_drag_free, Signal::common_y, no_product,
      1.0, SignalSet::common},
-    {a_d13, "a_d13", shaken, pushed_along(Axis::z), common_drag_free, Signal::common_z, no_product,
+    {a_d13, "a_d13", shaken, pushed_along(Axis::z), any_drag_free, Signal::common_z, no_product,
      1.0, SignalSet::common},
-    {k2d, "k2d", shaken, pushed_along(Axis::x), common_drag_free, Signal::product,
+    {k2d, "k2d", shaken, pushed_along(Axis::x), any_drag_free, Signal::product,
      Product::common_squared, 1.0, SignalSet::common},
     {k2_sensor_1, "k2_sensor_1", shaken, Stimulus{test_mass, Axis::x, mass_1},
      DragFreeSource::sensor_2, Signal::product, Product::sensor_1_squared, 2.0, SignalSet::common},
@@ -135,6 +134,14 @@ std::string text_of(const LineMultiple& line) {
   }
   if (line.spin == 0.0) return fmt::format("[{}, {}]", line.orbital, excitations);
   return fmt::format("[{}, {}, {}]", line.orbital, excitations, line.spin);
+}
+
+DragFreeSource drag_free_of_a_d11_prime(const std::vector<Session>& sessions) {
+  for (const SessionTarget target : {a_d11_prime, ep_test}) {
+    const auto found = std::ranges::find(sessions, target, &Session::target);
+    if (found != sessions.end()) return found->drag_free;
+  }
+  return DragFreeSource::common;
 }
 
 double line_frequency_hz(const Session& session, const LineMultiple& line, double orbit_period_s) {

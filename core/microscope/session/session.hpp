@@ -239,6 +239,10 @@ struct Session {
   return session.target == SessionTarget::ep_test;
 }
 
+/// What the drag-free loop nulls where a_d11' is found: in its sessions; without any, in the first
+/// test. a_d11' holds what the constant accelerations there make of the quadratic factors.
+[[nodiscard]] DragFreeSource drag_free_of_a_d11_prime(const std::vector<Session>& sessions);
+
 /// Frequency of a line of the session, Hz, without its sign; f_orb = 1/orbit_period_s.
 [[nodiscard]] double line_frequency_hz(const Session& session, const LineMultiple& line,
                                        double orbit_period_s);

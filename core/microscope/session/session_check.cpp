@@ -225,6 +225,19 @@ void check_unique_names(const std::vector<Session>& sessions) {
   }
 }
 
+/// One a_d11' cannot hold what two kinds of constant accelerations make.
+void check_one_drag_free(const std::vector<Session>& sessions) {
+  const DragFreeSource first = drag_free_of_a_d11_prime(sessions);
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const bool is_other =
+        sessions[i].target == SessionTarget::a_d11_prime && sessions[i].drag_free != first;
+    if (!is_other) continue;
+    throw ConfigError(
+        fmt::format("session[{}].drag_free", i), spelling(sessions[i].drag_free),
+        fmt::format("all sessions with the target a_d11_prime need one, {}", spelling(first)));
+  }
+}
+
 }  // namespace
 
 void validate_sessions(const std::vector<Session>& sessions, double orbit_period_s,
@@ -233,6 +246,7 @@ void validate_sessions(const std::vector<Session>& sessions, double orbit_period
     SessionCheck(sessions[i], i, orbit_period_s, sample_period_s).run();
   }
   check_unique_names(sessions);
+  check_one_drag_free(sessions);
 }
 
 }  // namespace proofmass

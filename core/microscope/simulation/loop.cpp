@@ -1,6 +1,7 @@
 #include "core/microscope/simulation/loop.hpp"
 
 #include "core/microscope/control/star_tracker.hpp"
+#include "core/microscope/instrument/stiffness.hpp"
 
 namespace proofmass {
 namespace {
@@ -24,8 +25,10 @@ std::array<double, 2> motion_factors(MassMotion motion) {
   return {0.0, 0.0};
 }
 
-/// Directions of the motions that a session commands of the mass of sensor k.
+/// Directions of the motions that a session commands of the mass of sensor k. The force of the
+/// electrodes takes the place of a second motion.
 std::array<Eigen::Vector3d, num_mass_motions_max> motion_directions_S(const Session& session,
+                                                                      const SensorConfig& config,
                                                                       const Sensor& sensor,
                                                                       std::size_t k) {
   std::array<Eigen::Vector3d, num_mass_motions_max> directions;
@@ -37,6 +40,11 @@ std::array<Eigen::Vector3d, num_mass_motions_max> motion_directions_S(const Sess
     if (factor == 0.0) continue;
     const auto axis = static_cast<Eigen::Index>(index(excitations[i]->axis));
     directions[i] = factor * sensor.alignment_KS().transpose().col(axis);
+  }
+  if (feels_stiffness(config, session)) {
+    directions[1] =
+        stiffness_direction_S(sensor, config.radial_stiffness_s2[k], excitations[0]->axis,
+                              motion_factors(excitations[0]->motion)[k]);
   }
   return directions;
 }
@@ -76,15 +84,16 @@ LoopConstants<double> make_loop_constants(const Instrument& instrument, const Sc
   const Eigen::Vector3d bias_error(scenario.drag_free.bias_compensation_error_x_m_s2,
                                    scenario.drag_free.bias_compensation_error_y_m_s2,
                                    scenario.drag_free.bias_compensation_error_z_m_s2);
+  const Eigen::Vector3d unit_position(scenario.sensor.position_m.data());
   LoopConstants<double> constants;
   Eigen::Vector3d subtracted_bias = bias_error;
   for (std::size_t k = 0; k < 2; ++k) {
     const Sensor& sensor = instrument.sensors[k];
     // r_1 = r_c − ½Δ, r_2 = r_c + ½Δ
     const double side = k == 0 ? -0.5 : 0.5;
-    constants.sensors[k] =
-        make_sensor_model(sensor, instrument.centre_offset_S_m + side * instrument.offcentring_S_m,
-                          motion_directions_S(session, sensor, k));
+    constants.sensors[k] = make_sensor_model(
+        sensor, unit_position + instrument.centre_offset_S_m + side * instrument.offcentring_S_m,
+        motion_directions_S(session, scenario.sensor, sensor, k));
     subtracted_bias += weights[k] * sensor.read_out_bias_K_m_s2;
   }
   constants.sensor_range_m_s2 = scenario.sensor.range_m_s2;

@@ -202,15 +202,15 @@ std::size_t value_index(const Recording& recording, std::string_view group_name,
   return index;
 }
 
-/// Half the difference of two sensors whose noise is independent has half the PSD of one. What the
-/// loops leave of thrust and attitude reaches Γ_mes,dx through factors of a percent and is left
-/// out.
+/// Half the difference of two sensors whose noise is independent has a quarter of the sum of both
+/// PSDs. What the loops leave of thrust and attitude reaches Γ_mes,dx through factors of a percent
+/// and is left out.
 std::vector<ExpectedSpectrum> expected_spectra(const Scenario& scenario, const NoiseModel& noise,
                                                const Recording& recording) {
   const std::size_t differential_x = value_index(recording, "modes", "differential_x");
   const double period_s = scenario.simulation.sample_period_s;
-  const auto noise_psd = [shape = noise.linear_x, period_s](double frequency_hz) {
-    return 0.5 * shape.psd(frequency_hz, period_s);
+  const auto noise_psd = [shapes = noise.linear_x, period_s](double frequency_hz) {
+    return 0.25 * (shapes[0].psd(frequency_hz, period_s) + shapes[1].psd(frequency_hz, period_s));
   };
   std::vector<ExpectedSpectrum> spectra;
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {

@@ -237,12 +237,12 @@ struct RunPlan::Impl : RunParts {
   }
 
   /// Whether sessions may be computed side by side: the loops settle for a whole number of noise
-  /// blocks, no further lines are recorded, and none is a test.
+  /// blocks, no further lines are recorded, none is a test and none feels stiffness.
   [[nodiscard]] bool may_be_mixed() const {
     const Scenario& scenario = campaign.scenario;
     const SessionSignals signals(scenario, scenario.sessions[0], orbit, environment);
     return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 &&
-           !scenario.has_tests() &&
+           !scenario.has_tests() && !has_stiffness() &&
            std::ranges::all_of(groups, [](const auto& further) { return further.empty(); });
   }
 };

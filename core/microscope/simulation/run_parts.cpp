@@ -1,6 +1,9 @@
 #include "core/microscope/simulation/run_parts.hpp"
 
+#include <algorithm>
+
 #include "core/error.hpp"
+#include "core/microscope/instrument/stiffness.hpp"
 #include "core/microscope/simulation/line_fit.hpp"
 
 namespace proofmass {
@@ -68,6 +71,12 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
   }
 }
 
+bool RunParts::has_stiffness() const {
+  return std::ranges::any_of(campaign.scenario.sessions, [&](const Session& session) {
+    return feels_stiffness(campaign.scenario.sensor, session);
+  });
+}
+
 bool RunParts::is_monitored_before(std::size_t i) const {
   const Session& session = campaign.scenario.sessions[i];
   for (std::size_t k = 0; k < i; ++k) {
@@ -82,7 +91,10 @@ bool RunParts::is_monitored_before(std::size_t i) const {
 
 SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
   const Session& session = campaign.scenario.sessions[i];
-  return {.masses = mass_excitation(session) == nullptr ? TestMasses::at_rest : TestMasses::moving,
+  TestMasses masses =
+      mass_excitation(session) == nullptr ? TestMasses::at_rest : TestMasses::moving;
+  if (feels_stiffness(campaign.scenario.sensor, session)) masses = TestMasses::moving_twice;
+  return {.masses = masses,
           .reader = &readers.lines,
           .drag_free = drag_free,
           .attitude = attitude,
@@ -100,8 +112,7 @@ RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {
   record.phasors.resize(scenario.sessions.size());
   record.health.resize(scenario.sessions.size());
   if (draw.instrument) {
-    record.truth =
-        true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+    record.truth = true_parameters(*draw.instrument, common_offset_x(scenario, *draw.instrument));
     record.eotvos_parameter = draw.instrument->eotvos_parameter;
   }
   return record;

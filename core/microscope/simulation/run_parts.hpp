@@ -68,6 +68,9 @@ struct RunParts {
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
   std::vector<TestSetup> tests;  ///< Of each session; of use where it is a test.
 
+  /// Whether the masses of any session feel stiffness.
+  [[nodiscard]] bool has_stiffness() const;
+
  private:
   /// True if the loops of a session without excitation are those of one before, which tells enough.
   [[nodiscard]] bool is_monitored_before(std::size_t i) const;

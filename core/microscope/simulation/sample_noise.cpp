@@ -29,9 +29,12 @@ NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s) {
   const Eigen::Matrix3d star = make_star_tracker(config, sample_period_s).noise_factor_S_rad;
   // A one-sided density A² is the variance A²/(2T) of each sample.
   const double per_sample = scale / std::sqrt(2.0 * sample_period_s);
-  return {.linear_x = scaled_shape(config.linear_x, scale, sample_period_s),
-          .linear_yz = scaled_shape(config.linear_yz, scale, sample_period_s),
-          .angular = scaled_shape(config.angular, scale, sample_period_s),
+  const auto shape = [&](const SensorNoise& noise) {
+    return scaled_shape(noise, scale, sample_period_s);
+  };
+  return {.linear_x = {shape(linear_x_of(config, 0)), shape(linear_x_of(config, 1))},
+          .linear_yz = {shape(linear_yz_of(config, 0)), shape(linear_yz_of(config, 1))},
+          .angular = shape(config.angular),
           .star_tracker_factor = {scale * star(0, 0), scale * star(1, 0), scale * star(1, 1),
                                   scale * star(2, 0), scale * star(2, 1), scale * star(2, 2)},
           .thrust_deviation = config.thrust_asd_m_s2 * per_sample,

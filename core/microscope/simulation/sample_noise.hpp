@@ -28,7 +28,8 @@ struct SampleNoise {
 
 /// Colours and levels, the same for every run; noise.scale is in all of them.
 struct NoiseModel {
-  NoiseShape linear_x, linear_yz, angular;  ///< m/s², m/s², rad/s².
+  std::array<NoiseShape, 2> linear_x, linear_yz;  ///< Of each sensor, m/s².
+  NoiseShape angular;                             ///< rad/s².
   /// Lower triangular factor of the star tracker's covariance: xx, yx, yy, zx, zy, zz, rad.
   std::array<double, 6> star_tracker_factor{};
   double thrust_deviation = 0.0;  ///< Of a sample, each axis, m/s².
@@ -99,7 +100,7 @@ using NoiseStates = std::array<NoiseState<T>, num_coloured_channels>;
 /// The filter of a coloured channel.
 [[nodiscard]] inline const NoiseShape& shape_of(const NoiseModel& model, std::size_t channel) {
   if (channel >= 6) return model.angular;
-  return channel % 3 == 0 ? model.linear_x : model.linear_yz;
+  return (channel % 3 == 0 ? model.linear_x : model.linear_yz)[channel / 3];
 }
 
 /// Where a coloured channel's value goes: x, y, z of each sensor, then of the angular measurement.

@@ -103,7 +103,9 @@ struct LineReader {
 
 /// What the runs of a batch share in one session.
 struct SessionSetup {
-  TestMasses masses = TestMasses::moving;  ///< `at_rest` if no excitation moves one.
+  /// `at_rest` if no excitation moves one, `moving_twice` if the motion feels stiffness; several
+  /// motions without it are `moving`, because only sessions with line readers have them.
+  TestMasses masses = TestMasses::moving;
   WeightReader* reader = nullptr;
   DragFreeGains drag_free;
   AttitudeGains attitude;
@@ -368,7 +370,7 @@ using AdvanceGroups = void (*)(Signals&, const SessionSetup&, std::span<Group>, 
 static_assert(LineWeights::block_size % test_block_size == 0);
 
 /// The compiled loop for a session. Where further lines are recorded, two loops serve all sessions,
-/// and one serves those that test.
+/// one of them also those that feel stiffness, and one serves those that test.
 template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
@@ -377,7 +379,7 @@ AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& se
                               Monitoring::on, RecordedLines::own, true};
     return advance_groups<kind, Signals, Group, Observer>;
   }
-  if (!setup.line_readers.empty()) {
+  if (!setup.line_readers.empty() || setup.masses == moving_twice) {
     constexpr SampleKind kind{moving_twice, SignalSet::all, true, Monitoring::on,
                               RecordedLines::further};
     constexpr SampleKind kind_at_rest{at_rest, SignalSet::all, true, kind.monitoring, kind.lines};

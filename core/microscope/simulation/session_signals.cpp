@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/error.hpp"
+#include "core/microscope/instrument/stiffness.hpp"
 
 namespace proofmass {
 
@@ -38,6 +39,7 @@ SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
       num_record_(num_record_samples(scenario, session)),
       next_(-num_settling_) {
   environment_.begin_session(static_cast<double>(num_record_) * sample_period_s_);
+  feels_stiffness_ = feels_stiffness(scenario.sensor, session);
   num_excitations_ = session.excitations.size();
   PROOFMASS_EXPECT(num_excitations_ <= num_excitations_max);
   for (std::size_t i = 0; i < num_excitations_; ++i) {
@@ -114,6 +116,7 @@ void SessionSignals::excite(const SamplePhases& phases, SharedSample& sample) co
         (is_moved ? sample.second_motion : sample.mass_motion) = {
             value, omega * excitation.amplitude * phase.cosine, -omega * omega * value};
         is_moved = true;
+        if (feels_stiffness_) sample.second_motion = {0.0, 0.0, value};
         break;
       }
     }

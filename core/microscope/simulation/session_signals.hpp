@@ -35,8 +35,10 @@ struct SharedSampleOf {
   /// What the attitude command alone makes of the on-board estimate, which is linear: the ground
   /// takes it out again.
   AttitudeEstimator<T> commanded;
-  MassMotionPhaseOf<T> mass_motion;    ///< Of the moving test masses.
-  MassMotionPhaseOf<T> second_motion;  ///< Of the second of mass_excitations().
+  MassMotionPhaseOf<T> mass_motion;  ///< Of the moving test masses.
+  /// Of the second of mass_excitations(). Of stiffness, whose acceleration is in proportion to the
+  /// position in the first one and which moves no mass.
+  MassMotionPhaseOf<T> second_motion;
 };
 using SharedSample = SharedSampleOf<double>;
 
@@ -124,6 +126,7 @@ class SessionSignals {
   std::int64_t next_;
   std::size_t num_excitations_ = 0;
   std::array<Excitation, num_excitations_max> excitations_{};
+  bool feels_stiffness_ = false;
   bool commands_attitude_ = false;  ///< Otherwise commanded_ is 0 and remains so.
   AttitudeEstimator<double> commanded_;
 };

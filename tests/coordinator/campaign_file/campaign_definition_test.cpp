@@ -82,7 +82,14 @@ TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
 TEST(CanonicalDefinition, StatesEveryField) {
   MicroscopeCampaign campaign;
   EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("test_spin_rate_rad_s")));
+  EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("sensor_1_factor")));
+  EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("sensor_1_radial")));
   campaign.scenario.budget.test_spin_rate_rad_s = -2e-3;
+  NoiseConfig& noise = campaign.scenario.noise;
+  noise.linear_factor = {2.0, 3.0};
+  noise.wire = {1e-4, 300.0, {0.3, 0.4}, {0.5, 0.6}};
+  campaign.scenario.sensor.position_m = {0.1, 0.2, 0.3};
+  campaign.scenario.sensor.radial_stiffness_s2 = {-0.1, -0.2};
   const std::string definition = canonical_definition(campaign);
   EXPECT_EQ(canonical_definition(parse_campaign("", definition, {}, {})), definition);
   for_each_field(campaign.scenario, [&](const FieldInfo& field, const auto&) {
@@ -90,6 +97,16 @@ TEST(CanonicalDefinition, StatesEveryField) {
     EXPECT_THAT(definition, HasSubstr("[" + path.substr(0, path.rfind('.')) + "]\n"));
     EXPECT_THAT(definition, HasSubstr("\n" + path.substr(path.rfind('.') + 1) + " = "));
   });
+}
+
+// A preset of a text applies before its other keys.
+TEST(CanonicalDefinition, StatesANominalValueThatThePresetReplaces) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.noise = noise_preset(NoisePreset::wire_suep);
+  campaign.scenario.noise.wire.damping_n_m = 0.0;
+  const MicroscopeCampaign read = parse_campaign("", canonical_definition(campaign), {}, {});
+  EXPECT_EQ(read.scenario.noise.wire.damping_n_m, 0.0);
+  EXPECT_EQ(read.scenario.noise.wire.mass_kg, campaign.scenario.noise.wire.mass_kg);
 }
 
 TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {

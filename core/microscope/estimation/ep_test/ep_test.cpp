@@ -37,6 +37,9 @@ struct TestRecord {
   Products products;
   double common_mean = 0.0;        ///< Γ_mes,cx, m/s².
   double differential_mean = 0.0;  ///< Γ_mes,dx, m/s².
+  /// Γ_App,cx over Γ_App,dx of what is constant: 0 if the loop nulls both sensors, −1 or 1 if it
+  /// nulls the first or the second.
+  double common_part = 0.0;
   Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
   Fitted density;                 ///< At the line of each regressor, (m/s²)²/Hz.
 };
@@ -62,9 +65,13 @@ TestRecord test_record(const SessionPhasors& record, const Session& session,
   of.common_mean = mean(common_x);
   of.differential_mean = mean(differential_x);
   of.mean_gradient << mean(gradient_xx), mean(gradient_xy), mean(gradient_xz);
+  if (session.drag_free == DragFreeSource::sensor_1) of.common_part = -1.0;
+  if (session.drag_free == DragFreeSource::sensor_2) of.common_part = 1.0;
   const double f = test_frequency_hz(session, input.orbit_period_s);
   const auto density = [&](double frequency_hz) {
-    return window_noise_psd(input.noise.linear_x, frequency_hz, input.sample_period_s);
+    return differential_x_density(input.noise, [&](const SensorNoise& x) {
+      return 2.0 * window_noise_psd(x, frequency_hz, input.sample_period_s);
+    });
   };
   of.density << density(f), density(2.0 * f), density(2.0 * f);
   return of;
@@ -90,14 +97,15 @@ Factors corrected(const TestRecord& record, const ParameterArray& calibration) {
   subtract(gradient_zy, known(Parameter::a_c13) * y);
   subtract(gradient_zz, known(Parameter::a_c13) * z);
   // Squares about the means: a_d11' holds what the means make, but for that of the gradient.
-  const double known_mean =
-      record.differential_mean - record.mean_gradient.dot(Eigen::Vector3d(x, y, z));
+  const double of_gradient = record.mean_gradient.dot(Eigen::Vector3d(x, y, z));
+  const double known_mean = record.differential_mean - of_gradient;
+  const double known_common_mean = record.common_mean - record.common_part * of_gradient;
   const double k2d = known(Parameter::k2d), twice_k2c = 2.0 * known(Parameter::k2c);
   subtract(common_squared, k2d);
-  subtract(common_x, -2.0 * k2d * record.common_mean);
+  subtract(common_x, -2.0 * k2d * known_common_mean);
   subtract(common_product, twice_k2c);
   subtract(common_x, -twice_k2c * known_mean);
-  subtract(differential_x, -twice_k2c * record.common_mean);
+  subtract(differential_x, -twice_k2c * known_common_mean);
   return factors;
 }
 

@@ -151,15 +151,16 @@ Priors make_priors(const EstimationInput& input, const DrawnSums& drawn) {
 double line_variance(const EstimationInput& input, const Session& session, const LineMultiple& line,
                      const BandPass& filter) {
   const double f = line_frequency_hz(session, line, input.orbit_period_s);
-  const SensorNoise& x = input.noise.linear_x;
-  const double rise = x.rise_asd * (f / x.rise_corner_hz) * (f / x.rise_corner_hz);
-  const double limited = x.rise_limit_hz == 0.0 ? 0.0 : f / x.rise_limit_hz;
-  const double density = x.white_asd * x.white_asd * (1.0 + x.pink_corner_hz / f) +
-                         rise * rise / (1.0 + limited * limited * limited * limited);
+  const double density = differential_x_density(input.noise, [f](const SensorNoise& x) {
+    const double rise = x.rise_asd * (f / x.rise_corner_hz) * (f / x.rise_corner_hz);
+    const double limited = x.rise_limit_hz == 0.0 ? 0.0 : f / x.rise_limit_hz;
+    return x.white_asd * x.white_asd * (1.0 + x.pink_corner_hz / f) +
+           rise * rise / (1.0 + limited * limited * limited * limited);
+  });
   const double scale = input.noise.scale > 0.0 ? input.noise.scale : 1.0;
   const double duration_s = session.num_orbits * input.orbit_period_s - input.config.transient_s;
   const double passed = std::norm(response(filter, f, input.sample_period_s));
-  return 0.5 * scale * scale * density * passed / duration_s;
+  return scale * scale * density * passed / duration_s;
 }
 
 /// An observed line.
@@ -222,9 +223,11 @@ class JointFit {
 
   /// Of each session's lines, about these values.
   [[nodiscard]] std::vector<NormalEquations> of_sessions(const UnknownArray& unknowns) const {
+    const DragFreeSource found = drag_free_of_a_d11_prime(input_.sessions);
     std::vector<LineCoefficients> coefficients;
     for (std::size_t i = 0; i < records_.size(); ++i) {
-      coefficients.push_back(line_coefficients(input_.sessions[i], records_[i].means, unknowns));
+      coefficients.push_back(
+          line_coefficients(input_.sessions[i], records_[i].means, unknowns, found));
     }
     std::vector<NormalEquations> equations(records_.size());
     for (const Line& line : lines_) {

@@ -108,6 +108,14 @@ Dual common_constant(DragFreeSource source, const Dual& a, const Dual& b, const 
   return Dual(0.0) - a * b - cross;
 }
 
+/// a_d11' less a_d11: 2(K2c Γ_d + K2d Γ_c)/K1c with the constants Γ_d = b_1d and Γ_c of the loop.
+Dual constant_part(DragFreeSource found, const Unknowns& x) {
+  Dual factor = x[Parameter::k2c];
+  if (found == DragFreeSource::sensor_1) factor = factor - x[Parameter::k2d];
+  if (found == DragFreeSource::sensor_2) factor = factor + x[Parameter::k2d];
+  return Dual(2.0) * factor * x[Unknown::differential_bias];
+}
+
 /// Direction e of a relative motion in S: a row of [θ_c].
 Vector motion_direction(const Excitation& excitation, const Unknowns& x) {
   if (excitation.axis == Axis::x) return {1.0, 0.0, 0.0};
@@ -142,8 +150,8 @@ Dual constant_of(const std::array<double, num_line_bases>& means, const Unknowns
 
 }  // namespace
 
-UnknownArray true_unknowns(const Instrument& instrument, double bias_compensation_error_x_m_s2) {
-  const ParameterArray parameters = true_parameters(instrument, bias_compensation_error_x_m_s2);
+UnknownArray true_unknowns(const Instrument& instrument, double common_offset_x_m_s2) {
+  const ParameterArray parameters = true_parameters(instrument, common_offset_x_m_s2);
   const auto& [one, two] = instrument.sensors;
   const Eigen::Vector3d k1 = 0.5 * (one.scale_factor + two.scale_factor);
   const Eigen::Vector3d p = 0.5 * (one.parasitic_K_m_s2 + two.parasitic_K_m_s2);
@@ -171,13 +179,13 @@ Dual differential_constant(const std::array<double, num_line_bases>& means,
 
 LineCoefficients line_coefficients(const Session& session,
                                    const std::array<double, num_line_bases>& means,
-                                   const UnknownArray& unknowns) {
+                                   const UnknownArray& unknowns, DragFreeSource found) {
   const Unknowns x(unknowns);
   const Dual one(1.0), two(2.0), half(0.5);
   const Dual k2c = x[Parameter::k2c], k2d = x[Parameter::k2d];
   const Dual k2_1 = k2c + k2d, k2_2 = k2c - k2d;
   const Dual b = constant_of(means, x);
-  const Dual a = x[Parameter::a_d11_prime] - two * k2c * x[Unknown::differential_bias];
+  const Dual a = x[Parameter::a_d11_prime] - constant_part(found, x);
   const Dual c = common_constant(session.drag_free, a, b, x);
 
   const Dual kappa = two * (k2d * b + k2c * c);   // Of the common channel's scale.

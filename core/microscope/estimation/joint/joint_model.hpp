@@ -36,9 +36,9 @@ inline constexpr std::size_t num_unknowns = num_parameters + 12;
 /// One value for each unknown, SI.
 using UnknownArray = std::array<double, num_unknowns>;
 
-/// What the unknowns of an instrument are, but for the tilt of its star tracker, which is 0.
-[[nodiscard]] UnknownArray true_unknowns(const Instrument& instrument,
-                                         double bias_compensation_error_x_m_s2);
+/// What the unknowns of an instrument are, but for the tilt of its star tracker, which is 0; see
+/// true_parameters() for the offset.
+[[nodiscard]] UnknownArray true_unknowns(const Instrument& instrument, double common_offset_x_m_s2);
 
 /// A number with its derivatives by all unknowns: arithmetic on it yields the exact Jacobian.
 struct Dual {
@@ -60,9 +60,11 @@ struct LineCoefficients {
 
 /// The coefficients of a session.
 /// @param means  SessionPhasors::means of the session.
+/// @param found  drag_free_of_a_d11_prime() of all sessions.
 [[nodiscard]] LineCoefficients line_coefficients(const Session& session,
                                                  const std::array<double, num_line_bases>& means,
-                                                 const UnknownArray& unknowns);
+                                                 const UnknownArray& unknowns,
+                                                 DragFreeSource found = DragFreeSource::common);
 
 /// Constant part b of the differential acceleration, m/s²: b₁ and what the mean gradient adds.
 [[nodiscard]] Dual differential_constant(const std::array<double, num_line_bases>& means,

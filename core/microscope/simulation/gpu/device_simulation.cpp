@@ -49,6 +49,11 @@ std::vector<double> all_weights(const LineWeights& weights) {
   return all;
 }
 
+/// Whether both sensors have the same noise: the kernels have one filter for both.
+bool are_alike(const NoiseConfig& noise) {
+  return noise.wire.damping_n_m == 0.0 && noise.linear_factor[0] == noise.linear_factor[1];
+}
+
 /// The mark of a launch's loops. The last one but one has the same, and wrote over the noise that
 /// those have read.
 Device::Mark loops_done(std::size_t launch) { return 2 + launch % 2; }
@@ -59,9 +64,9 @@ bool can_simulate(const RunParts& parts) {
   const auto is_short = [](const NoiseFilter& filter) {
     return filter.num_real <= num_device_poles_max;
   };
-  return *program() != '\0' && !parts.campaign.scenario.has_tests() &&
-         is_short(parts.noise.linear_x) && is_short(parts.noise.linear_yz) &&
-         is_short(parts.noise.angular) &&
+  return *program() != '\0' && !parts.campaign.scenario.has_tests() && !parts.has_stiffness() &&
+         are_alike(parts.campaign.scenario.noise) && is_short(parts.noise.linear_x[0]) &&
+         is_short(parts.noise.linear_yz[0]) && is_short(parts.noise.angular) &&
          std::ranges::all_of(parts.groups, [](const auto& further) { return further.empty(); });
 }
 
@@ -101,7 +106,7 @@ void MicroscopeDeviceSimulation::make_tables() {
     starts_.push_back(start_streams(session.name));
   }
   tables_ = upload(device_, tables);
-  shared_ = {.filter = {parts_.noise.linear_x, parts_.noise.linear_yz, parts_.noise.angular},
+  shared_ = {.filter = {parts_.noise.linear_x[0], parts_.noise.linear_yz[0], parts_.noise.angular},
              .star_tracker_factor = parts_.noise.star_tracker_factor,
              .thrust_deviation = parts_.noise.thrust_deviation,
              .torque_deviation = parts_.noise.torque_deviation,

@@ -28,8 +28,37 @@ std::string refusal_after(const std::function<void(Scenario&)>& change) {
 
 TEST(Scenario, IsValidWithEveryPreset) {
   EXPECT_EQ(refusal_after([](Scenario&) {}), "");
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.noise = noise_preset(NoisePreset::flight_suref); }),
-            "");
+  for (const NoisePreset preset :
+       {NoisePreset::flight_suref, NoisePreset::wire_suref, NoisePreset::wire_suep}) {
+    EXPECT_EQ(refusal_after([=](Scenario& s) { s.noise = noise_preset(preset); }), "");
+  }
+}
+
+TEST(Scenario, RefusesAWireThatNoFilterFollows) {
+  const auto with_damping = [](double damping_n_m) {
+    return refusal_after([=](Scenario& s) {
+      s.noise = noise_preset(NoisePreset::wire_suep);
+      s.noise.wire.damping_n_m = damping_n_m;
+    });
+  };
+  EXPECT_EQ(with_damping(0.035), "");
+  EXPECT_EQ(with_damping(0.05),
+            "noise.wire.damping_n_m = 0.05 (must leave the 1/f noise of sensor 2 along x below the "
+            "white level from 50 Hz on, not 70.5 Hz)");
+}
+
+TEST(Scenario, RefusesStiffnessWhereMassesMoveTwice) {
+  const auto with_stiffness = [](std::array<double, 2> stiffness_s2) {
+    return refusal_after([=](Scenario& s) {
+      s.estimation.method = EstimationMethod{2};
+      s.sensor.radial_stiffness_s2 = stiffness_s2;
+      s.sessions[4].excitations.push_back({ExcitationKind::test_mass, Axis::y, 1e-5, 7e-3});
+    });
+  };
+  EXPECT_EQ(with_stiffness({}), "");
+  EXPECT_EQ(with_stiffness({0.0, -0.3}),
+            "sensor.sensor_2_radial_stiffness_s2 = -0.3 (must be 0 where two excitations of a "
+            "session, session[4], move test masses)");
 }
 
 TEST(Scenario, HasTheObjectivesOfThePaper) {
@@ -86,7 +115,7 @@ TEST(Scenario, NamesFieldValueAndRule) {
   EXPECT_EQ(refusal_after([](Scenario& s) { s.simulation.sample_period_s = 2.0; }),
             "simulation.sample_period_s = 2 (must be in [0.05, 1])");
   EXPECT_EQ(refusal_after([](Scenario& s) { s.noise.preset = static_cast<NoisePreset>(0); }),
-            "noise.preset = 0 (must be in [1, 2])");
+            "noise.preset = 0 (must be in [1, 4])");
   EXPECT_EQ(refusal_after([](Scenario& s) { s.estimation.num_rounds_max = 0; }),
             "estimation.num_rounds_max = 0 (must be in [1, 1000])");
   EXPECT_EQ(refusal_after([](Scenario& s) { s.sessions[0].num_orbits = 0; }),

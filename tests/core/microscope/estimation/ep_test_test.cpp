@@ -238,9 +238,10 @@ struct Coverage {
 };
 
 /// Of the Eötvös parameter.
-Coverage coverage(double spin, int num_orbits) {
+Coverage coverage(double spin, int num_orbits, const NoiseConfig& noise = {}) {
   constexpr std::uint64_t num_runs = 208;
   MicroscopeCampaign campaign;
+  campaign.scenario.noise = noise;
   campaign.scenario.sessions = {test_session("ep", num_orbits, spin)};
   const RunPlan plan(campaign, no_calibration);
   Coverage found;
@@ -266,6 +267,56 @@ TEST(EpTest, HasAnHonestStandardError) {
     EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin;
     EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin;
   }
+}
+
+// Of a wire whose noise differs in both sensors by a factor of ten in density.
+TEST(EpTest, HasAnHonestStandardErrorWithNoiseOfEachSensor) {
+  NoiseConfig noise = noise_preset(NoisePreset::wire_suref);
+  noise.linear_factor = {1.0, 0.5};
+  const Coverage found = coverage(17.5, 2, noise);
+  EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208));
+  EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208));
+}
+
+/// A test whose loop nulls the outer mass, calibrated by the truth.
+double error_on_the_outer_mass(DragFreeSource of_calibration, double offcentring_m = 0.0) {
+  MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, 17.5)});
+  campaign.scenario.sessions[0].drag_free = DragFreeSource::sensor_2;
+  Session calibration = hardy2013_sessions()[5];
+  calibration.num_orbits = 1;
+  calibration.drag_free = of_calibration;
+  campaign.scenario.sessions.push_back(calibration);
+  campaign.scenario.sensor.position_m = {0.0, 0.17, 0.0};
+  fix(campaign, "offcentring_m.x", offcentring_m);
+  fix(campaign, "quadratic_factor_s2_m.sensor_1_x", 14000.0);
+  fix(campaign, "quadratic_factor_s2_m.sensor_2_x", -14000.0);
+  fix(campaign, "parasitic_acceleration_m_s2.sensor_1_x", -1.4e-8);
+  fix(campaign, "parasitic_acceleration_m_s2.sensor_2_x", 1.4e-8);
+  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  return estimate(campaign, record, record.truth).values[delta];
+}
+
+// With Γ_App,c = b_1d in the test, 2 K2d b_1d = 3.9e-4 belongs to its a_d11'. It multiplies the
+// 3e-10 m/s² that the loop leaves at f_EP.
+TEST(EpTest, NeedsADPrimeOfItsOwnDragFreePoint) {
+  EXPECT_LT(std::abs(error_on_the_outer_mass(DragFreeSource::sensor_2)), 5e-16);
+  EXPECT_GT(std::abs(error_on_the_outer_mass(DragFreeSource::common)), 5e-15);
+}
+
+// The centrifugal acceleration ½Ω²Δx of a test is in Γ_App,c then, as it is in Γ_App,d, but not in
+// a calibration that does not spin: 2 K2d ½Ω²Δx of 1.9e-4.
+TEST(EpTest, KnowsTheCentrifugalAccelerationOnTheOuterMass) {
+  EXPECT_LT(std::abs(error_on_the_outer_mass(DragFreeSource::sensor_2, 40e-6)), 5e-16);
+}
+
+TEST(EpTest, FindsAViolationFarFromTheCentreOfMassOnTheOuterMass) {
+  MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, 17.5)});
+  campaign.scenario.sessions[0].drag_free = DragFreeSource::sensor_2;
+  campaign.scenario.sensor.position_m = {0.0, 0.17, 0.0};
+  fix(campaign, "eotvos_parameter.masses_2_1", 1e-14);
+  fix(campaign, "offcentring_m.x", 35e-6);
+  EXPECT_NEAR(estimate(campaign).values[delta], 1e-14, 1e-17);
+  EXPECT_NEAR(estimate(campaign).values[delta_x], 35e-6, 1e-11);
 }
 
 TEST(EpTest, HasTheSameBitsOnEveryInstructionSet) {

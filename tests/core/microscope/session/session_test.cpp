@@ -171,6 +171,41 @@ TEST(ValidateSessions, WantsTheExcitationThatShowsTheTarget) {
       "session[9].drag_free = common (target k2_sensor_1 needs sensor_2)");
 }
 
+TEST(ValidateSessions, LetsTheLoopNullAnySensorButWhereOneMassMoves) {
+  const auto refusal_of = [](DragFreeSource source) {
+    return refusal_after([=](Sessions& s) {
+      for (std::size_t i = 0; i < at_k2_sensor_1; ++i) s[i].drag_free = source;
+    });
+  };
+  EXPECT_EQ(refusal_of(DragFreeSource::sensor_1), "");
+  EXPECT_EQ(refusal_of(DragFreeSource::sensor_2), "");
+}
+
+TEST(ValidateSessions, WantsOneDragFreePointForADPrime) {
+  EXPECT_EQ(refusal_after([](Sessions& s) {
+              s.push_back(s[5]);
+              s.back().name = "again";
+              s.back().drag_free = DragFreeSource::sensor_2;
+            }),
+            "session[11].drag_free = sensor_2 (all sessions with the target a_d11_prime need one, "
+            "common)");
+}
+
+// A test corrects its own record by a_d11', so that a campaign without sessions of it goes by that.
+TEST(DragFreeOfADPrime, IsThatOfItsSessionsOrElseOfTheTest) {
+  Sessions sessions = hardy2013_sessions();
+  Session test;
+  test.target = SessionTarget::ep_test;
+  test.drag_free = DragFreeSource::sensor_2;
+  sessions.push_back(test);
+  EXPECT_EQ(drag_free_of_a_d11_prime(sessions), DragFreeSource::common);
+  sessions[5].drag_free = DragFreeSource::sensor_1;
+  EXPECT_EQ(drag_free_of_a_d11_prime(sessions), DragFreeSource::sensor_1);
+  sessions[5].target = SessionTarget::no_target;
+  EXPECT_EQ(drag_free_of_a_d11_prime(sessions), DragFreeSource::sensor_2);
+  EXPECT_EQ(drag_free_of_a_d11_prime({}), DragFreeSource::common);
+}
+
 TEST(ValidateSessions, WantsAnExcitationThatCanBeSeen) {
   const auto with_amplitude = [](double amplitude) {
     return refusal_after([=](Sessions& s) { s[at_delta_y].excitations[0].amplitude = amplitude; });

@@ -87,11 +87,15 @@ std::vector<RunResult> on_device(const RunPlan& plan, std::span<const RunRequest
   }
 }
 
+/// Whether devices simulate a campaign, or leave it to processors.
+enum class OnDevices : std::uint8_t { simulated, left_out };
+
 /// Compares every run of a batch on every instruction set with the same run alone: in that batch,
 /// in a full one, and in those of one and two runs, whose sessions are computed side by side; and
 /// the runs on a device.
 void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
-                                const std::vector<RunRequest>& requests) {
+                                const std::vector<RunRequest>& requests,
+                                OnDevices on_devices = OnDevices::simulated) {
   campaign.validate();
   const RunPlan plan(campaign);
   std::vector<RunResult> alone;
@@ -110,6 +114,8 @@ void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
       }
     }
   }
+  EXPECT_EQ(plan.runs_on_devices(), on_devices == OnDevices::simulated);
+  if (!plan.runs_on_devices()) return;
   const std::vector<RunResult> results = on_device(plan, requests);
   ASSERT_EQ(results.size(), alone.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
@@ -169,6 +175,33 @@ TEST(Batch, TakesRunsFromAnywhereInAnyOrder) {
 TEST(Batch, EqualsTheScalarReferenceWithComplexPolesInTheNoise) {
   MicroscopeCampaign campaign = short_campaign();
   campaign.scenario.noise = noise_preset(NoisePreset::flight_suref);
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
+TEST(Batch, EqualsTheScalarReferenceWithNoiseOfEachSensor) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.noise = noise_preset(NoisePreset::wire_suep);
+  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
+  campaign.scenario.noise = {};
+  campaign.scenario.noise.linear_factor = {1.0, 2.0};
+  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
+  campaign.scenario.noise.linear_factor = {2.0, 2.0};
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
+TEST(Batch, EqualsTheScalarReferenceWithStiffness) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
+  campaign.scenario.sensor.radial_stiffness_s2 = {-0.05, 0.0};
+  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
+}
+
+TEST(Batch, EqualsTheScalarReferenceOnOneSensorAwayFromTheCentreOfMass) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
+  for (std::size_t i = 0; i < 9; ++i) {
+    campaign.scenario.sessions[i].drag_free = DragFreeSource::sensor_2;
+  }
   expect_batch_equals_scalar(campaign, requests_from(0, 3));
 }
 

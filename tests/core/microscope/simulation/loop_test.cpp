@@ -194,6 +194,54 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
   }
 }
 
+// r_k = place of the unit + drawn offset ∓ ½Δ.
+TEST(LoopConstants, PutTheUnitAtItsPlace) {
+  Scenario scenario = silent_scenario();
+  scenario.sensor.position_m = {0.5, 0.25, -0.5};
+  Instrument instrument = perfect_instrument();
+  instrument.centre_offset_S_m = {0.0, 0.125, 0.0};
+  instrument.offcentring_S_m = {0.0, 0.0, 0.25};
+  const LoopConstants<double> constants =
+      make_loop_constants(instrument, scenario, quiet_session());
+  const Vector3<double>& inner = constants.sensors[0].rest_position_S_m;
+  const Vector3<double>& outer = constants.sensors[1].rest_position_S_m;
+  EXPECT_EQ(inner.x, 0.5);
+  EXPECT_EQ(inner.y, 0.375);
+  EXPECT_EQ(inner.z, -0.625);
+  EXPECT_EQ(outer.z, -0.375);
+}
+
+// Masses that move by ∓½Δ_TM sin(ωt) along Y accelerate by ±½ω²Δ_TM sin(ωt) and push their sensors
+// by −(k/m) q: of perfect sensors, Γ_mes,dy = ¼(2ω² + k_1/m_1 + k_2/m_2) Δ_TM sin(ωt), and the loop
+// does not come in. T_yy = −n² is 6e-6 of that.
+TEST(Loop, MeasuresTheForceOfStiffElectrodes) {
+  Scenario scenario = silent_scenario();
+  scenario.sensor.radial_stiffness_s2 = {-0.05, -0.3};
+  Session session = quiet_session();
+  session.target = SessionTarget::a_c12;
+  session.excitations = {{ExcitationKind::test_mass, Axis::y, 1e-5, 9.88e-3}};
+  const LoopConstants<double> constants =
+      make_loop_constants(perfect_instrument(), scenario, session);
+  const KeplerOrbit orbit(scenario.orbit);
+  const EnvironmentTable no_table;
+  SessionSignals signals(scenario, session, orbit,
+                         Environment(scenario.environment, no_table, orbit.period_s()));
+  const DragFreeGains drag_free = drag_free_gains(scenario.drag_free, period_s);
+  const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
+  Loop<double> loop;
+  loop.begin(signals.reference_at_start());
+  const double omega = two_pi * 9.88e-3;
+  const double expected = 0.25 * (2.0 * omega * omega - 0.35) * 1e-5;
+  for (std::int64_t i = -signals.num_settling(); i < 1000; ++i) {
+    const SharedSample shared = signals.next();
+    const Observation<double> observation = loop.advance<TestMasses::moving_twice>(
+        constants, drag_free, attitude, shared, SampleNoise<double>{});
+    const double t = static_cast<double>(i) * period_s;
+    const double measured = 0.5 * (observation.measured_K[0].y - observation.measured_K[1].y);
+    ASSERT_NEAR(measured, expected * std::sin(omega * t), 2e-5 * std::abs(expected)) << t;
+  }
+}
+
 // A commanded swing about Z: the ground takes the command out of the on-board angles, so that its
 // gradients are those of the true attitude: T_xy + Ω̇_z with T_xy = (μ/r³)·3 û_x û_y in S.
 TEST(GroundSignals, SeeTheTrueAttitudeUnderACommandedSwing) {
