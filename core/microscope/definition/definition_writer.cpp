@@ -226,11 +226,14 @@ class CommentedWriter {
 // remains the one that it was stored with.
 std::vector<detail::Entry> canonical_entries(const MicroscopeCampaign& campaign) {
   static constexpr std::array<std::string_view, 1> later_keys{"budget.test_spin_rate_rad_s"};
-  const std::vector<detail::Entry> nominal = detail::scenario_entries(MicroscopeCampaign{});
+  MicroscopeCampaign of_sessions;
+  of_sessions.scenario.sessions = campaign.scenario.sessions;
+  const std::vector<detail::Entry> nominal = detail::scenario_entries(of_sessions);
   std::vector<detail::Entry> entries = detail::scenario_entries(campaign);
   std::erase_if(entries, [&](const detail::Entry& entry) {
-    return std::ranges::find(later_keys, entry.path) != later_keys.end() &&
-           std::ranges::find(nominal, entry.path, &Entry::path)->text == entry.text;
+    const bool is_later = entry.path.starts_with("gaps.") ||
+                          std::ranges::find(later_keys, entry.path) != later_keys.end();
+    return is_later && std::ranges::find(nominal, entry.path, &Entry::path)->text == entry.text;
   });
   return entries;
 }
