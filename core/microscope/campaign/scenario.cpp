@@ -197,6 +197,7 @@ void Scenario::validate() const {
   validate_sessions(sessions, orbit.period_s, simulation.sample_period_s);
   estimation_method(estimation.method).check(sessions);
   check_test(*this);
+  gaps.validate(sessions, simulation.sample_period_s);
   check_transient(*this);
   check_band(*this);
   check_wanted_lines(*this);

@@ -14,6 +14,7 @@
 #include "core/microscope/instrument/noise_config.hpp"
 #include "core/microscope/orbit/orbit_config.hpp"
 #include "core/microscope/results/results.hpp"
+#include "core/microscope/session/gaps.hpp"
 #include "core/microscope/session/session.hpp"
 
 namespace proofmass {
@@ -29,6 +30,7 @@ struct Scenario {
   DragFreeConfig drag_free;
   AttitudeConfig attitude;
   SensorConfig sensor;
+  GapsConfig gaps;  ///< Of campaigns that test.
   EstimationConfig estimation;
   AcceptanceConfig acceptance;    ///< Bounds outside which an instrument is drawn again.
   BudgetConfig budget;            ///< Levels behind the error budget; the simulation uses none.

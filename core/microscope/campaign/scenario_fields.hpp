@@ -165,6 +165,31 @@ void visit_sensor(Config& sensor, Visitor& visit) {
 }
 
 template <typename Config, typename Visitor>
+void visit_gaps(Config& gaps, Visitor& visit) {
+  const Range depth = range::between(0.0, 1.0), duration = range::between(1.0, 1e5);
+  visit(FieldInfo{"gaps.glitch_rate_hz", "Mean rate of glitches in tests; 0 for none.",
+                  range::between(0.0, 1.0)},
+        gaps.glitch_rate_hz);
+  visit(FieldInfo{"gaps.glitch_duration_s", "Data discarded from a glitch on.", duration},
+        gaps.glitch_duration_s);
+  visit(FieldInfo{"gaps.orbital_modulation", "Part of the rate that follows f_orb.", depth},
+        gaps.orbital.depth);
+  visit(FieldInfo{"gaps.orbital_phase_rad", "Cosine from the session's start."},
+        gaps.orbital.phase_rad);
+  visit(FieldInfo{"gaps.spin_modulation", "Part that follows f_spin, the Sun's frequency.", depth},
+        gaps.spin.depth);
+  visit(FieldInfo{"gaps.spin_phase_rad", "Cosine from the session's start."}, gaps.spin.phase_rad);
+  visit(FieldInfo{"gaps.test_modulation", "Part that follows f_EP, the Earth's frequency.", depth},
+        gaps.test.depth);
+  visit(FieldInfo{"gaps.test_phase_rad", "Cosine from the session's start."}, gaps.test.phase_rad);
+  visit(FieldInfo{"gaps.telemetry_rate_hz", "Rate of gaps in the telemetry; 0 for none.",
+                  range::between(0.0, 1.0)},
+        gaps.telemetry_rate_hz);
+  visit(FieldInfo{"gaps.telemetry_duration_s", "Length of one.", duration},
+        gaps.telemetry_duration_s);
+}
+
+template <typename Config, typename Visitor>
 void visit_estimation(Config& estimation, Visitor& visit) {
   visit(FieldInfo{"estimation.method",
                   "\"hardy2013\": one parameter a session, iterated; \"joint\": all at once."},
@@ -239,6 +264,7 @@ void for_each_field(Config& scenario, Visitor&& visit) {
   detail::visit_noise(scenario.noise, visit);
   detail::visit_control(scenario, visit);
   detail::visit_sensor(scenario.sensor, visit);
+  if (scenario.has_tests()) detail::visit_gaps(scenario.gaps, visit);
   detail::visit_estimation(scenario.estimation, visit);
   detail::visit_tables(scenario, visit);
 }

@@ -63,6 +63,9 @@ class Comparison {
       std::erase_if(entries,
                     [&](const Entry& entry) { return entry.path == test_objective_path(i); });
     }
+    if (!with_tests) {
+      std::erase_if(entries, [](const Entry& entry) { return entry.path.starts_with("gaps."); });
+    }
     for (Entry& entry : entries) {
       constexpr std::string_view table = "campaign.";
       if (entry.path.starts_with(table)) entry.path.erase(0, table.size());

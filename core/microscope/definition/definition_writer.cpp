@@ -225,8 +225,8 @@ class CommentedWriter {
 bool is_later_key(std::string_view path) {
   static constexpr std::array<std::string_view, 3> later_keys{
       "budget.test_spin_rate_rad_s", "noise.sensor_1_factor", "noise.sensor_2_factor"};
-  static constexpr std::array<std::string_view, 4> later_stems{
-      "noise.wire.", "sensor.position_", "sensor.sensor_1_", "sensor.sensor_2_"};
+  static constexpr std::array<std::string_view, 5> later_stems{
+      "gaps.", "noise.wire.", "sensor.position_", "sensor.sensor_1_", "sensor.sensor_2_"};
   return std::ranges::find(later_keys, path) != later_keys.end() ||
          std::ranges::any_of(later_stems,
                              [&](std::string_view stem) { return path.starts_with(stem); });
@@ -236,9 +236,11 @@ bool is_later_key(std::string_view path) {
 // remains the one that it was stored with. Where a preset sets another value, even the nominal one
 // is stated, because the preset of a text applies first.
 std::vector<detail::Entry> canonical_entries(const MicroscopeCampaign& campaign) {
-  MicroscopeCampaign preset;
+  MicroscopeCampaign of_sessions;  // Some keys are there only with sessions that test.
+  of_sessions.scenario.sessions = campaign.scenario.sessions;
+  MicroscopeCampaign preset = of_sessions;
   preset.scenario.noise = noise_preset(campaign.scenario.noise.preset);
-  const std::vector<detail::Entry> nominal = detail::scenario_entries(MicroscopeCampaign{});
+  const std::vector<detail::Entry> nominal = detail::scenario_entries(of_sessions);
   const std::vector<detail::Entry> of_preset = detail::scenario_entries(preset);
   const auto has = [](const std::vector<detail::Entry>& all, const detail::Entry& entry) {
     return std::ranges::find(all, entry.path, &Entry::path)->text == entry.text;

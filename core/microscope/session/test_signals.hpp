@@ -45,6 +45,13 @@ inline constexpr std::size_t num_test_signals = 20;
 inline constexpr std::size_t num_test_products = num_test_signals * (num_test_signals + 1) / 2;
 using TestProducts = std::array<double, num_test_products>;
 
+/// The fitted regressors g_x, G_xx and G_xz of a window.
+inline constexpr std::size_t num_test_regressors = 3;
+using WindowRegressors = std::array<double, num_test_regressors>;
+
+/// Sums of products of two regressors, [i][j].
+using RegressorProducts = std::array<WindowRegressors, num_test_regressors>;
+
 /// Samples of a block. A window is two neighbouring blocks long, and its weights rise in the first
 /// and fall in the second.
 inline constexpr std::size_t test_block_size = 16;

@@ -139,6 +139,9 @@ void PROOFMASS_NAME(record_batch_,
   for (std::size_t g = 0; g < num_used; ++g) {
     groups[g].eotvos_parameter =
         gather([&](std::size_t lane) { return session.eotvos_parameters[g * num_lanes + lane]; });
+    for (std::size_t lane = 0; lane < num_lanes; ++lane) {
+      groups[g].test.window_weights.runs[lane] = session.window_weights[g * num_lanes + lane];
+    }
   }
   record_session(signals, session.setup, used, session.weights_buffer, progress, NoObserver{});
   for (std::size_t g = 0; g < num_used; ++g) {

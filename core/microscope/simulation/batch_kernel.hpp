@@ -24,7 +24,9 @@ struct BatchSession {
   std::array<LoopConstants<double>, batch_lanes> constants{};
   std::array<NoiseStates<double>, batch_lanes> noise_states{};
   std::array<double, batch_lanes> eotvos_parameters{};  ///< Read in a test session alone.
-  std::span<double> weights_buffer;                     ///< Room for a block of weights.
+  /// Of the windows of each lane, null if each counts once; read in a test session alone.
+  std::array<const float*, batch_lanes> window_weights{};
+  std::span<double> weights_buffer;  ///< Room for a block of weights.
   /// Called with the number of record samples done, after each block or more often.
   void (*progress)(const void* context, std::size_t num_samples) = nullptr;
   const void* progress_context = nullptr;

@@ -1,6 +1,7 @@
 #include "core/microscope/simulation/run.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <functional>
@@ -129,6 +130,8 @@ struct RunPlan::Impl : RunParts {
                             const Observer& observer, const SessionProgress& progress,
                             RunRecord& record) const {
     Readers readers(*this, i);
+    const std::vector<float> of_windows = window_weights(i, record.run);
+    if (!of_windows.empty()) alone.test.window_weights.runs[0] = of_windows.data();
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
     keep(
@@ -162,6 +165,8 @@ struct RunPlan::Impl : RunParts {
         batch.constants[l] = make_loop_constants(lane.instrument, impl.campaign.scenario, session);
         batch.eotvos_parameters[l] = lane.instrument.eotvos_parameter;
         batch.noise_states[l] = stationary_states(impl.noise, impl.campaign.seed, lane.run, starts);
+        of_windows[l] = impl.window_weights(i, lane.run);
+        if (!of_windows[l].empty()) batch.window_weights[l] = of_windows[l].data();
       }
     }
     SessionOfBatch(const SessionOfBatch&) = delete;
@@ -171,6 +176,7 @@ struct RunPlan::Impl : RunParts {
     NoiseStreams streams;
     Readers readers;
     BatchSession batch;
+    std::array<std::vector<float>, batch_lanes> of_windows;
   };
 
   void keep_all(std::size_t i, std::span<const Lane> lanes, const SessionOutcomes& outcomes,

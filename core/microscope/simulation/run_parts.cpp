@@ -4,6 +4,7 @@
 
 #include "core/error.hpp"
 #include "core/microscope/instrument/stiffness.hpp"
+#include "core/microscope/session/gaps.hpp"
 #include "core/microscope/simulation/line_fit.hpp"
 
 namespace proofmass {
@@ -69,6 +70,34 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     if (is_test(session) || !session.excitations.empty() || is_monitored_before(i)) continue;
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
+  if (!campaign.scenario.gaps.lose_data()) return;
+  weights_of_windows.emplace(c.scenario.noise.linear_x, c.scenario.simulation.sample_period_s);
+  for (std::size_t i = 0; i < tests.size(); ++i) regressors.push_back(nominal_regressors(i));
+}
+
+std::vector<float> RunParts::window_weights(std::size_t i, RunIndex run) const {
+  const Scenario& scenario = campaign.scenario;
+  if (!weights_of_windows || !is_test(scenario.sessions[i])) return {};
+  return weights_of_windows->of(lost_blocks(scenario.gaps, scenario.sessions[i], campaign.seed, run,
+                                            tests[i].num_blocks, scenario.orbit.period_s,
+                                            scenario.simulation.sample_period_s));
+}
+
+std::vector<WindowRegressors> RunParts::nominal_regressors(std::size_t i) const {
+  const Session& session = campaign.scenario.sessions[i];
+  std::vector<WindowRegressors> of_windows;
+  if (!is_test(session)) return of_windows;
+  SessionSignals signals(campaign.scenario, session, orbit, environment);
+  for (std::int64_t n = 0; n < signals.num_settling(); ++n) (void)signals.next();
+  for (std::size_t n = 0; n < tests[i].num_blocks * test_block_size; ++n) {
+    const SharedSample sample = signals.next();
+    if (n == 0 || n % test_block_size != 0) continue;  // A window's middle is between two blocks.
+    const Vector3<double>& radial_S = sample.radial_R;
+    const double gradient = 3.0 * sample.gradient_s2 * radial_S.x;
+    of_windows.push_back({-tests[i].gravity_m_s2(sample) * radial_S.x, gradient * radial_S.x,
+                          gradient * radial_S.z});
+  }
+  return of_windows;
 }
 
 bool RunParts::has_stiffness() const {
@@ -127,6 +156,10 @@ void RunParts::keep(std::size_t i, const SessionOutcome& outcome, RunRecord& rec
   }
   if (is_test(campaign.scenario.sessions[i])) {
     phasors.test_products.assign(outcome.test_products.begin(), outcome.test_products.end());
+    if (weights_of_windows) {
+      phasors.test_noise =
+          weights_of_windows->noise_products(window_weights(i, record.run), regressors[i]);
+    }
   }
   record.health[i] = outcome.health;
   record.health[i].is_quiet = is_quiet(i);

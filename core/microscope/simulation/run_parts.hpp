@@ -7,6 +7,7 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/environment/environment.hpp"
+#include "core/microscope/estimation/ep_test/window_weights.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/line_fit.hpp"
@@ -45,6 +46,9 @@ struct RunParts {
 
   [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const;
 
+  /// Weights of the windows of a run's session; none if each counts once.
+  [[nodiscard]] std::vector<float> window_weights(std::size_t i, RunIndex run) const;
+
   /// What is known of a run before it is simulated.
   [[nodiscard]] RunRecord drawn_record(RunIndex run, const AcceptedDraw& draw) const;
 
@@ -66,12 +70,17 @@ struct RunParts {
   std::vector<std::vector<LineGroup>> groups;                ///< Of each session's further lines.
   std::vector<std::vector<LineWeights>> group_weights;       ///< Of those groups.
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
-  std::vector<TestSetup> tests;  ///< Of each session; of use where it is a test.
+  std::vector<TestSetup> tests;                     ///< Of each session; of use where it is a test.
+  std::optional<WindowWeights> weights_of_windows;  ///< If tests lose data.
+  std::vector<std::vector<WindowRegressors>> regressors;  ///< Of each session; none if none do.
 
   /// Whether the masses of any session feel stiffness.
   [[nodiscard]] bool has_stiffness() const;
 
  private:
+  /// The regressors of a test in the attitude that it is to have.
+  [[nodiscard]] std::vector<WindowRegressors> nominal_regressors(std::size_t i) const;
+
   /// True if the loops of a session without excitation are those of one before, which tells enough.
   [[nodiscard]] bool is_monitored_before(std::size_t i) const;
 };

@@ -27,6 +27,20 @@ struct TestSetup {
   }
 };
 
+/// Weights of the windows of each run of T, window after window; null where each counts once.
+template <typename T>
+struct WeightsOfRuns {
+  std::array<const float*, sizeof(T) / sizeof(double)> runs{};
+
+  PROOFMASS_INLINE T at(std::size_t window) const {
+    std::array<double, sizeof(T) / sizeof(double)> values;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      values[i] = runs[i] == nullptr ? 1.0 : double{runs[i][window]};
+    }
+    return __builtin_bit_cast(T, values);
+  }
+};
+
 /// Sums of a test session. A window is two neighbouring blocks: its weights rise from 0 to 1 in the
 /// first and fall in the second. So each signal has two sums of the open block, one with the rising
 /// weights.
@@ -37,6 +51,7 @@ struct TestSums {
   std::array<T, num_averaged_signals> before{};  ///< `rising` of the block before.
   std::array<T, num_test_products> products{};   ///< Over the windows, as TestProducts.
   std::size_t num_blocks = 0;                    ///< That ended.
+  WeightsOfRuns<T> window_weights{};
 
   /// Adds the sample `k` of a block.
   PROOFMASS_INLINE void add(const std::array<T, num_averaged_signals>& values, std::size_t k,
@@ -70,10 +85,12 @@ struct TestSums {
     means[index(TestSignal::time)] = T(time);
     means[index(TestSignal::time_squared)] = T(time * time);
     means[index(TestSignal::time_cubed)] = T(time * time * time);
+    const T weight = window_weights.at(num_blocks - 1);
     std::size_t at = 0;
     for (std::size_t i = 0; i < num_test_signals; ++i) {
+      const T weighted = weight * means[i];
       for (std::size_t j = i; j < num_test_signals; ++j, ++at) {
-        products[at] = products[at] + means[i] * means[j];
+        products[at] = products[at] + weighted * means[j];
       }
     }
   }

@@ -16,7 +16,7 @@ namespace {
 using enum TestSignal;
 
 constexpr auto num_averaged = static_cast<Eigen::Index>(num_averaged_signals);
-constexpr Eigen::Index num_fitted = 3;
+constexpr auto num_fitted = static_cast<Eigen::Index>(num_test_regressors);
 constexpr auto num_calibrated = static_cast<Eigen::Index>(num_parameters);
 constexpr auto num_powers = static_cast<Eigen::Index>(num_test_signals - num_averaged_signals);
 
@@ -42,7 +42,26 @@ struct TestRecord {
   double common_part = 0.0;
   Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
   Fitted density;                 ///< At the line of each regressor, (m/s²)²/Hz.
+  FittedMatrix noise;             ///< XᵀRX of the regressors, of noise of scale 1.
 };
+
+FittedMatrix fitted_block(const TestRecord& record);
+
+/// XᵀRX: that of the run if it has lost data. Otherwise regressors are narrow lines.
+FittedMatrix noise_products(const SessionPhasors& record, const TestRecord& of,
+                            const EstimationInput& input) {
+  FittedMatrix noise;
+  if (record.test_noise) {
+    for (Eigen::Index i = 0; i < num_fitted; ++i) {
+      const auto& row = (*record.test_noise)[static_cast<std::size_t>(i)];
+      noise.row(i) = Eigen::Map<const Fitted>(row.data()).transpose();
+    }
+    return noise;
+  }
+  const double window_s = static_cast<double>(test_block_size) * input.sample_period_s;
+  const Fitted root = (0.5 / window_s * of.density).cwiseSqrt();
+  return root.asDiagonal() * fitted_block(of) * root.asDiagonal();
+}
 
 TestRecord test_record(const SessionPhasors& record, const Session& session,
                        const EstimationInput& input) {
@@ -74,6 +93,7 @@ TestRecord test_record(const SessionPhasors& record, const Session& session,
     });
   };
   of.density << density(f), density(2.0 * f), density(2.0 * f);
+  of.noise = noise_products(record, of, input);
   return of;
 }
 
@@ -144,8 +164,7 @@ Eigen::Matrix<double, num_calibrated, num_calibrated> covariance_of(const Estima
 class TestFit {
  public:
   TestFit(const RunPhasors& records, const EstimationInput& input)
-      : window_s_(static_cast<double>(test_block_size) * input.sample_period_s),
-        scale_(input.noise.scale > 0.0 ? input.noise.scale : 1.0) {
+      : scale_(input.noise.scale > 0.0 ? input.noise.scale : 1.0) {
     for (std::size_t i = 0; i < records.size(); ++i) {
       if (!is_test(input.sessions[i])) continue;
       tests_.push_back(test_record(records[i], input.sessions[i], input));
@@ -168,9 +187,7 @@ class TestFit {
   [[nodiscard]] FittedMatrix covariance() const {
     FittedMatrix sum = FittedMatrix::Zero();
     for (const TestRecord& test : tests_) {
-      const Fitted root = (0.5 / window_s_ * test.density).cwiseSqrt();
-      sum +=
-          weight(test) * weight(test) * root.asDiagonal() * fitted_block(test) * root.asDiagonal();
+      sum += weight(test) * weight(test) * test.noise;
     }
     return 4.0 * scale_ * scale_ * inverse_ * sum * inverse_;
   }
@@ -192,7 +209,6 @@ class TestFit {
   /// Sessions count by their noise at f_EP.
   static double weight(const TestRecord& test) { return 1.0 / test.density[0]; }
 
-  double window_s_;  ///< From one window to the next.
   double scale_;
   std::vector<TestRecord> tests_;
   FittedMatrix inverse_;

@@ -193,6 +193,7 @@ TEST(CanonicalDefinition, OfACampaignThatDoesNotTestHasNothingOfTests) {
   const std::string without = canonical_definition(campaign);
   EXPECT_THAT(without, Not(HasSubstr("eotvos_parameter")));
   EXPECT_THAT(without, Not(HasSubstr("test_a_c11")));
+  EXPECT_THAT(commented_campaign(campaign), Not(HasSubstr("[gaps]")));
   EXPECT_THAT(commented_campaign(campaign), Not(HasSubstr("eotvos_parameter")));
   campaign.scenario.sessions.front().target = SessionTarget::ep_test;
   EXPECT_THAT(canonical_definition(campaign), HasSubstr("eotvos_parameter = 1e-15\n"));
@@ -202,9 +203,34 @@ TEST(CanonicalDefinition, OfACampaignThatDoesNotTestHasNothingOfTests) {
                         "masses_2_1 = { law = \"fixed\", value = 1e-14 }\n"));
 }
 
-TEST(ParseCampaign, RefusesObjectivesOfATestWithoutOne) {
-  const std::string text = "[campaign]\nname = \"c\"\n[objective]\neotvos_parameter = 1e-15\n";
-  EXPECT_THROW((void)parse_campaign("c.toml", text, {}, {}), DefinitionError);
+TEST(ParseCampaign, RefusesWhatIsOfATestWithoutOne) {
+  for (const std::string table :
+       {"[objective]\neotvos_parameter = 1e-15\n", "[gaps]\nglitch_rate_hz = 0.01\n"}) {
+    const std::string text = "[campaign]\nname = \"c\"\n" + table;
+    EXPECT_THROW((void)parse_campaign("c.toml", text, {}, {}), DefinitionError);
+  }
+}
+
+// Campaigns with tests were stored before any could lose data.
+TEST(CanonicalDefinition, HasGapsWhereTestsLoseData) {
+  MicroscopeCampaign campaign;
+  Session& test = campaign.scenario.sessions.emplace_back();
+  test.name = "test";
+  test.target = SessionTarget::ep_test;
+  const MicroscopeCampaign without = campaign;
+  EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("[gaps]")));
+  campaign.scenario.gaps.glitch_rate_hz = 0.01;
+  campaign.scenario.gaps.test = {.depth = 0.5, .phase_rad = 0.0};
+  const std::string text = canonical_definition(campaign);
+  EXPECT_THAT(text, HasSubstr("\n[gaps]\nglitch_rate_hz = 0.01\ntest_modulation = 0.5\n["));
+  EXPECT_EQ(canonical_definition(parse_campaign("c.toml", text, {}, {})), text);
+  const auto differences = compare_definitions(without, campaign);
+  ASSERT_EQ(differences.size(), 2u);
+  EXPECT_EQ(differences[0].field, "gaps.glitch_rate_hz");
+  EXPECT_EQ(differences[1].field, "gaps.test_modulation");
+  campaign.scenario.gaps.spin.depth = 0.6;
+  EXPECT_THROW((void)parse_campaign("c.toml", canonical_definition(campaign), {}, {}),
+               DefinitionError);
 }
 
 // The objectives of a test are those of one campaign alone: its sessions are the difference.

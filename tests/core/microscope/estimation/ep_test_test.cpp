@@ -208,6 +208,33 @@ TEST(EpTest, HasTheErrorOfAnOffcentringAcrossInItsBudget) {
   EXPECT_NEAR(estimate(campaign, record, record.truth).values[delta], 0.0, 1e-18);
 }
 
+/// Glitches that follow everything at once, and some telemetry; two fifths of the windows are lost.
+GapsConfig many_gaps() {
+  return {.glitch_rate_hz = 0.02,
+          .glitch_duration_s = 15.0,
+          .orbital = {.depth = 0.2, .phase_rad = 1.0},
+          .spin = {.depth = 0.3},
+          .test = {.depth = 0.5, .phase_rad = -0.7},
+          .telemetry_rate_hz = 1e-4,
+          .telemetry_duration_s = 300.0};
+}
+
+// Γ_mes,dx is a sum of the regressors, a constant, and 1e-3 of δ that the averages and angles of
+// mrad leave. Whatever windows count, the fit finds the sum.
+TEST(EpTest, FindsViolationAndOffcentringsInWhatIsLeftOfTheData) {
+  for (const double spin : {0.0, 4.5, -17.5}) {
+    MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
+    campaign.scenario.gaps = many_gaps();
+    fix(campaign, "eotvos_parameter.masses_2_1", 1e-14);
+    fix(campaign, "offcentring_m.x", 20e-6);
+    fix(campaign, "offcentring_m.z", -10e-6);
+    const TestEstimation found = estimate(campaign);
+    EXPECT_NEAR(found.values[delta], 1e-14, 2e-17) << spin;
+    EXPECT_NEAR(found.values[delta_x], 20e-6, 1e-11) << spin;
+    EXPECT_NEAR(found.values[delta_z], -10e-6, 1e-11) << spin;
+  }
+}
+
 // White noise, from the covariance of windows that overlap by half: its density at a low frequency
 // is that of the samples, and half of it goes where neighbours are half a turn apart.
 TEST(WindowNoise, IsThatOfTheWindowsWeights) {
@@ -238,11 +265,13 @@ struct Coverage {
 };
 
 /// Of the Eötvös parameter.
-Coverage coverage(double spin, int num_orbits, const NoiseConfig& noise = {}) {
+Coverage coverage(double spin, int num_orbits, const NoiseConfig& noise = {},
+                  const GapsConfig& gaps = {}) {
   constexpr std::uint64_t num_runs = 208;
   MicroscopeCampaign campaign;
   campaign.scenario.noise = noise;
   campaign.scenario.sessions = {test_session("ep", num_orbits, spin)};
+  campaign.scenario.gaps = gaps;
   const RunPlan plan(campaign, no_calibration);
   Coverage found;
   for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
@@ -319,6 +348,15 @@ TEST(EpTest, FindsAViolationFarFromTheCentreOfMassOnTheOuterMass) {
   EXPECT_NEAR(estimate(campaign).values[delta_x], 35e-6, 1e-11);
 }
 
+TEST(EpTest, HasAnHonestStandardErrorOfWhatIsLeftOfTheData) {
+  for (const double spin : {0.0, 17.5}) {
+    const Coverage found = coverage(spin, 2, {}, many_gaps());
+    // As above. The formula for lines would be exceeded by half in the mean, and more at 17.5.
+    EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin;
+    EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin;
+  }
+}
+
 TEST(EpTest, HasTheSameBitsOnEveryInstructionSet) {
   MicroscopeCampaign campaign;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
@@ -330,6 +368,7 @@ TEST(EpTest, HasTheSameBitsOnEveryInstructionSet) {
   campaign.dispersions[index_of_eotvos_parameter].law = Law::uniform;
   campaign.dispersions[index_of_eotvos_parameter].minimum = -1e-13;
   campaign.dispersions[index_of_eotvos_parameter].maximum = 1e-13;
+  campaign.scenario.gaps.glitch_rate_hz = 2e-3;
   for (const char* method : {"hardy2013", "joint"}) {
     for (std::size_t i = 0; i < estimation_methods().size(); ++i) {
       if (estimation_methods()[i].name == method) {

@@ -1,0 +1,112 @@
+#include "core/microscope/session/gaps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/error.hpp"
+#include "core/math/elementary.hpp"
+#include "core/random/stream.hpp"
+
+namespace proofmass {
+namespace {
+
+// They bound the memory for a batch: four bytes a window and lane, 95 MB.
+constexpr int num_orbits_max = 1000;
+// Mean number of losses that touch a window. exp(−2), a seventh of the windows, are left.
+constexpr double touches_max = 2.0;
+
+/// The blocks of one record.
+class Record {
+ public:
+  Record(std::size_t num_blocks, double sample_period_s)
+      : lost_(num_blocks), block_s_(static_cast<double>(test_block_size) * sample_period_s) {}
+
+  [[nodiscard]] double duration_s() const { return static_cast<double>(lost_.size()) * block_s_; }
+
+  void lose(double begin_s, double end_s) {
+    const auto first = static_cast<std::size_t>(std::max(begin_s / block_s_, 0.0));
+    for (std::size_t i = first; i < lost_.size() && static_cast<double>(i) * block_s_ < end_s; ++i)
+      lost_[i] = true;
+  }
+
+  [[nodiscard]] const std::vector<bool>& lost() const { return lost_; }
+
+ private:
+  std::vector<bool> lost_;
+  double block_s_;
+};
+
+/// Loses what follows each event of a Poisson process: events at the highest rate, of which one at
+/// t is kept with the probability rate_hz(t)/highest_hz. They begin early enough to reach into the
+/// record.
+template <typename Rate>
+void lose_after_events(const RandomStream& stream, double highest_hz, const Rate& rate_hz,
+                       double duration_s, Record& record) {
+  if (highest_hz == 0.0) return;
+  double time_s = -duration_s;
+  for (std::uint32_t i = 0;; i += 2) {
+    time_s -= logarithm(uniform(stream.block(i))) / highest_hz;
+    if (time_s >= record.duration_s()) return;
+    const bool is_kept = uniform(stream.block(i + 1)) * highest_hz < rate_hz(time_s);
+    if (is_kept) record.lose(time_s, time_s + duration_s);
+  }
+}
+
+}  // namespace
+
+void GapsConfig::validate(const std::vector<Session>& sessions, double sample_period_s) const {
+  const double depth = orbital.depth + spin.depth + test.depth;
+  if (depth > 1.0) {
+    throw ConfigError("gaps.orbital_modulation", fmt::format("{}", orbital.depth),
+                      fmt::format("must be at most 1 with the other modulations, not {:.6g}, as no "
+                                  "rate is below 0",
+                                  depth));
+  }
+  const double window_s = 2.0 * static_cast<double>(test_block_size) * sample_period_s;
+  const double touches = glitch_rate_hz * (glitch_duration_s + window_s) +
+                         telemetry_rate_hz * (telemetry_duration_s + window_s);
+  if (touches > touches_max) {
+    throw ConfigError("gaps.glitch_rate_hz", fmt::format("{}", glitch_rate_hz),
+                      fmt::format("must leave more than a seventh of the windows of {} s: {:.6g} "
+                                  "losses touch one, and may be {}",
+                                  window_s, touches, touches_max));
+  }
+  for (std::size_t i = 0; lose_data() && i < sessions.size(); ++i) {
+    if (!is_test(sessions[i]) || sessions[i].num_orbits <= num_orbits_max) continue;
+    throw ConfigError(fmt::format("session[{}].orbits", i),
+                      fmt::format("{}", sessions[i].num_orbits),
+                      fmt::format("must be at most {} with gaps", num_orbits_max));
+  }
+}
+
+std::vector<bool> lost_blocks(const GapsConfig& gaps, const Session& session, std::uint64_t seed,
+                              RunIndex run, std::size_t num_blocks, double orbit_period_s,
+                              double sample_period_s) {
+  Record record(num_blocks, sample_period_s);
+  const auto stream = [&](std::string_view name) {
+    return RandomStream(seed, run, stream_id(fmt::format("session/{}/{}", session.name, name)));
+  };
+  const double spin_hz = std::abs(session.spin_rate_rad_s) / (2.0 * std::numbers::pi);
+  const auto modulation = [](const RateModulation& of, double frequency_hz, double time_s) {
+    const double turns = frequency_hz * time_s + of.phase_rad / (2.0 * std::numbers::pi);
+    return of.depth * sincos_turns(turns).cosine;
+  };
+  const auto glitch_rate_hz = [&](double time_s) {
+    double relative = 1.0 + modulation(gaps.orbital, 1.0 / orbit_period_s, time_s) +
+                      modulation(gaps.test, test_frequency_hz(session, orbit_period_s), time_s);
+    if (spin_hz > 0.0) relative += modulation(gaps.spin, spin_hz, time_s);
+    return gaps.glitch_rate_hz * relative;
+  };
+  const double depth = gaps.orbital.depth + gaps.spin.depth + gaps.test.depth;
+  lose_after_events(stream("glitches"), gaps.glitch_rate_hz * (1.0 + depth), glitch_rate_hz,
+                    gaps.glitch_duration_s, record);
+  lose_after_events(
+      stream("telemetry"), gaps.telemetry_rate_hz, [&](double) { return gaps.telemetry_rate_hz; },
+      gaps.telemetry_duration_s, record);
+  return record.lost();
+}
+
+}  // namespace proofmass
