@@ -43,8 +43,8 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
 /// @param why_not_independent  Of the draws: then bias, skewness and percentiles without intervals,
 ///                             and this reason.
 [[nodiscard]] Table error_table(const ResultSchema& schema, const std::vector<double>& objectives,
-                                const CampaignStatistics& statistics,
-                                std::uint64_t num_given_up, Interpretation interpretation,
+                                const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                                Interpretation interpretation,
                                 const std::string& why_not_independent = "");
 
 /// Budget before and after estimation beside the published one, and what single runs have. A
