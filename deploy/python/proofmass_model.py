@@ -74,10 +74,13 @@ class Model:
         answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)  # What the model prints is no answer.
         sys.stdin.reconfigure(encoding="utf-8")
-        for line in sys.stdin:
-            question = json.loads(line)
-            answers.write(json.dumps(getattr(self, "_" + question["ask"])(question)) + "\n")
-            answers.flush()
+        try:
+            for line in sys.stdin:
+                question = json.loads(line)
+                answers.write(json.dumps(getattr(self, "_" + question["ask"])(question)) + "\n")
+                answers.flush()
+        except (BrokenPipeError, KeyboardInterrupt):
+            os._exit(1)  # Nobody waits for an answer any more.
 
     def _describe(self, _):
         description = {

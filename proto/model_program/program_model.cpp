@@ -430,7 +430,8 @@ class ProgramModel final : public Model {
     const std::unique_ptr<const Plan> plan = ProgramCampaign(program_).prepare();
     for (std::uint64_t run = 0; run < num_runs; ++run) {
       const RunRequest request{RunIndex{run}, {}};
-      for (const double value : plan->simulate_batch({&request, 1}, set, {}).front().estimate) {
+      const std::vector<RunResult> results = plan->simulate_batch({&request, 1}, set, {});
+      for (const double value : results.front().estimate) {
         digest = fnv1a(digest, std::bit_cast<std::uint64_t>(value));
       }
     }
