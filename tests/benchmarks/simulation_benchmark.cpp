@@ -60,6 +60,44 @@ void runs_of_a_batch(benchmark::State& state, InstructionSet set) {
   count_steps(state, num_steps(campaign) * static_cast<double>(state.range(0)));
 }
 
+/// A whole batch of one session of ten orbits: the parts of a run and, with and without gaps, of a
+/// test.
+void session_of_a_batch(benchmark::State& state, const Session& session, const GapsConfig& gaps) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.sessions = {session};
+  campaign.scenario.sessions[0].num_orbits = 10;
+  campaign.scenario.gaps = gaps;
+  EstimationMethodInfo method = estimation_methods()[0];
+  method.estimate = [](const RunPhasors&, const EstimationInput&) { return Estimation{}; };
+  const RunPlan plan(campaign, method);
+  std::vector<RunRequest> requests(batch_lanes);
+  for (std::uint64_t run = 0; run < batch_lanes; ++run) requests[run].run = {run};
+  for (auto _ : state) {
+    for (const RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
+      benchmark::DoNotOptimize(is_test(session) ? plan.estimate(record).status
+                                                : RunStatus::completed);
+    }
+  }
+  count_steps(state, num_steps(campaign) * static_cast<double>(batch_lanes));
+}
+
+[[maybe_unused]] const bool are_sessions_registered = [] {
+  const auto add = [](const std::string& name, const Session& session, const GapsConfig& gaps) {
+    benchmark::RegisterBenchmark(("session_of_a_batch/" + name).c_str(), session_of_a_batch,
+                                 session, gaps)
+        ->Unit(benchmark::kMillisecond);
+  };
+  for (const Session& session : hardy2013_sessions()) add(session.name, session, {});
+  Session test;
+  test.name = "ep_test";
+  test.target = SessionTarget::ep_test;
+  add(test.name, test, {});
+  GapsConfig gaps;
+  gaps.glitch_rate_hz = 0.02;
+  add(test.name + "_with_gaps", test, gaps);
+  return true;
+}();
+
 [[maybe_unused]] const bool are_batches_registered = [] {
   for (const InstructionSet set : available_instruction_sets()) {
     if (set == InstructionSet::scalar) continue;

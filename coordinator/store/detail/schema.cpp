@@ -112,6 +112,22 @@ void check_small_tables(const Database& database) {
   }
 }
 
+/// `hardy2013` of `hardy2013-6`; empty if there is no such name.
+std::string_view name_of_model(std::string_view version) {
+  const std::size_t end = version.rfind('-');
+  return end == version.npos ? std::string_view() : version.substr(0, end);
+}
+
+/// What its results are only that other model knows.
+void refuse_other_model(const Database& database, std::string_view version) {
+  const std::string_view name = name_of_model(version);
+  if (name.empty() || name == name_of_model(model().version())) return;
+  database.refuse(
+      fmt::format("is of the model {}, and this program has {}; --model-program names "
+                  "that of another model",
+                  version, model().version()));
+}
+
 // Nothing of a file may be evaluated before its definition has been compared. That of the table
 // `campaign` does not depend on what the results are.
 ResultSchema stored_results(const Database& database, std::int64_t version) {
@@ -122,7 +138,9 @@ ResultSchema stored_results(const Database& database, std::int64_t version) {
   const SchemaObjects& expected = known_schemas(of_example).at(step_to(version));
   if (found == objects.end() || found->second != expected.at(found->first)) return of_example;
   Statement row = database.prepare("SELECT definition, model_version FROM campaign");
-  return row.step() ? model().results_of(row.text(0), row.text(1)) : of_example;
+  if (!row.step()) return of_example;
+  refuse_other_model(database, row.text(1));
+  return model().results_of(row.text(0), row.text(1));
 }
 
 }  // namespace

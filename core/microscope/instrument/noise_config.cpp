@@ -1,6 +1,7 @@
 #include "core/microscope/instrument/noise_config.hpp"
 
 #include <array>
+#include <cmath>
 
 #include "core/signal/noise_shape.hpp"
 
@@ -50,6 +51,20 @@ SensorNoise linear_x_of(const NoiseConfig& noise, std::size_t sensor) {
   of.rise_asd *= noise.linear_factor[sensor];
   of.pink_corner_hz += wire_noise_level(noise.wire, sensor) / (of.white_asd * of.white_asd);
   return of;
+}
+
+// Densities of both have one shape, so that their mean has it, too.
+SensorNoise mean_linear_x(const NoiseConfig& noise) {
+  const SensorNoise first = linear_x_of(noise, 0), second = linear_x_of(noise, 1);
+  const auto mean_of_squares = [](double a, double b) { return 0.5 * (a * a + b * b); };
+  const double white = mean_of_squares(first.white_asd, second.white_asd);
+  SensorNoise mean = first;
+  mean.white_asd = std::sqrt(white);
+  mean.rise_asd = std::sqrt(mean_of_squares(first.rise_asd, second.rise_asd));
+  mean.pink_corner_hz = 0.5 / white *
+                        (first.white_asd * first.white_asd * first.pink_corner_hz +
+                         second.white_asd * second.white_asd * second.pink_corner_hz);
+  return mean;
 }
 
 double differential_x_psd(const NoiseConfig& noise, double frequency_hz) {

@@ -52,6 +52,9 @@ struct NoiseConfig {
 /// @param sensor  0 or 1.
 [[nodiscard]] SensorNoise linear_x_of(const NoiseConfig& noise, std::size_t sensor);
 
+/// A sensor whose density along X is the mean of both: two of it make the noise of Γ_mes,dx.
+[[nodiscard]] SensorNoise mean_linear_x(const NoiseConfig& noise);
+
 /// Noise of a sensor along Y and Z; of scale 1.
 [[nodiscard]] SensorNoise linear_yz_of(const NoiseConfig& noise, std::size_t sensor);
 

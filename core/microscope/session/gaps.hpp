@@ -20,9 +20,9 @@ struct GapsConfig {
   /// λ0 of glitches, which come at λ(t) = λ0 (1 + Σ m cos(2π f t + φ)) ≥ 0; 0 for none.
   double glitch_rate_hz = 0.0;
   double glitch_duration_s = 15.0;  ///< Discarded from each glitch on.
-  RateModulation orbital;           ///< f = f_orb.
-  RateModulation spin;              ///< f = f_spin; none in inertial pointing.
-  RateModulation test;              ///< f = f_EP.
+  RateModulation orbital{};         ///< f = f_orb.
+  RateModulation spin{};            ///< f = f_spin; none in inertial pointing.
+  RateModulation test{};            ///< f = f_EP.
   double telemetry_rate_hz = 0.0;   ///< Of gaps in the telemetry; 0 for none.
   double telemetry_duration_s = 600.0;
 

@@ -71,7 +71,8 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
   if (!campaign.scenario.gaps.lose_data()) return;
-  weights_of_windows.emplace(c.scenario.noise.linear_x, c.scenario.simulation.sample_period_s);
+  weights_of_windows.emplace(mean_linear_x(c.scenario.noise),
+                             c.scenario.simulation.sample_period_s);
   for (std::size_t i = 0; i < tests.size(); ++i) regressors.push_back(nominal_regressors(i));
 }
 

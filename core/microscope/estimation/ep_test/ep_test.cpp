@@ -42,12 +42,15 @@ struct TestRecord {
   double common_part = 0.0;
   Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
   Fitted density;                 ///< At the line of each regressor, (m/s²)²/Hz.
-  FittedMatrix noise;             ///< XᵀRX of the regressors, of noise of scale 1.
+  FittedMatrix noise;             ///< w²XᵀRX of the regressors, of noise of scale 1.
 };
+
+/// Sessions count by their noise at f_EP.
+double weight(const TestRecord& test) { return 1.0 / test.density[0]; }
 
 FittedMatrix fitted_block(const TestRecord& record);
 
-/// XᵀRX: that of the run if it has lost data. Otherwise regressors are narrow lines.
+/// w²XᵀRX: that of the run if it has lost data. Otherwise regressors are narrow lines.
 FittedMatrix noise_products(const SessionPhasors& record, const TestRecord& of,
                             const EstimationInput& input) {
   FittedMatrix noise;
@@ -56,11 +59,11 @@ FittedMatrix noise_products(const SessionPhasors& record, const TestRecord& of,
       const auto& row = (*record.test_noise)[static_cast<std::size_t>(i)];
       noise.row(i) = Eigen::Map<const Fitted>(row.data()).transpose();
     }
-    return noise;
+    return weight(of) * weight(of) * noise;
   }
   const double window_s = static_cast<double>(test_block_size) * input.sample_period_s;
   const Fitted root = (0.5 / window_s * of.density).cwiseSqrt();
-  return root.asDiagonal() * fitted_block(of) * root.asDiagonal();
+  return weight(of) * weight(of) * root.asDiagonal() * fitted_block(of) * root.asDiagonal();
 }
 
 TestRecord test_record(const SessionPhasors& record, const Session& session,
@@ -186,9 +189,7 @@ class TestFit {
   /// By noise.
   [[nodiscard]] FittedMatrix covariance() const {
     FittedMatrix sum = FittedMatrix::Zero();
-    for (const TestRecord& test : tests_) {
-      sum += weight(test) * weight(test) * test.noise;
-    }
+    for (const TestRecord& test : tests_) sum += test.noise;
     return 4.0 * scale_ * scale_ * inverse_ * sum * inverse_;
   }
 
@@ -206,9 +207,6 @@ class TestFit {
   }
 
  private:
-  /// Sessions count by their noise at f_EP.
-  static double weight(const TestRecord& test) { return 1.0 / test.density[0]; }
-
   double scale_;
   std::vector<TestRecord> tests_;
   FittedMatrix inverse_;

@@ -307,6 +307,14 @@ TEST(EpTest, HasAnHonestStandardErrorWithNoiseOfEachSensor) {
   EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208));
 }
 
+TEST(EpTest, HasAnHonestStandardErrorOfWhatIsLeftWithNoiseOfEachSensor) {
+  NoiseConfig noise = noise_preset(NoisePreset::wire_suref);
+  noise.linear_factor = {1.0, 0.5};
+  const Coverage found = coverage(17.5, 2, noise, many_gaps());
+  EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208));
+  EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208));
+}
+
 /// A test whose loop nulls the outer mass, calibrated by the truth.
 double error_on_the_outer_mass(DragFreeSource of_calibration, double offcentring_m = 0.0) {
   MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, 17.5)});
