@@ -128,6 +128,18 @@ void refuse_other_model(const Database& database, std::string_view version) {
                   version, model().version()));
 }
 
+/// What SQLite sees: comments name tables of the model.
+std::string without_comments(std::string_view sql) {
+  std::string text;
+  while (!sql.empty()) {
+    const std::string_view line = sql.substr(0, sql.find('\n'));
+    text += line.substr(0, line.find("--"));
+    text += '\n';
+    sql.remove_prefix(std::min(line.size() + 1, sql.size()));
+  }
+  return text;
+}
+
 // Nothing of a file may be evaluated before its definition has been compared. That of the table
 // `campaign` does not depend on what the results are.
 ResultSchema stored_results(const Database& database, std::int64_t version) {
@@ -136,7 +148,10 @@ ResultSchema stored_results(const Database& database, std::int64_t version) {
   const SchemaObjects objects = schema_objects(database);
   const auto found = objects.find(std::string(table));
   const SchemaObjects& expected = known_schemas(of_example).at(step_to(version));
-  if (found == objects.end() || found->second != expected.at(found->first)) return of_example;
+  if (found == objects.end() ||
+      without_comments(found->second) != without_comments(expected.at(found->first))) {
+    return of_example;
+  }
   Statement row = database.prepare("SELECT definition, model_version FROM campaign");
   if (!row.step()) return of_example;
   refuse_other_model(database, row.text(1));

@@ -34,9 +34,10 @@ std::string interval_text(const CampaignStatistics& statistics, std::uint64_t nu
   return terminal_text(interval_table(test::schema(), statistics, num_given_up));
 }
 
-std::string error_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+std::string error_text(const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                       const std::vector<double>& objectives = MicroscopeCampaign{}.objectives()) {
   return terminal_text(
-      error_table(test::schema(), statistics, num_given_up, Interpretation::mixed));
+      error_table(test::schema(), objectives, statistics, num_given_up, Interpretation::mixed));
 }
 
 std::string budget_text(const Campaign& campaign, const CampaignStatistics& statistics,
@@ -111,12 +112,26 @@ TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
                        "    40    10   7.3"));
 }
 
+// Nothing is beyond an objective that there is not, and nothing within.
+TEST(ErrorTable, CountsNothingBeyondAnObjectiveThatThereIsNot) {
+  std::vector<double> objectives = MicroscopeCampaign{}.objectives();
+  objectives[0] = std::numeric_limits<double>::infinity();
+  const std::string accuracy =
+      terminal_text(accuracy_table(test::schema(), objectives, paper_statistics(100)));
+  EXPECT_THAT(
+      lines_of(accuracy),
+      Contains(::testing::MatchesRegex("a_c11·Δx   nm  +-  +40.0  +10.0  +[0-9.]+ +- │.*")));
+  EXPECT_THAT(lines_of(error_text(paper_statistics(100), 0, objectives)),
+              Contains(::testing::MatchesRegex("a_c11·Δx .* +-  +-")));
+}
+
 TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   CampaignStatistics statistics = paper_statistics(40);
   leave_out_intervals(statistics);
   EXPECT_TRUE(interval_table(test::schema(), statistics, 0).rows.empty());
-  const std::string text = terminal_text(
-      error_table(test::schema(), statistics, 0, Interpretation::mixed, "4 runs share one draw"));
+  const std::string text =
+      terminal_text(error_table(test::schema(), MicroscopeCampaign{}.objectives(), statistics, 0,
+                                Interpretation::mixed, "4 runs share one draw"));
   EXPECT_THAT(text, HasSubstr("no intervals over runs: 4 runs share one draw\n"
                               "all objectives together: 40 of 40 runs\n"));
   EXPECT_THAT(text, ::testing::Not(HasSubstr("from")));
