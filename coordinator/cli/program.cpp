@@ -72,7 +72,6 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
 
 std::optional<int> refused_model(int argc, char** argv, std::string_view program) {
   try {
-    wire::settle_surroundings();
     wire::choose_model(argc, argv);
     return std::nullopt;
   } catch (const Error& error) {

@@ -8,6 +8,7 @@
 
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/surroundings.hpp"
 #include "proto/model_program/program_model.hpp"
 
 namespace proofmass::wire {
@@ -37,7 +38,8 @@ void choose_model(int argc, const char* const* argv) {
     if (argument.substr(option.size()).starts_with('=')) named = argv[i] + option.size() + 1;
   }
   if (named == nullptr || *named == '\0') return;
-  const std::filesystem::path program = std::filesystem::absolute(named);
+  settle_surroundings();  // Its pipes are to be no standard descriptors.
+  const std::filesystem::path program = std::filesystem::absolute(named).lexically_normal();
   choice() = Choice{.program = program, .model = model_of(program)};
   use_model(*choice()->model);
 }
@@ -51,7 +53,8 @@ void add_model_program_option(CLI::App& app) {
   app.add_option_function<std::string>(
          std::string(option),
          [](const std::string& named) {
-           if (chosen_model_program() == std::filesystem::absolute(named)) return;
+           const std::filesystem::path program = std::filesystem::absolute(named);
+           if (chosen_model_program() == program.lexically_normal()) return;
            throw InvalidArgument("model-program = " + named +
                                  " (must be an argument or the variable " + variable +
                                  ", as it decides what other options mean)");
