@@ -53,8 +53,8 @@ class JointInformation {
 ///         needs.
 void check_joint(const std::vector<Session>& sessions);
 
-/// The equations leave out e²; measured (`noise.scale = 1`, K2c/K1c²): 17 s²/m at 0.3, 47 at 0.5,
-/// which is 1.9 or a fifth of the standard error at the largest one that is accepted, 0.1.
+/// The equations leave out terms of order e². They shift K2c/K1c² by 17 s²/m at e = 0.3 and by
+/// 47 s²/m at 0.5, measured; so by 1.9 s²/m at 0.1, a fifth of its standard error.
 /// @throws ConfigError if the eccentricity is larger.
 void check_joint_orbit(double eccentricity);
 
