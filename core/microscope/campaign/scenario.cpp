@@ -181,6 +181,21 @@ void check_test(const Scenario& scenario) {
                     "must leave f_EP = |f_orb + f_spin| a tenth of f_orb or more");
 }
 
+// Up to there the loop stays a third or more away from −1, whatever its corners.
+void check_resonator(const Scenario& scenario) {
+  const DragFreeConfig& config = scenario.drag_free;
+  if (config.resonator_damping == 0.0) return;
+  for (const Session& session : scenario.sessions) {
+    if (!is_test(session)) continue;
+    const double frequency_hz = test_frequency_hz(session, scenario.orbit.period_s);
+    if (frequency_hz <= 0.5 * config.bandwidth_hz) continue;
+    throw ConfigError("drag_free.resonator_damping", fmt::format("{}", config.resonator_damping),
+                      fmt::format("must be 0 where f_EP of a session, here {:.4g} Hz of {}, is "
+                                  "above half of drag_free.bandwidth_hz",
+                                  frequency_hz, session.name));
+  }
+}
+
 }  // namespace
 
 void Scenario::validate() const {
@@ -197,6 +212,7 @@ void Scenario::validate() const {
   validate_sessions(sessions, orbit.period_s, simulation.sample_period_s);
   estimation_method(estimation.method).check(sessions);
   check_test(*this);
+  check_resonator(*this);
   gaps.validate(sessions, simulation.sample_period_s);
   check_transient(*this);
   check_band(*this);

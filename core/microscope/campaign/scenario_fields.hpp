@@ -123,6 +123,12 @@ void visit_control(Config& scenario, Visitor& visit) {
         linear.bandwidth_hz);
   visit(FieldInfo{"drag_free.integral_hz", "Corner of its integral.", range::between(0.0, 0.05)},
         linear.integral_hz);
+  if (scenario.has_tests()) {
+    visit(FieldInfo{"drag_free.resonator_damping",
+                    "Of a resonator at f_EP in sessions that test; 0 for none.",
+                    range::between(0.0, 0.9)},
+          linear.resonator_damping);
+  }
   visit(FieldInfo{"drag_free.bias_compensation_error_x_m_s2", "Error of the subtracted bias, X."},
         linear.bias_compensation_error_x_m_s2);
   visit(FieldInfo{"drag_free.bias_compensation_error_y_m_s2", "Error of the subtracted bias, Y."},

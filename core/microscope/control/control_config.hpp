@@ -6,6 +6,8 @@ namespace proofmass {
 struct DragFreeConfig {
   double bandwidth_hz = 0.05;  ///< f_c = ω_c/2π, at which |L| is about 1.
   double integral_hz = 0.005;  ///< f_i = ω_i/2π, below which L grows with 1/f²; < bandwidth_hz.
+  /// ζ of the resonator at f_EP that the loop has in sessions that test; 0: it has none.
+  double resonator_damping = 0.0;
   /// Error of the read-out bias that the loop subtracts, on each axis of S: C_0 − b_0c of
   /// [Hardy2013] section 4.2.
   double bias_compensation_error_x_m_s2 = 0.0;

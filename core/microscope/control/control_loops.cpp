@@ -14,6 +14,13 @@ DragFreeGains drag_free_gains(const DragFreeConfig& config, double sample_period
           .integral = two_pi * config.integral_hz * sample_period_s};
 }
 
+ResonatorGains resonator_gains(double damping, double frequency_hz, double sample_period_s) {
+  const SineCosine turn = sincos_turns(frequency_hz * sample_period_s);
+  return {.cosine = turn.cosine,
+          .sine = turn.sine,
+          .input = 2.0 * damping * two_pi * frequency_hz * sample_period_s};
+}
+
 AttitudeGains attitude_gains(const AttitudeConfig& config, double sample_period_s) {
   const double period = sample_period_s;
   const double r = exponential(-two_pi * config.blending_hz * period);

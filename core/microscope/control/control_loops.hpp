@@ -40,6 +40,40 @@ struct DragFreeController {
   }
 };
 
+/// Gains of a resonator at the sample rate, without unit.
+struct ResonatorGains {
+  double cosine = 1.0;  ///< cos ω_0T.
+  double sine = 0.0;    ///< sin ω_0T.
+  double input = 0.0;   ///< 2ζω_0T; 0: no resonator.
+};
+
+/// @param damping       ζ: what is left of a line at ω_0 decays as e^(−ζω_0 t).
+/// @param frequency_hz  ω_0/2π.
+[[nodiscard]] ResonatorGains resonator_gains(double damping, double frequency_hz,
+                                             double sample_period_s);
+
+/// Makes the drag-free loop reject one line altogether: its input, on each axis by itself, times
+///
+///     1 + 2ζω_0 s/(s² + ω_0²),    here 1 + 2ζω_0T (1 − z⁻¹ cos ω_0T)/(1 − 2z⁻¹ cos ω_0T + z⁻²)
+///
+/// The loop's gain is infinite at ω_0, so its sensitivity 1/(1 + L) is 0 there. Where |L| without
+/// the resonator is far above 1, the zeros of this factor are poles of the closed loop.
+template <typename T>
+struct Resonator {
+  Vector3<T> in_phase_S;    ///< m/s².
+  Vector3<T> quadrature_S;  ///< A quarter of a turn behind, m/s².
+
+  /// @param input_S  What DragFreeController::advance() would be given, m/s².
+  /// @returns What it is given instead.
+  PROOFMASS_INLINE Vector3<T> advance(const ResonatorGains& gains, const Vector3<T>& input_S) {
+    const T cosine = T(gains.cosine), sine = T(gains.sine);
+    const Vector3<T> turned_S = cosine * in_phase_S - sine * quadrature_S;
+    quadrature_S = sine * in_phase_S + cosine * quadrature_S;
+    in_phase_S = turned_S + T(gains.input) * input_S;
+    return input_S + in_phase_S;
+  }
+};
+
 /// Gains of the attitude estimator and controller at the sample rate.
 struct AttitudeGains {
   double sample_period_s = 0.0;    ///< T.

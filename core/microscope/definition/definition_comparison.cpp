@@ -64,7 +64,9 @@ class Comparison {
                     [&](const Entry& entry) { return entry.path == test_objective_path(i); });
     }
     if (!with_tests) {
-      std::erase_if(entries, [](const Entry& entry) { return entry.path.starts_with("gaps."); });
+      std::erase_if(entries, [](const Entry& entry) {
+        return entry.path.starts_with("gaps.") || entry.path == "drag_free.resonator_damping";
+      });
     }
     for (Entry& entry : entries) {
       constexpr std::string_view table = "campaign.";

@@ -223,8 +223,9 @@ class CommentedWriter {
 };
 
 bool is_later_key(std::string_view path) {
-  static constexpr std::array<std::string_view, 3> later_keys{
-      "budget.test_spin_rate_rad_s", "noise.sensor_1_factor", "noise.sensor_2_factor"};
+  static constexpr std::array<std::string_view, 4> later_keys{
+      "budget.test_spin_rate_rad_s", "drag_free.resonator_damping", "noise.sensor_1_factor",
+      "noise.sensor_2_factor"};
   static constexpr std::array<std::string_view, 5> later_stems{
       "gaps.", "noise.wire.", "sensor.position_", "sensor.sensor_1_", "sensor.sensor_2_"};
   return std::ranges::find(later_keys, path) != later_keys.end() ||

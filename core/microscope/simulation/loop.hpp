@@ -54,6 +54,14 @@ struct Violation {
   double gravity_m_s2 = 0.0;
 };
 
+/// The drag-free controller gets what is measured.
+struct AsMeasured {
+  template <typename T>
+  PROOFMASS_INLINE const Vector3<T>& operator()(const Vector3<T>& input_S) const {
+    return input_S;
+  }
+};
+
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
 /// section 5.1).
 ///
@@ -131,15 +139,17 @@ struct Loop {
   /// @param shared  Of this sample; what all runs have in common, or each lane its own.
   /// @param noise   Of this sample; its scale is in it already.
   /// @param violation  NoViolation, or a Violation in a session that tests.
+  /// @param shaping  Of what the drag-free controller gets: AsMeasured, or that of a Resonator.
   /// @tparam masses  `at_rest` only in a session that moves no test mass.
   /// @returns What instrument and estimator report at this sample.
-  template <TestMasses masses = TestMasses::moving, typename Shared, typename Fall = NoViolation>
+  template <TestMasses masses = TestMasses::moving, typename Shared, typename Fall = NoViolation,
+            typename Shaping = AsMeasured>
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
                                           const SharedSampleOf<Shared>& shared,
                                           const SampleNoise<T>& noise, Watch watch = Watch::yes,
-                                          const Fall& violation = {}) {
+                                          const Fall& violation = {}, const Shaping& shaping = {}) {
     const SatelliteMotion<T> satellite = motion(constants, shared, noise);
 
     Observation<T> observation;
@@ -174,11 +184,11 @@ struct Loop {
     estimator.predict(attitude_gains, observation.measured_omega_dot_IS_S,
                       broadcast<T>(shared.omega_IR_R));
 
-    thrust_command_S = drag_free.advance(
-        drag_free_gains, constants.drag_free_weight[0] * observation.measured_K[0] +
-                             constants.drag_free_weight[1] * observation.measured_K[1] -
-                             constants.subtracted_bias_S_m_s2 +
-                             broadcast<T>(shared.drag_free_command_S_m_s2));
+    const Vector3<T> drag_free_input_S = constants.drag_free_weight[0] * observation.measured_K[0] +
+                                         constants.drag_free_weight[1] * observation.measured_K[1] -
+                                         constants.subtracted_bias_S_m_s2 +
+                                         broadcast<T>(shared.drag_free_command_S_m_s2);
+    thrust_command_S = drag_free.advance(drag_free_gains, shaping(drag_free_input_S));
     rotate(satellite.omega_dot_IS_S, attitude_gains.sample_period_s);
     return observation;
   }

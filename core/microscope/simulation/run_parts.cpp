@@ -119,6 +119,14 @@ bool RunParts::is_monitored_before(std::size_t i) const {
   return false;
 }
 
+ResonatorGains RunParts::resonator(const Session& session) const {
+  const Scenario& scenario = campaign.scenario;
+  if (!is_test(session)) return {};
+  return resonator_gains(scenario.drag_free.resonator_damping,
+                         test_frequency_hz(session, scenario.orbit.period_s),
+                         scenario.simulation.sample_period_s);
+}
+
 SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
   const Session& session = campaign.scenario.sessions[i];
   TestMasses masses =
@@ -132,7 +140,8 @@ SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
           .signals = needs[i].signals,
           .line_readers = readers.further,
           .residual_reader = readers.residual ? &*readers.residual : nullptr,
-          .test = is_test(session) ? &tests[i] : nullptr};
+          .test = is_test(session) ? &tests[i] : nullptr,
+          .resonator = resonator(session)};
 }
 
 RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {

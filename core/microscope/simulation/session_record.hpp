@@ -116,6 +116,7 @@ struct SessionSetup {
   /// Weights of the line at f_EP; null in a session that is not monitored.
   WeightReader* residual_reader = nullptr;
   const TestSetup* test = nullptr;  ///< Null in a session that does not test.
+  ResonatorGains resonator;         ///< Of such a session's drag-free loop.
 };
 
 /// Weights of a block of samples.
@@ -252,7 +253,8 @@ struct LaneGroup {
   SignalSums<T> sums{};
   LoopMonitor<T> monitor{};
   FurtherSums<T> further{};
-  T eotvos_parameter{};  ///< Acts in test sessions alone.
+  T eotvos_parameter{};  ///< Acts in test sessions alone, as what follows.
+  Resonator<T> resonator{};
   TestSums<T> test{};
 };
 
@@ -320,6 +322,16 @@ PROOFMASS_INLINE auto violation_of(const T& eotvos_parameter, const SessionSetup
   }
 }
 
+/// What the drag-free controller gets in a session of a kind.
+template <SampleKind kind, typename T>
+PROOFMASS_INLINE auto shaping_of(Resonator<T>& resonator, const ResonatorGains& gains) {
+  if constexpr (kind.is_test) {
+    return [&](const Vector3<T>& input_S) { return resonator.advance(gains, input_S); };
+  } else {
+    return AsMeasured{};
+  }
+}
+
 /// Advances all groups by some samples.
 /// @tparam kind     Covers what `setup` asks for.
 /// @param weights   Of these samples; none while the loops settle, when nothing is summed.
@@ -333,11 +345,13 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   const SignalSet recorded = kind.signals == SignalSet::all ? setup.signals : SignalSet::common;
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
-    for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, test] : groups) {
+    for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, resonator, test] :
+         groups) {
       if constexpr (Observer::is_active) observer.begin_sample(loop);
       const auto observation = loop.template advance<kind.masses>(
           constants, setup.drag_free, setup.attitude, shared, noise.next(),
-          k % 4 == 0 ? Watch::yes : Watch::no, violation_of<kind>(eotvos_parameter, setup, shared));
+          k % 4 == 0 ? Watch::yes : Watch::no, violation_of<kind>(eotvos_parameter, setup, shared),
+          shaping_of<kind>(resonator, setup.resonator));
       if constexpr (Observer::is_active) {
         observer(shared, observation, ground_signals(observation, shared, setup.product));
       }

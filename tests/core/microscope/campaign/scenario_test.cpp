@@ -135,6 +135,27 @@ TEST(Scenario, WantsLoopsMuchSlowerThanTheSampleRate) {
             "attitude.bandwidth_hz = 0.06 (must be <= 0.05, a twentieth of the sample rate)");
 }
 
+TEST(Scenario, WantsResonatorsSlowerThanTheLoop) {
+  const auto with_resonator = [](Scenario& s) {
+    Session& test = s.sessions.emplace_back();
+    test.name = "v3";
+    test.target = SessionTarget::ep_test;
+    test.spin_rate_rad_s = 0.0184923886;  // f_EP = 3.111 mHz.
+    s.drag_free.resonator_damping = 0.9;
+    s.drag_free.integral_hz = 1e-3;
+    s.drag_free.bandwidth_hz = 6.3e-3;
+  };
+  Scenario scenario;
+  with_resonator(scenario);
+  EXPECT_NO_THROW(scenario.validate());
+  EXPECT_EQ(refusal_after([&](Scenario& s) {
+              with_resonator(s);
+              s.drag_free.bandwidth_hz = 6.2e-3;
+            }),
+            "drag_free.resonator_damping = 0.9 (must be 0 where f_EP of a session, here 0.003111 "
+            "Hz of v3, is above half of drag_free.bandwidth_hz)");
+}
+
 TEST(Scenario, WantsIntegralsSlowerThanTheirLoops) {
   EXPECT_EQ(refusal_after([](Scenario& s) { s.drag_free.integral_hz = 0.05; }),
             "drag_free.integral_hz = 0.05 (must be < drag_free.bandwidth_hz, 0.05)");

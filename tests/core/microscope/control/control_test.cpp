@@ -40,6 +40,38 @@ TEST(DragFreeController, HasTheSampledTransferFunction) {
   }
 }
 
+// The same way. The cosine's z-transform is (1 − z⁻¹ cos ω_0T)/(1 − 2z⁻¹ cos ω_0T + z⁻²).
+TEST(Resonator, AddsTheTransformOfACosine) {
+  constexpr double resonance_hz = 0.02, damping = 0.3;
+  const ResonatorGains gains = resonator_gains(damping, resonance_hz, period_s);
+  constexpr double step = 2.0 * std::numbers::pi * resonance_hz * period_s;
+  for (const double frequency_hz : {0.0, 1e-3, 0.019, 0.02, 0.7}) {
+    Resonator<double> resonator;
+    const std::complex<double> inverse_z =
+        std::polar(1.0 / 1.001, -2.0 * std::numbers::pi * frequency_hz * period_s);
+    std::complex<double> sum = 0.0, cosine = 0.0, power = 1.0;
+    for (int k = 0; k < 60000; ++k) {
+      sum += power * resonator.advance(gains, {0.0, k == 0 ? 1.0 : 0.0, 0.0}).y;
+      cosine += power * std::cos(step * k);
+      power *= inverse_z;
+    }
+    EXPECT_NEAR(std::abs(sum - (1.0 + 2.0 * damping * step * cosine)), 0.0, 1e-9 * std::abs(sum))
+        << frequency_hz;
+  }
+}
+
+TEST(Resonator, PassesEverythingWithoutDamping) {
+  const ResonatorGains gains = resonator_gains(0.0, 0.02, period_s);
+  Resonator<double> resonator;
+  for (int k = 0; k < 100; ++k) {
+    const Vector3<double> input{1e-8 * k, -3e-9 * k * k, 1e-10};
+    const Vector3<double> passed = resonator.advance(gains, input);
+    EXPECT_EQ(passed.x, input.x);
+    EXPECT_EQ(passed.y, input.y);
+    EXPECT_EQ(passed.z, input.z);
+  }
+}
+
 TEST(DragFreeLoop, IsStableWithGoodMargins) {
   // Nyquist by the largest |1/(1 + L)|: below 2 (6 dB), the distance from −1 is at least ½.
   const DragFreeConfig config;

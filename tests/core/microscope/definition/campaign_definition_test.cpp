@@ -205,7 +205,8 @@ TEST(CanonicalDefinition, OfACampaignThatDoesNotTestHasNothingOfTests) {
 
 TEST(ParseCampaign, RefusesWhatIsOfATestWithoutOne) {
   for (const std::string table :
-       {"[objective]\neotvos_parameter = 1e-15\n", "[gaps]\nglitch_rate_hz = 0.01\n"}) {
+       {"[objective]\neotvos_parameter = 1e-15\n", "[gaps]\nglitch_rate_hz = 0.01\n",
+        "[drag_free]\nresonator_damping = 0.5\n"}) {
     const std::string text = "[campaign]\nname = \"c\"\n" + table;
     EXPECT_THROW((void)parse_campaign("c.toml", text, {}, {}), DefinitionError);
   }
@@ -219,6 +220,7 @@ TEST(CanonicalDefinition, HasGapsWhereTestsLoseData) {
   test.target = SessionTarget::ep_test;
   const MicroscopeCampaign without = campaign;
   EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("[gaps]")));
+  EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("resonator")));
   campaign.scenario.gaps.glitch_rate_hz = 0.01;
   campaign.scenario.gaps.test = {.depth = 0.5, .phase_rad = 0.0};
   const std::string text = canonical_definition(campaign);

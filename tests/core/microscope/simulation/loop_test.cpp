@@ -98,7 +98,8 @@ TEST(LoopRotation, FollowsATurningAxis) {
 
 /// Amplitude of the measured common acceleration along X for a unit external acceleration,
 /// relative.
-double measured_rejection(double frequency_hz) {
+/// @param resonance_gains  Of the loop's resonator; none by default.
+double measured_rejection(double frequency_hz, const ResonatorGains& resonance_gains = {}) {
   const Scenario scenario = silent_scenario();
   const LoopConstants<double> constants =
       make_loop_constants(perfect_instrument(), scenario, quiet_session());
@@ -107,13 +108,18 @@ double measured_rejection(double frequency_hz) {
   const int samples = static_cast<int>(std::lround(1.0 / (frequency_hz * period_s)));
   const double step = two_pi / samples;
   Loop<double> loop;
+  Resonator<double> resonator;
+  const auto shaping = [&](const Vector3<double>& input_S) {
+    return resonator.advance(resonance_gains, input_S);
+  };
   SharedSample shared;
   std::complex<double> sum = 0.0;
   const int num_settling = 16000;
   for (int k = 0; k < num_settling + samples; ++k) {
     shared.external_S.linear_m_s2.x = 1e-8 * std::cos(step * k);
     const Observation<double> observation =
-        loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
+        loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{}, Watch::yes,
+                     NoViolation{}, shaping);
     const double common = 0.5 * (observation.measured_K[0].x + observation.measured_K[1].x);
     if (k >= num_settling) sum += common * std::polar(1.0, -step * k);
   }
@@ -135,6 +141,29 @@ TEST(Loop, RejectsExternalAccelerationsAsTheSampledLoopSays) {
     EXPECT_NEAR(measured_rejection(frequency_hz) / expected, 1.0, 1e-6) << frequency_hz;
   }
   EXPECT_LT(measured_rejection(1.0 / 5950.0), 1.2e-4);
+}
+
+// With a resonator L is 1 + 2ζω_0T (1 − z⁻¹ cos ω_0T)/(1 − 2z⁻¹ cos ω_0T + z⁻²) times as large, and
+// at ω_0 nothing is left: e^(−ζω_0 · 4000 s) of it after the settling, 6e-18, and rounding.
+TEST(Loop, RejectsALineAltogetherWithAResonator) {
+  const DragFreeConfig config;
+  const double resonance_hz = 1.0 / (period_s * 1286);  // 3.11 mHz, f_EP at V3.
+  constexpr double damping = 0.5;
+  const ResonatorGains gains = resonator_gains(damping, resonance_hz, period_s);
+  for (const int samples : {8000, 1500, 1100, 400, 8}) {
+    const double frequency_hz = 1.0 / (period_s * samples);
+    const std::complex<double> delay = std::polar(1.0, -two_pi * frequency_hz * period_s);
+    const double step = two_pi * resonance_hz * period_s;
+    const std::complex<double> open =
+        delay * two_pi * config.bandwidth_hz * period_s / (1.0 - delay) *
+        (1.0 + two_pi * config.integral_hz * period_s / (1.0 - delay)) *
+        (1.0 + 2.0 * damping * step * (1.0 - delay * std::cos(step)) /
+                   (1.0 - 2.0 * delay * std::cos(step) + delay * delay));
+    const double expected = 1.0 / std::abs(1.0 + open);
+    EXPECT_NEAR(measured_rejection(frequency_hz, gains) / expected, 1.0, 1e-6) << samples;
+  }
+  EXPECT_GT(measured_rejection(resonance_hz), 0.01);
+  EXPECT_LT(measured_rejection(resonance_hz, gains), 1e-9);
 }
 
 // A command of the session moves the satellite so that the common measurement is its opposite,
