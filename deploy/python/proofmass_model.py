@@ -56,6 +56,7 @@ class Model:
     streams = ("noise",)  # Of random numbers.
     runs_at_once = 16  # That a worker takes together; fewer if a run takes many seconds.
     run_time_max_s = 600  # After which a run counts as crashed.
+    memory_max_mib = 4096  # More than that cannot be had.
 
     def check(self, parameters):
         """Raises Refused if the parameters make no sense."""
@@ -93,6 +94,7 @@ class Model:
             "streams": [{"name": n} for n in self.streams],
             "runs_at_once": self.runs_at_once,
             "run_time_max_s": self.run_time_max_s,
+            "memory_max_mib": self.memory_max_mib,
         }
         if self.purpose is not None:
             description["purpose"] = self.purpose

@@ -10,7 +10,6 @@
 #include "core/campaign/expression.hpp"
 #include "core/campaign/law_keys.hpp"
 #include "core/campaign/name.hpp"
-#include "proto/model_program/program_process.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::wire {
@@ -198,7 +197,9 @@ ProgramDescription description_in(std::string_view answer) {
   description.purpose =
       part.text_or("purpose", fmt::format("Runs campaigns of {}.", part.text("name")));
   description.runs_at_once = part.count("runs_at_once", 1, runs_at_once_max);
-  description.run_time_max = std::chrono::seconds(part.count("run_time_max_s", 600, 86400));
+  description.limits = {
+      .answer_time_max = std::chrono::seconds(part.count("run_time_max_s", 600, 86400)),
+      .memory_max_mib = part.count("memory_max_mib", 4096, std::size_t{1} << 20)};
   if (!is_name(description.version)) refuse("name-version", description.version, is_name_rule);
   part.each("parameters", parameters_max, [&](const Json& entry, const std::string& path) {
     const Part of(entry, path);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/run_result.hpp"
+#include "proto/model_program/program_process.hpp"
 
 namespace proofmass::wire {
 
@@ -55,7 +55,7 @@ struct ProgramDescription {
   std::vector<ProgramQuantity> quantities;
   std::vector<std::string> streams;  ///< Of random numbers, each with a seed of its own in a run.
   std::size_t runs_at_once = 1;      ///< That it is asked for together.
-  std::chrono::seconds run_time_max{600};
+  ProgramLimits limits;
 };
 
 /// @param answer  A line of JSON.

@@ -291,7 +291,7 @@ std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
     }
   }
   const Program& program = *campaign_.program;
-  auto process = std::make_unique<ProgramProcess>(program.path, program.description.run_time_max);
+  auto process = std::make_unique<ProgramProcess>(program.path, program.description.limits);
   const std::string question = campaign_.question_of_preparation();
   process->ask({&question, 1}, [&](std::string_view answer) { expect_accepted(answer, program); });
   return process;
@@ -452,7 +452,7 @@ class ProgramModel final : public Model {
                                                         DataFiles&) const override {
     auto campaign = std::make_unique<ProgramCampaign>(program_);
     campaign->read(document);
-    ProgramProcess process(program_->path, program_->description.run_time_max);
+    ProgramProcess process(program_->path, program_->description.limits);
     const std::string question = campaign->question_of_preparation();
     try {
       process.ask({&question, 1},
@@ -474,10 +474,10 @@ class ProgramModel final : public Model {
 }  // namespace
 
 std::unique_ptr<const Model> model_of(const std::filesystem::path& path) {
-  constexpr std::chrono::minutes description_time_max{1};
+  constexpr ProgramLimits while_describing{.answer_time_max = std::chrono::seconds(60)};
   auto program = std::make_shared<Program>();
   program->path = std::filesystem::absolute(path);
-  ProgramProcess process(program->path, description_time_max);
+  ProgramProcess process(program->path, while_describing);
   const std::string question = Json{{"ask", "describe"}}.dump();
   process.ask({&question, 1},
               [&](std::string_view answer) { program->description = description_in(answer); });

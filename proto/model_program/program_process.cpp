@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -29,9 +30,8 @@ std::array<int, 2> connected_pair() {
 
 }  // namespace
 
-ProgramProcess::ProgramProcess(const std::filesystem::path& program,
-                               std::chrono::milliseconds time_max)
-    : name_(program.string()), time_max_(time_max) {
+ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
+    : name_(program.string()), answer_time_max_(limits.answer_time_max) {
   const std::array<int, 2> in = connected_pair();
   const std::array<int, 2> out = connected_pair();
   questions_ = in[0];
@@ -46,6 +46,9 @@ ProgramProcess::ProgramProcess(const std::filesystem::path& program,
   }
   close(in[1]);
   close(out[1]);
+  const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
+  const rlimit memory{memory_max, memory_max};
+  prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
   fcntl(questions_, F_SETFL, O_NONBLOCK);
   fcntl(answers_, F_SETFL, O_NONBLOCK);
 }
@@ -101,14 +104,13 @@ void ProgramProcess::ask(std::span<const std::string> questions,
   for (const std::string& question : questions) all += question + '\n';
   std::string_view unsent = all;
   std::size_t num_answered = 0;
-  Clock::time_point deadline = Clock::now() + time_max_;
+  Clock::time_point deadline = Clock::now() + answer_time_max_;
   while (num_answered < questions.size()) {
     std::array<pollfd, 2> ends{{{answers_, POLLIN, 0}, {questions_, POLLOUT, 0}}};
     const auto left =
         std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) {
-      fail(fmt::format("no answer within {} s",
-                       std::chrono::duration_cast<std::chrono::seconds>(time_max_).count()));
+      fail(fmt::format("no answer within {} s", answer_time_max_.count()));
     }
     poll(ends.data(), unsent.empty() ? 1 : 2, static_cast<int>(left.count()));
     if (ends[1].revents != 0) write_some(unsent);
@@ -119,7 +121,7 @@ void ProgramProcess::ask(std::span<const std::string> questions,
       on_answer(std::string_view(received_).substr(begin, end - begin));
       begin = end + 1;
       ++num_answered;
-      deadline = Clock::now() + time_max_;
+      deadline = Clock::now() + answer_time_max_;
     }
     received_.erase(0, begin);
     if (received_.size() > answer_size_max) {

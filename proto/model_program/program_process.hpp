@@ -23,14 +23,19 @@ class ModelProgramError : public Error {
 /// Most bytes of a line that a model program answers.
 inline constexpr std::size_t answer_size_max = std::size_t{1} << 20;
 
+/// What a model program may take.
+struct ProgramLimits {
+  std::chrono::seconds answer_time_max{600};  ///< For each answer.
+  std::size_t memory_max_mib = 4096;          ///< Of data, which counts once it is asked for.
+};
+
 /// A model program that runs as a child of this process: it reads questions from its standard
 /// input, a line each, and answers each with a line, in their order. What it prints as standard
 /// error is that of this process.
 class ProgramProcess {
  public:
-  /// @param time_max  For each answer.
   /// @throws ModelProgramError if it cannot be started.
-  ProgramProcess(const std::filesystem::path& program, std::chrono::milliseconds time_max);
+  ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits);
   /// Kills it.
   ~ProgramProcess();
   ProgramProcess(const ProgramProcess&) = delete;
@@ -51,7 +56,7 @@ class ProgramProcess {
   [[noreturn]] void fail(std::string_view reason) const;
 
   std::string name_;
-  std::chrono::milliseconds time_max_;
+  std::chrono::seconds answer_time_max_;
   pid_t process_id_ = 0;  // 0 once it has ended.
   int questions_ = -1;
   int answers_ = -1;
