@@ -3,25 +3,15 @@
 #include <sys/types.h>
 
 #include <chrono>
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
 #include <string_view>
 
-#include "core/error.hpp"
+#include "proto/model_program/program_description.hpp"
 
 namespace proofmass::wire {
-
-/// A model program cannot be started, ended, is silent, or answers what it must not.
-class ModelProgramError : public Error {
- public:
-  using Error::Error;
-};
-
-/// Most bytes of a line that a model program answers.
-inline constexpr std::size_t answer_size_max = std::size_t{1} << 20;
 
 /// A model program that runs as a child of this process: it reads questions from its standard
 /// input, a line each, and answers each with a line, in their order. What it prints as standard
