@@ -79,6 +79,13 @@ class Model {
   /// @param set  One of available_instruction_sets().
   [[nodiscard]] virtual std::uint64_t reference_digest(InstructionSet set) const = 0;
 
+  /// The text by which others know the model who do not have its program, see
+  /// proto/model_program/README.md. Empty if it has none, as models in C++.
+  [[nodiscard]] virtual std::string_view description() const { return {}; }
+  /// False for a model that is known by its description alone: whatever computes runs or asks the
+  /// program throws an Error that names it.
+  [[nodiscard]] virtual bool can_simulate() const { return true; }
+
   /// What a device proves before it computes anything that counts.
   struct DeviceProof {
     std::uint64_t digest = 0;  ///< reference_digest() by the device's own kernels.

@@ -142,7 +142,7 @@ class Columns {
 
   void add_draw_columns(const Hdf5File& file) {
     const Hdf5Handle group = file.make_group("draw");
-    for (const DrawnQuantity& drawn : model().drawn()) {
+    for (const DrawnQuantity& drawn : draws_->model().drawn()) {
       drawn_values_.emplace_back(file, group, std::string(drawn.name), H5T_IEEE_F64LE,
                                  H5T_NATIVE_DOUBLE);
       file.set_text(drawn_values_.back().dataset(), "unit", std::string(drawn.unit));

@@ -19,11 +19,16 @@ namespace {
 
 void require_model_of_this_program(const Store& store) {
   const std::string stored = store.model_version();
-  if (stored == model().version()) return;
+  const Model& model = store.model();
+  if (!model.can_simulate()) {
+    throw ArchiveError(fmt::format(
+        "model = {} (its program computes runs: name it with --model-program)", stored));
+  }
+  if (stored == model.version()) return;
   throw ArchiveError(
       fmt::format("model_version = {} (must be {}, the model of this program: others compute other "
                   "bits)",
-                  stored, model().version()));
+                  stored, model.version()));
 }
 
 bool is_among(const std::vector<RunRange>& ranges, RunIndex run) {

@@ -127,7 +127,7 @@ std::vector<ResultDifference> simulate_again(const Campaign& campaign,
                                              std::size_t num_threads, const IsStopped& is_stopped) {
   const std::unique_ptr<const Plan> plan = campaign.prepare();
   const ResultSchema schema = campaign.results();
-  const std::size_t batch_size = model().batch_size();
+  const std::size_t batch_size = campaign.model().batch_size();
   std::vector<std::vector<ResultDifference>> found((stored.size() + batch_size - 1) / batch_size);
   in_threads(found.size(), num_threads, [&](std::size_t i, const std::atomic<bool>& has_failed) {
     const std::size_t first = i * batch_size;

@@ -54,10 +54,10 @@ std::shared_ptr<const Campaign> stored_campaign(const Store& store) {
 
 std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store) {
   std::shared_ptr<const Campaign> campaign =
-      model().campaign_of({.text = store.definition(),
-                           .tables = store.data_tables(),
-                           .table_columns = store.table_columns()},
-                          TableColumns::included, "stored definition");
+      store.model().campaign_of({.text = store.definition(),
+                                 .tables = store.data_tables(),
+                                 .table_columns = store.table_columns()},
+                                TableColumns::included, "stored definition");
   require_identity(*campaign, {.name = store.name(),
                                .seed = fmt::to_string(store.seed()),
                                .num_runs = fmt::to_string(store.num_runs())});

@@ -17,6 +17,9 @@
 namespace proofmass::coordinator {
 namespace {
 
+constexpr std::string_view program_missing =
+    "its program is not here, --model-program names it: the file itself says what the model is";
+
 /// The checks of one file, each made once, in order.
 class Verification {
  public:
@@ -95,7 +98,9 @@ class Verification {
 
   Check check_model() {
     const std::string model = store_->model_version();
-    is_same_model_ = model == options_.model_version;
+    can_simulate_ = store_->model().can_simulate();
+    is_same_model_ = model == options_.model_version || !can_simulate_;
+    if (!can_simulate_) return Check::not_checked(fmt::format("{}; {}", model, program_missing));
     if (is_same_model_) return Check::holds(fmt::format("{}; {}", model, store_->build()));
     return Check::fails(
         fmt::format("{} made this file and this program has {}: its runs cannot be "
@@ -176,6 +181,7 @@ class Verification {
 
   Check check_simulation() {
     if (!is_same_model_) return Check::not_checked("another model made the file");
+    if (!can_simulate_) return Check::not_checked(std::string(program_missing));
     if (!scan_) return Check::not_checked("the results cannot be read");
     ChosenRuns chosen(scan_->runs, options_.fraction);
     if (chosen.size() == 0) return Check::not_checked("no run is finished");
@@ -239,6 +245,7 @@ class Verification {
   std::optional<Store> store_;
   std::shared_ptr<const Campaign> campaign_;
   bool is_same_model_ = false;
+  bool can_simulate_ = false;
   std::optional<ResultScan> scan_;
 };
 

@@ -48,6 +48,7 @@ struct VerifyOptions {
 /// Checks whether a campaign database is whole and holds what its definition yields, in this order:
 /// file, integrity, definition, model, results, digest, statistics, stop_checks, audit, draws,
 /// simulation.
+/// Of a model that is known by its description alone, runs are drawn and not simulated again.
 /// A check that fails ends none of the others that can still be made. Nothing is written, and a
 /// coordinator may write meanwhile.
 ///

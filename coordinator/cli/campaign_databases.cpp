@@ -35,10 +35,16 @@ std::string text_of(const Campaign& campaign) {
 
 void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
                   std::string_view remedy) {
-  std::vector<std::string> differences = definition_differences(*stored_campaign(store), wanted);
-  if (store.model_version() != model().version()) {
+  // Definitions of two models have nothing in common that could be compared.
+  const bool is_one_model = &store.model() == &wanted.model();
+  std::vector<std::string> differences;
+  if (is_one_model) differences = definition_differences(*stored_campaign(store), wanted);
+  if (store.model_version() != wanted.model().version()) {
     differences.push_back(fmt::format("model: {} in the database, {} in this program",
-                                      store.model_version(), model().version()));
+                                      store.model_version(), wanted.model().version()));
+  } else if (!is_one_model) {
+    differences.push_back(
+        fmt::format("model: {} has another description", wanted.model().version()));
   }
   if (differences.empty()) return;
   std::string text = fmt::format("{} holds another campaign:", database.string());
@@ -145,9 +151,11 @@ int lock(const std::filesystem::path& directory) {
 
 ServedCampaign load_file(const std::filesystem::path& file) {
   Store store = Store::open(file);
-  if (store.model_version() != model().version()) {
-    throw Error(fmt::format("{}: model = {} (this program has {})", file.string(),
-                            store.model_version(), model().version()));
+  const bool is_own = store.model().can_simulate();
+  if (!is_own || store.model_version() != store.model().version()) {
+    throw Error(fmt::format("{}: model = {} (this program has {}{})", file.string(),
+                            store.model_version(), model().version(),
+                            is_own ? "" : "; --model-program names that of another model"));
   }
   std::shared_ptr<const Campaign> definition = stored_campaign(store);
   try {

@@ -38,7 +38,7 @@ double database_mb(const ResultSchema& schema, std::uint64_t num_runs) {
 FirstBatch try_first_batch(const Campaign& campaign, const Plan& plan) {
   const InstructionSet set = best_instruction_set();
   // Scalar code simulates the runs of a batch one after the other.
-  const std::size_t num_at_once = set == InstructionSet::scalar ? 1 : model().batch_size();
+  const std::size_t num_at_once = set == InstructionSet::scalar ? 1 : campaign.model().batch_size();
   std::vector<RunRequest> requests;
   for (std::uint64_t run = 0; run < std::min<std::uint64_t>(num_at_once, campaign.num_runs);
        ++run) {
@@ -60,7 +60,7 @@ FirstBatch try_first_batch(const Campaign& campaign, const Plan& plan) {
     // The steps so far are enough.
   }
   const double all_steps = static_cast<double>(plan.num_steps()) / num_steps;
-  const std::size_t num_rounds = model().batch_size() / num_at_once;
+  const std::size_t num_rounds = campaign.model().batch_size() / num_at_once;
   return {.time_s = elapsed_s() * all_steps * static_cast<double>(num_rounds),
           .results = std::move(results)};
 }

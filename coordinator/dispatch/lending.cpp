@@ -346,9 +346,9 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
 }
 
 /// A batch of a lease has the same part in its runs as in its slots.
-std::uint32_t batch_runs_max(const Lease& lease) {
+std::uint32_t batch_runs_max(const Lease& lease, const Campaign& campaign) {
   if (lease.num_runs >= lease.num_slots) return 0;
-  const std::uint64_t batch_size = model().batch_size();
+  const std::uint64_t batch_size = campaign.model().batch_size();
   return static_cast<std::uint32_t>(ratio_rounded_up(lease.num_runs * batch_size, lease.num_slots));
 }
 
@@ -429,7 +429,7 @@ void send_lease(const State& state, LeaseId id, Outbox& outbox) {
     message.set_num_runs(static_cast<std::uint32_t>(runs.count));
     message.set_attempt(lease.attempt.value);
     message.set_is_alone(lease.is_alone);
-    message.set_batch_runs_max(batch_runs_max(lease));
+    message.set_batch_runs_max(batch_runs_max(lease, campaign));
     message.set_is_for_cards(lease.is_for_cards);
     add_table_values(campaign, runs, message);
     outbox.send(lease.worker, std::move(envelope));

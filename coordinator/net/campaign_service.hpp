@@ -121,7 +121,8 @@ class CampaignService {
 
   /// True if every campaign is finished, cancelled or abandoned.
   [[nodiscard]] bool is_all_done() const;
-  /// True if no file waits to be served; copies of served campaigns do not count.
+  /// True if no file waits to be served; copies of served campaigns do not count. An unfinished
+  /// campaign waits whose model this program does not have.
   [[nodiscard]] bool is_all_served() const;
 
   /// Ends the service of all campaigns and gives the files that are open back, in the order in

@@ -15,6 +15,7 @@
 #include "coordinator/net/outcome.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -169,7 +170,10 @@ void CampaignService::take_findings(Findings findings) {
 }
 
 bool CampaignService::is_all_served() const {
-  return std::ranges::all_of(unserved_, [](const auto& item) { return item.second.is_copy; });
+  return std::ranges::all_of(unserved_, [](const auto& item) { return item.second.is_copy; }) &&
+         std::ranges::all_of(closed_ | std::views::values, [](const CampaignRecord& campaign) {
+           return has_ended(wire::phase_of(campaign.status));
+         });
 }
 
 void CampaignService::add_unserved(proto::StatusReply& reply) const {

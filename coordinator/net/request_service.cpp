@@ -127,8 +127,10 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
     return campaigns_.archive(campaign->id, respond);
   }
   if (campaign->is_closed) {
-    const bool begins =
-        action == wire::ControlAction::resume || action == wire::ControlAction::retry;
+    // One that has not ended is closed as its model is not here, which opening it says.
+    const bool begins = action == wire::ControlAction::resume ||
+                        action == wire::ControlAction::retry ||
+                        !has_ended(wire::phase_of(campaign->status));
     return begins ? reopen(*campaign, action, respond)
                   : respond(campaigns_.done_reply(campaign->id));
   }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -38,6 +39,7 @@ class DrawnCampaign {
   explicit DrawnCampaign(std::shared_ptr<const Campaign> campaign)
       : campaign_(std::move(campaign)) {}
 
+  [[nodiscard]] std::span<const DrawnQuantity> drawn() const { return campaign_->model().drawn(); }
   [[nodiscard]] std::string_view campaign_name() const { return campaign_->name; }
   [[nodiscard]] std::uint64_t num_runs() const { return campaign_->num_runs; }
 
@@ -130,11 +132,10 @@ std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info& plan) 
 
 // A campaign of medium size; a draw costs as much as a dozen rows.
 void estimate_cost(sqlite3_index_info& plan) {
+  constexpr double num_drawn = 50.0;
   const bool has_range = (plan.idxNum & range_bits) != 0;
   const double runs = (plan.idxNum & run_bit) != 0 ? 1.0 : has_range ? 1e3 : 1e5;
-  const double rows =
-      runs *
-      ((plan.idxNum & quantity_bit) != 0 ? 1.0 : static_cast<double>(model().drawn().size()));
+  const double rows = runs * ((plan.idxNum & quantity_bit) != 0 ? 1.0 : num_drawn);
   plan.estimatedCost = 12.0 * runs + rows;
   plan.estimatedRows = static_cast<sqlite3_int64>(rows);
   constexpr int one_row = run_bit | quantity_bit;
@@ -156,9 +157,9 @@ void DrawCursor::choose_plan(sqlite3_index_info& plan) {
 }
 
 // Other types than these compare by rules of SQLite's own, and narrow nothing.
-void narrow(DrawScan& scan, const Offer& offer, sqlite3_value* value) {
+void narrow(DrawScan& scan, const Offer& offer, std::span<const DrawnQuantity> drawn,
+            sqlite3_value* value) {
   const int type = sqlite3_value_type(value);
-  const std::span<const DrawnQuantity> drawn = model().drawn();
   if (type == SQLITE_NULL) {
     scan.end_run = scan.first_run;
   } else if (offer.column == quantity_column && type == SQLITE_TEXT) {
@@ -198,18 +199,20 @@ void DrawCursor::begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value*
   for (std::size_t i = 0; i < offers.size(); ++i) {
     if ((plan & (1 << i)) == 0) continue;
     sqlite3_value* value = *arguments++;
-    if (offers[i].column != draw_campaign_column) narrow(scan, offers[i], value);
+    if (offers[i].column != draw_campaign_column) {
+      narrow(scan, offers[i], runs->drawn(), value);
+    }
   }
   go_to_run(scan.first_run);
 }
 
 void DrawCursor::next() {
   ++quantity;
-  if (scan.quantity || quantity == model().drawn().size()) go_to_run(run + 1);
+  if (scan.quantity || quantity == runs->drawn().size()) go_to_run(run + 1);
 }
 
 std::int64_t DrawCursor::row() const {
-  return static_cast<std::int64_t>(run * model().drawn().size() + quantity);
+  return static_cast<std::int64_t>(run * runs->drawn().size() + quantity);
 }
 
 void set_text(sqlite3_context* context, std::string_view text) {
@@ -221,9 +224,9 @@ void DrawCursor::give_column(sqlite3_context* context, int number) const {
     case run_index_column:
       return sqlite3_result_int64(context, static_cast<sqlite3_int64>(run));
     case quantity_column:
-      return set_text(context, model().drawn()[quantity].name);
+      return set_text(context, runs->drawn()[quantity].name);
     case unit_column:
-      return set_text(context, model().drawn()[quantity].unit);
+      return set_text(context, runs->drawn()[quantity].unit);
     case draw_value_column:
       if (!values.empty()) sqlite3_result_double(context, values[quantity]);
       return;

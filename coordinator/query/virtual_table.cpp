@@ -14,6 +14,7 @@
 #include "coordinator/query/virtual_table-inl.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/model_program/described_model.hpp"
 
 SQLITE_EXTENSION_INIT3
 
@@ -75,9 +76,10 @@ std::string quoted_name(std::string_view name) {
   return quoted + "\"";
 }
 
-std::vector<DataTable> data_tables_of(sqlite3* connection, const std::string& database) {
+std::vector<DataTable> data_tables_of(sqlite3* connection, const std::string& database,
+                                      const Model& model) {
   std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model().tables()) {
+  for (const DataTableSchema& schema : model.tables()) {
     const int num_columns = static_cast<int>(schema.columns.size());
     DataTable table{.key = std::string(schema.key),
                     .num_columns = static_cast<std::uint32_t>(num_columns)};
@@ -93,13 +95,13 @@ std::vector<DataTable> data_tables_of(sqlite3* connection, const std::string& da
 }
 
 // One column for each quantity that has values, in the order of Model::drawn().
-std::vector<std::vector<double>> table_columns_of(sqlite3* connection,
-                                                  const std::string& database) {
+std::vector<std::vector<double>> table_columns_of(sqlite3* connection, const std::string& database,
+                                                  const Model& model) {
   const std::string sql =
       fmt::format("SELECT value FROM {}.dispersion_value WHERE quantity = ? ORDER BY run_index",
                   quoted_name(database));
   std::vector<std::vector<double>> columns;
-  for (const DrawnQuantity& drawn : model().drawn()) {
+  for (const DrawnQuantity& drawn : model.drawn()) {
     Selection row(connection, sql);
     row.bind(std::string(drawn.name));
     std::vector<double> column;
@@ -107,6 +109,20 @@ std::vector<std::vector<double>> table_columns_of(sqlite3* connection,
     if (!column.empty()) columns.push_back(std::move(column));
   }
   return columns;
+}
+
+// Our own programs bring the schema up to date before; the extension takes a file as it is.
+const Model& model_of(sqlite3* connection, const std::string& database) {
+  constexpr std::int64_t first_with_description = 12;
+  Selection version(connection, fmt::format("PRAGMA {}.user_version", quoted_name(database)));
+  version.require_row();
+  Selection row(
+      connection,
+      fmt::format("SELECT model_version, {} FROM {}.campaign",
+                  version.integer(0) < first_with_description ? "''" : "model_description",
+                  quoted_name(database)));
+  row.require_row();
+  return wire::stored_model(row.text(0), row.text(1));
 }
 
 std::string name_in(sqlite3* connection, const std::string& database) {
@@ -162,11 +178,12 @@ std::shared_ptr<const Campaign> read_campaign_of(sqlite3* connection, const std:
   Selection row(connection, fmt::format("SELECT definition, name, seed, num_runs FROM {}.campaign",
                                         quoted_name(database)));
   row.require_row();
+  const Model& model = model_of(connection, database);
   std::shared_ptr<const Campaign> campaign =
-      model().campaign_of({.text = row.text(0),
-                           .tables = data_tables_of(connection, database),
-                           .table_columns = table_columns_of(connection, database)},
-                          TableColumns::included, "stored definition");
+      model.campaign_of({.text = row.text(0),
+                         .tables = data_tables_of(connection, database, model),
+                         .table_columns = table_columns_of(connection, database, model)},
+                        TableColumns::included, "stored definition");
   require_identity(*campaign, {.name = row.text(1), .seed = row.text(2), .num_runs = row.text(3)});
   return campaign;
 }

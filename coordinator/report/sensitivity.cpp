@@ -22,9 +22,9 @@ namespace {
 
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
 
-std::vector<std::string> column_names(const ResultSchema& schema) {
+std::vector<std::string> column_names(const Campaign& campaign, const ResultSchema& schema) {
   std::vector<std::string> names;
-  for (const DrawnQuantity& drawn : model().drawn()) names.emplace_back(drawn.name);
+  for (const DrawnQuantity& drawn : campaign.model().drawn()) names.emplace_back(drawn.name);
   for (const Quantity& quantity : schema.quantities) {
     names.push_back("truth_" + quantity.column());
   }
@@ -245,7 +245,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
                           std::optional<RunIndex> also) {
   const ResultSchema& schema = store.schema();
   DrawnRuns drawn;
-  drawn.names = column_names(schema);
+  drawn.names = column_names(campaign, schema);
   drawn.quantities = schema.quantities;
   drawn.columns.resize(drawn.names.size());
   drawn.errors.resize(schema.quantities.size());

@@ -130,7 +130,7 @@ std::vector<std::string> stop_check_differences(const Store& store,
                                                 std::span<const double> objectives) {
   std::vector<std::string> differences;
   // Older models counted the errors of runs that did not converge.
-  if (store.model_version() != model().version()) return differences;
+  if (store.model_version() != store.model().version()) return differences;
   std::vector<StopCheckRow> expected;
   const std::uint64_t num_runs = store.num_runs();
   const std::uint64_t num_runs_held = num_held(store);

@@ -65,19 +65,21 @@ CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth)
   if (!std::filesystem::is_regular_file(path, ignored)) detail::refuse_file(path, "is no file");
   Database database(path, detail::Access::immutable);
   database.execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
-  if (depth == PeekDepth::pages) {
-    (void)detail::check_campaign_file(database);
-    (void)detail::check_all_pages(database);
-  } else {
-    (void)detail::check_kind(database);
-  }
+  const detail::StoredKind kind = depth == PeekDepth::pages ? detail::check_campaign_file(database)
+                                                            : detail::check_kind(database);
+  if (depth == PeekDepth::pages) (void)detail::check_all_pages(database);
   CampaignRecord record = read_record(database);
   record.file = path;
   proto::CampaignStatus& status = record.status;
   status.set_num_given_up(database.count("SELECT count(*) FROM run_failure"));
   status.set_num_done(database.count("SELECT coalesce(max(num_finished), 0) FROM summary"));
   const bool is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
-  record.is_closed = is_complete(database, status) && !is_log_needed && !has_journal(path);
+  const bool can_go_on = kind.model->can_simulate();
+  if (!can_go_on && status.phase() == proto::CAMPAIGN_PHASE_ACTIVE) {
+    status.set_phase(proto::CAMPAIGN_PHASE_PAUSED);
+  }
+  record.is_closed =
+      (!can_go_on || is_complete(database, status)) && !is_log_needed && !has_journal(path);
   return record;
 }
 

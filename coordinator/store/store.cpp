@@ -51,7 +51,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   detail::configure(database);
   database.execute("PRAGMA synchronous = OFF");  // It is made durable before it gets its name.
   Transaction transaction(database);
-  detail::migrate(database, campaign.results());
+  detail::migrate(database, campaign.model(), campaign.results());
   detail::insert_campaign(database, campaign, definition);
   detail::replace_budgets(database, campaign.error_budget(), {});
   fill(database);
@@ -118,7 +118,9 @@ std::string Store::definition() const {
   return impl_->database.text("SELECT definition FROM campaign");
 }
 
-const ResultSchema& Store::schema() const { return impl_->results; }
+const Model& Store::model() const { return *impl_->kind.model; }
+
+const ResultSchema& Store::schema() const { return impl_->kind.results; }
 
 std::string Store::model_version() const {
   const std::string version = impl_->database.text("SELECT model_version FROM campaign");
@@ -138,7 +140,7 @@ std::string Store::owner() const { return impl_->database.text("SELECT owner FRO
 void Store::set_owner(std::string_view owner) {
   impl_->commit([&](Database& database) {
     database.prepare("UPDATE campaign SET owner = ?").run(owner);
-    detail::write_table_digest(database);
+    detail::write_table_digest(database, model());
   });
 }
 
@@ -147,11 +149,11 @@ std::string Store::table_digest() const {
 }
 
 std::string Store::computed_table_digest() const {
-  return detail::compute_table_digest(impl_->database);
+  return detail::compute_table_digest(impl_->database, model());
 }
 
 std::vector<DataTable> Store::data_tables() const {
-  return detail::read_data_tables(impl_->database);
+  return detail::read_data_tables(impl_->database, model());
 }
 
 std::vector<std::vector<double>> Store::table_columns() const {
@@ -237,7 +239,7 @@ void Store::read_one_state(const std::function<void()>& read) const {
 std::uint64_t Store::log_size() const { return impl_->database.log_size(); }
 
 void Store::check_integrity() const {
-  read_one_state([&] { detail::check_integrity(impl_->database, schema()); });
+  read_one_state([&] { detail::check_integrity(impl_->database, impl_->kind); });
 }
 
 void Store::write_plain(const std::filesystem::path& draft) const {

@@ -20,6 +20,10 @@
 #include "core/statistics/stop_rule.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass {
+class Model;  // Those who ask it include core/model.hpp.
+}  // namespace proofmass
+
 namespace proofmass::coordinator::detail {
 class Database;
 }  // namespace proofmass::coordinator::detail
@@ -81,8 +85,9 @@ class Store {
 
   /// Opens a campaign database for its coordinator: takes the lock, brings an older file up to
   /// date.
-  /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
-  ///         another coordinator has it; on a network file system; if it has another hard link.
+  /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or of
+  ///         a model that the program does not know and the file does not describe; if another
+  ///         coordinator has it; on a network file system; if it has another hard link.
   ///         A file without the log that it needs is opened as it is: runs whose results were in
   ///         it are missing, and are computed again. The event `log_lost` says so.
   static Store open(const std::filesystem::path& path);
@@ -116,6 +121,9 @@ class Store {
   /// program began the campaign, or if it began with a stop rule.
   [[nodiscard]] std::optional<std::uint64_t> num_runs_fixed() const;
   [[nodiscard]] std::string definition() const;
+  /// The model of the campaign: this program's if it is that one, or else what the file says of it,
+  /// which computes no runs. It lives as long as the program.
+  [[nodiscard]] const Model& model() const;
   /// What the results in the file are: those of its definition, as the model that began the
   /// campaign recorded them. It lives as long as the Store.
   [[nodiscard]] const ResultSchema& schema() const;

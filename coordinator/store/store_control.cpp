@@ -92,7 +92,7 @@ void Store::set_stop_plan(const StopPlan& plan) {
             " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
         .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
     detail::fix_num_runs(database);
-    detail::write_table_digest(database);
+    detail::write_table_digest(database, model());
   });
 }
 

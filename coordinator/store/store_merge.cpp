@@ -146,7 +146,6 @@ void MergeRows::finish() {
   const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
   control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
   detail::write_control(whole_, control);
-  detail::write_table_digest(whole_);
 }
 
 WorkerKeys MergeRows::add_workers(const Database& part) {
@@ -218,6 +217,7 @@ Store Store::merge(const std::filesystem::path& path, const Campaign& campaign,
       part.read_one_state([&] { on_part(rows.add(part.impl_->database)); });
     }
     rows.finish();
+    detail::write_table_digest(whole, campaign.model());
   });
 }
 

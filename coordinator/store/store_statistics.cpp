@@ -47,7 +47,7 @@ std::vector<std::string> Store::parameter_differences(const Campaign& campaign) 
       ComparedTable{.name = "parameter", .row_name = "parameter"},
       ComparedTable{.name = "budget_coefficient", .row_name = "parameter || ' in ' || term"}};
   return detail::table_differences(
-      impl_->database, schema(),
+      impl_->database, impl_->kind,
       [&](Database& expected) { detail::insert_parameters(expected, campaign); },
       std::span(tables).first(has_own_budget(impl_->database) ? 2 : 1));
 }
@@ -66,7 +66,7 @@ std::vector<std::string> Store::statistic_differences(const CampaignStatistics& 
                     .row_name = "effect || ' on ' || parameter || ' in run ' || run_index",
                     .tolerance = rounding}};
   return detail::table_differences(
-      impl_->database, schema(),
+      impl_->database, impl_->kind,
       [&](Database& expected) {
         replace_all(expected, schema(), statistics, budget);
         detail::replace_warnings(expected, schema(), warnings);
@@ -82,7 +82,7 @@ std::vector<std::string> Store::stop_check_differences(
                     .columns = "estimate, lower, upper, relative_half_width, is_reached",
                     .tolerance = rounding}};
   return detail::table_differences(
-      impl_->database, schema(),
+      impl_->database, impl_->kind,
       [&](Database& database) {
         for (const StopCheckRow& row : expected) {
           detail::replace_stop_check(database, row.num_runs, row.statistic, row.check);

@@ -20,6 +20,7 @@ namespace proofmass {
 
 class Device;  // Those who simulate on one include core/campaign/device.hpp.
 class DeviceSimulation;
+class Model;       // Those who ask it include core/model.hpp.
 struct Recording;  // Those who replay a run include core/campaign/recording.hpp.
 struct RecordedSample;
 
@@ -157,6 +158,9 @@ class Campaign {
   std::vector<std::vector<double>> table_columns;
 
   virtual ~Campaign() = default;
+
+  /// The model that it is a campaign of; outlives it.
+  [[nodiscard]] virtual const Model& model() const = 0;
 
   /// @throws ConfigError naming the field, its value and the rule.
   virtual void validate() const = 0;

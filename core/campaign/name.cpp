@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstddef>
 
 #include "core/error.hpp"
 
@@ -24,6 +23,10 @@ bool may_be_in_name(char c) { return is_letter_or_digit(c) || c == '.' || c == '
 bool has_name_form(std::string_view text) {
   return !text.empty() && is_letter_or_digit(text.front()) &&
          std::ranges::all_of(text, may_be_in_name);
+}
+
+bool is_name(std::string_view text) {
+  return text.size() <= name_length_max && has_name_form(text);
 }
 
 void check_campaign_name(const std::string& name, NameOrigin origin) {

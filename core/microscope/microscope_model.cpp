@@ -20,6 +20,8 @@
 
 namespace proofmass {
 
+const Model& MicroscopeCampaign::model() const { return built_in_model(); }
+
 std::unique_ptr<Campaign> MicroscopeCampaign::clone() const {
   return std::make_unique<MicroscopeCampaign>(*this);
 }

@@ -85,6 +85,7 @@ class OscillatorCampaign final : public Campaign {
 
   Oscillator oscillator;
 
+  [[nodiscard]] const Model& model() const override { return built_in_model(); }
   void validate() const override {
     check_identity(*this);
     check_table_columns(*this, {});

@@ -8,7 +8,7 @@ last one from a calibration signal of known size. The model deploy/model has the
 
     proofmass init --model-program ./oscillator.py
     proofmass run oscillator.toml --model-program ./oscillator.py --runs 1000
-    proofmass report oscillator.db --model-program ./oscillator.py
+    proofmass report oscillator.db
 """
 
 import math

@@ -10,7 +10,7 @@
 #include "core/campaign/expression.hpp"
 #include "core/campaign/law_keys.hpp"
 #include "core/campaign/name.hpp"
-#include "proto/wire/names.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -43,10 +43,9 @@ class Part {
   [[nodiscard]] std::string text(const std::string& key,
                                  std::size_t size_max = text_size_max) const {
     const Json& value = at(key);
-    const auto is_control = [](char c) { return static_cast<unsigned char>(c) < ' '; };
     const bool is_text =
         value.is_string() && value.get_ref<const std::string&>().size() <= size_max;
-    if (!is_text || std::ranges::any_of(value.get_ref<const std::string&>(), is_control)) {
+    if (!is_text || visible_text(value.get_ref<const std::string&>()) != value) {
       refuse(field(key), value,
              fmt::format("must be a text of one line, at most {} bytes", size_max));
     }
@@ -185,7 +184,14 @@ bool is_law_of_programs(Law law) {
 }
 
 ProgramDescription description_in(std::string_view answer) {
-  const Json json = Json::parse(answer, nullptr, false);
+  if (answer.size() > answer_size_max) {
+    throw ModelProgramError(
+        fmt::format("description: {} bytes (must be at most {})", answer.size(), answer_size_max));
+  }
+  // What is nested deeper than the entry of a list is no part of it, and would have to be written
+  // by a recursive function.
+  const auto is_kept = [](int depth, Json::parse_event_t, const Json&) { return depth <= 3; };
+  const Json json = Json::parse(answer, is_kept, false);
   if (json.is_discarded()) throw ModelProgramError("description: no JSON");
   const Part part(json, "");
   if (part.at("proofmass_model_program") != questions_version) {
@@ -193,6 +199,7 @@ ProgramDescription description_in(std::string_view answer) {
            fmt::format("must be {}, the version of the questions", questions_version));
   }
   ProgramDescription description;
+  description.text = json.dump();
   description.version = fmt::format("{}-{}", part.text("name"), part.text("version"));
   description.purpose =
       part.text_or("purpose", fmt::format("Runs campaigns of {}.", part.text("name")));

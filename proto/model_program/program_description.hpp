@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -8,9 +9,24 @@
 
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/run_result.hpp"
-#include "proto/model_program/program_process.hpp"
+#include "core/error.hpp"
 
 namespace proofmass::wire {
+
+/// A model program cannot be started, ended, is silent, answers what it must not, or is not there.
+class ModelProgramError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Most bytes of a line that a model program answers, and of a description.
+inline constexpr std::size_t answer_size_max = std::size_t{1} << 20;
+
+/// What a model program may take.
+struct ProgramLimits {
+  std::chrono::seconds answer_time_max{600};  ///< For each answer.
+  std::size_t memory_max_mib = 4096;          ///< Of data, which counts once it is asked for.
+};
 
 /// A number that the runs of a campaign share, and that a campaign file may change.
 struct ProgramParameter {
@@ -48,6 +64,7 @@ struct ProgramQuantity {
 
 /// What a model program says of itself when it is asked.
 struct ProgramDescription {
+  std::string text;     ///< All of it as JSON without blanks, keys in alphabetical order.
   std::string version;  ///< NAME-VERSION, as Model::version().
   std::string purpose;
   std::vector<ProgramParameter> parameters;
@@ -58,7 +75,7 @@ struct ProgramDescription {
   ProgramLimits limits;
 };
 
-/// @param answer  A line of JSON.
+/// @param answer  JSON that a program answered or a database holds: anything at all.
 /// @throws ModelProgramError naming field, value and rule.
 [[nodiscard]] ProgramDescription description_in(std::string_view answer);
 

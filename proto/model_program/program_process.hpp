@@ -3,31 +3,15 @@
 #include <sys/types.h>
 
 #include <chrono>
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
 #include <string_view>
 
-#include "core/error.hpp"
+#include "proto/model_program/program_description.hpp"
 
 namespace proofmass::wire {
-
-/// A model program cannot be started, ended, is silent, or answers what it must not.
-class ModelProgramError : public Error {
- public:
-  using Error::Error;
-};
-
-/// Most bytes of a line that a model program answers.
-inline constexpr std::size_t answer_size_max = std::size_t{1} << 20;
-
-/// What a model program may take.
-struct ProgramLimits {
-  std::chrono::seconds answer_time_max{600};  ///< For each answer.
-  std::size_t memory_max_mib = 4096;          ///< Of data, which counts once it is asked for.
-};
 
 /// A model program that runs as a child of this process: it reads questions from its standard
 /// input, a line each, and answers each with a line, in their order. What it prints as standard

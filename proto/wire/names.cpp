@@ -9,15 +9,6 @@
 #include "proto/client.pb.h"
 
 namespace proofmass::wire {
-namespace {
-
-constexpr std::size_t name_length_max = 128;
-
-}  // namespace
-
-bool is_name(std::string_view text) {
-  return text.size() <= name_length_max && has_name_form(text);
-}
 
 std::string name_from(std::string_view text) {
   std::string name(text.substr(0, name_length_max));

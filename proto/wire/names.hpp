@@ -3,6 +3,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/campaign/name.hpp"
 #include "proto/wire/client_messages.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -14,9 +15,7 @@ enum FactoryPhase : int;
 
 namespace proofmass::wire {
 
-/// True for 1 to 128 characters of which has_name_form() holds: names of workers, hosts and models,
-/// which go into logs and the database as they are; see core/campaign/name.hpp.
-[[nodiscard]] bool is_name(std::string_view text);
+using proofmass::is_name;
 
 /// The text with every character that a name may not have replaced by `-`, or `x` in the first
 /// place, cut to 128; `unnamed` if nothing is left.

@@ -106,7 +106,7 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
                  {"seed", std::to_string(campaign.seed)},
                  {"num_runs", campaign.num_runs},
                  {"num_steps", plan.num_steps()},
-                 {"step_name", model().step_name()},
+                 {"step_name", campaign.model().step_name()},
                  {"one_core_s", cost.one_core_s},
                  {"all_cores_s", cost.all_cores_s},
                  {"num_cores", wire::num_processors()},
@@ -127,7 +127,7 @@ std::string check_text(const CheckOptions& options, const Campaign& campaign, co
                        const Outlook& outlook, const CostEstimate& cost) {
   return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {} of {} {}\n{}\n{}\n{}",
                      options.file.string(), campaign.name, campaign.seed, campaign.num_runs,
-                     plan.num_steps(), model().step_name(),
+                     plan.num_steps(), campaign.model().step_name(),
                      outlook_text(options, campaign, outlook), cost_text(cost),
                      differences_text(campaign));
 }

@@ -205,7 +205,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
 
 std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& campaign) {
   try {
-    std::unique_ptr<PlanStudy> study = model().study(campaign);
+    std::unique_ptr<PlanStudy> study = campaign.model().study(campaign);
     if (study != nullptr) return study;
   } catch (const ConfigError& error) {
     throw UsageError(fmt::format("{}: {}", options.file.string(), error.what()));

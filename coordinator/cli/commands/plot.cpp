@@ -87,11 +87,17 @@ void write_picture(const Picture& picture, const PlotOptions& options) {
   write_document(options.output, options.if_there, svg_of(picture, SvgUse::standalone));
 }
 
+/// Of what can be simulated here.
+std::vector<std::string> spectrum_names_of(const Campaign& campaign) {
+  if (!campaign.model().can_simulate()) return {};
+  return spectrum_names(campaign.prepare()->recording());
+}
+
 /// The spectra are not computed: to tell their names, no run has to be simulated.
 void print_names(const Review& review, const Campaign& campaign) {
   std::string names;
   for (const NamedPicture& named : review_pictures(review)) names += named.name + "\n";
-  for (const std::string& name : spectrum_names(campaign.prepare()->recording())) {
+  for (const std::string& name : spectrum_names_of(campaign)) {
     names += name + "\n";
   }
   print_lines(names);
@@ -127,7 +133,7 @@ int plot(const PlotOptions& options) {
     write_picture(chosen_picture(review_pictures(review), options.chart), options);
     return exit_done;
   };
-  const std::vector<std::string> spectra = spectrum_names(campaign->prepare()->recording());
+  const std::vector<std::string> spectra = spectrum_names_of(*campaign);
   if (std::ranges::find(spectra, options.chart) == spectra.end()) return write();
   return run_until_stopped([&](const IsStopped& is_stopped) {
     add_spectra(store, options.chart, review, is_stopped);

@@ -17,12 +17,14 @@
 #include "coordinator/store/store.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/independence.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+/// More than any model draws and estimates.
+constexpr std::size_t num_rows_max = 2000;
 
 struct SensitivityOptions {
   std::filesystem::path database;
@@ -107,7 +109,7 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
       .add_option("--rows", options.num_rows,
                   "Quantities to name for each error; by default 5,\n"
                   "or none if chance explains all influences")
-      ->check(wire::in_range(std::size_t{1}, model().drawn().size() + quantities_max));
+      ->check(wire::in_range(std::size_t{1}, num_rows_max));
   add_json_flag(command, options.format);
   add_optional_connection(command, options.connection);
 }

@@ -32,8 +32,9 @@ wire::CampaignPhase read_phase(const Database& database, std::string_view name) 
   database.refuse_as_damaged(fmt::format("phase = {}", name));
 }
 
-void insert_data_tables(Database& database, const std::vector<DataTable>& tables) {
-  for (const DataTableSchema& schema : model().tables()) {
+void insert_data_tables(Database& database, const Campaign& campaign) {
+  const std::vector<DataTable> tables = campaign.definition(TableColumns::left_out).tables;
+  for (const DataTableSchema& schema : campaign.model().tables()) {
     const auto table = std::ranges::find(tables, schema.key, &DataTable::key);
     if (table == tables.end()) continue;
     const int num_columns = static_cast<int>(schema.columns.size());
@@ -53,7 +54,7 @@ void insert_data_tables(Database& database, const std::vector<DataTable>& tables
 std::vector<std::string_view> table_quantity_names(const Campaign& campaign) {
   std::vector<std::string_view> names;
   for (const std::size_t quantity : campaign.table_quantities()) {
-    names.push_back(model().drawn()[quantity].name);
+    names.push_back(campaign.model().drawn()[quantity].name);
   }
   return names;
 }
@@ -109,20 +110,21 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
   database
       .prepare(
           "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
-          " build, campaign_uid, first_version)"
-          " VALUES (1, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
+          " model_description, build, campaign_uid, first_version)"
+          " VALUES (1, ?, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
-           model().version(), std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
+           campaign.model().version(), campaign.model().description(),
+           std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
   insert_parameters(database, campaign);
-  insert_data_tables(database, campaign.definition(TableColumns::left_out).tables);
+  insert_data_tables(database, campaign);
   insert_dispersion_values(database, campaign, 0);
   fix_num_runs(database);
-  write_table_digest(database);
+  write_table_digest(database, campaign.model());
 }
 
-std::vector<DataTable> read_data_tables(const Database& database) {
+std::vector<DataTable> read_data_tables(const Database& database, const Model& model) {
   std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model().tables()) {
+  for (const DataTableSchema& schema : model.tables()) {
     DataTable table{.key = std::string(schema.key),
                     .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
     Statement select = database.prepare(fmt::format("SELECT {} FROM {} ORDER BY position",
@@ -161,7 +163,7 @@ void extend_campaign(Database& database, const Campaign& campaign, std::string_v
   database.prepare("UPDATE campaign SET num_runs = ?, definition = ?")
       .run(campaign.num_runs, definition);
   fix_num_runs(database);
-  write_table_digest(database);
+  write_table_digest(database, campaign.model());
 }
 
 std::uint64_t read_seed(const Database& database) {

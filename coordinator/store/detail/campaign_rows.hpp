@@ -21,7 +21,7 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
 void insert_parameters(Database& database, const Campaign& campaign);
 
 /// The data that all runs share; none that has no rows.
-[[nodiscard]] std::vector<DataTable> read_data_tables(const Database& database);
+[[nodiscard]] std::vector<DataTable> read_data_tables(const Database& database, const Model& model);
 
 /// Values of one drawn quantity, run by run; empty if the file has none.
 [[nodiscard]] std::vector<double> read_dispersion_values(const Database& database,

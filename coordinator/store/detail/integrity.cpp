@@ -15,11 +15,9 @@
 
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
-#include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -28,15 +26,18 @@ namespace {
 void add_campaign(const Database& database, Sha256& hash) {
   Statement row = database.prepare(
       "SELECT name, seed, num_runs, definition, model_version, build, created_utc, campaign_uid,"
-      " owner, stop_rule, num_runs_max, failures_max, num_runs_fixed FROM campaign");
+      " owner, stop_rule, num_runs_max, failures_max, num_runs_fixed, model_description"
+      " FROM campaign");
   if (!row.step()) database.refuse_as_damaged("it has no campaign");
-  const int num_columns = row.num_columns();
-  for (int column = 0; column < num_columns - 1; ++column) hash.add(row.shown(column));
-  if (row.optional_count(num_columns - 1)) hash.add(row.shown(num_columns - 1));
+  const int num_always = row.num_columns() - 2;
+  for (int column = 0; column < num_always; ++column) hash.add(row.shown(column));
+  if (row.optional_count(num_always)) hash.add(row.shown(num_always));
+  const std::string description = row.text(num_always + 1);
+  if (!description.empty()) hash.add(description);
 }
 
-void add_data_tables(const Database& database, Sha256& hash) {
-  for (const DataTableSchema& table : model().tables()) {
+void add_data_tables(const Database& database, const Model& model, Sha256& hash) {
+  for (const DataTableSchema& table : model.tables()) {
     hash.add(database.count(fmt::format("SELECT count(*) FROM {}", table.table)));
     Statement row = database.prepare(fmt::format("SELECT position, {} FROM {} ORDER BY position",
                                                  fmt::join(table.columns, ", "), table.table));
@@ -207,22 +208,24 @@ void compare(const Database& stored_in, const Database& expected_in, const Compa
 
 }  // namespace
 
-std::string compute_table_digest(const Database& database) {
+std::string compute_table_digest(const Database& database, const Model& model) {
   Sha256 hash;
   add_campaign(database, hash);
-  add_data_tables(database, hash);
+  add_data_tables(database, model, hash);
   add_dispersions(database, hash);
   return hash.finish();
 }
 
-void write_table_digest(const Database& database) {
-  database.prepare("UPDATE campaign SET table_digest = ?").run(compute_table_digest(database));
+void write_table_digest(const Database& database, const Model& model) {
+  database.prepare("UPDATE campaign SET table_digest = ?")
+      .run(compute_table_digest(database, model));
 }
 
-void check_integrity(const Database& database, const ResultSchema& results) {
+void check_integrity(const Database& database, const StoredKind& kind) {
+  const ResultSchema& results = kind.results;
   const std::string finding = database.text("PRAGMA integrity_check(1)");
   if (finding != "ok") database.refuse_as_damaged(finding);
-  check_schema(database, schema_version(), results);
+  check_schema(database, schema_version(), *kind.model, results);
   check_references(database);
   check_single_rows(database);
   check_largest_errors(database, results);
@@ -230,13 +233,13 @@ void check_integrity(const Database& database, const ResultSchema& results) {
   check_audits(database, results);
 }
 
-std::vector<std::string> table_differences(const Database& database, const ResultSchema& results,
+std::vector<std::string> table_differences(const Database& database, const StoredKind& kind,
                                            const std::function<void(Database&)>& write,
                                            std::span<const ComparedTable> tables,
                                            FurtherRows further) {
   Database expected("new campaign", Access::memory);
   Transaction transaction(expected);
-  migrate(expected, results);
+  migrate(expected, *kind.model, kind.results);
   write(expected);
   std::vector<std::string> differences;
   for (const ComparedTable& table : tables) {

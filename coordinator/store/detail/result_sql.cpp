@@ -8,7 +8,6 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -99,9 +98,9 @@ std::string health_of_row(const ResultSchema& schema) {
   return text;
 }
 
-std::string data_tables() {
+std::string data_tables(const Model& model) {
   std::string text;
-  for (const DataTableSchema& table : model().tables()) {
+  for (const DataTableSchema& table : model.tables()) {
     text += fmt::format("-- {}\nCREATE TABLE {} (\n  position INTEGER PRIMARY KEY", table.comment,
                         table.table);
     for (const std::string_view column : table.columns) {
@@ -112,9 +111,9 @@ std::string data_tables() {
   return text;
 }
 
-std::string digested_tables() {
+std::string digested_tables(const Model& model) {
   std::string text;
-  for (const DataTableSchema& table : model().tables()) {
+  for (const DataTableSchema& table : model.tables()) {
     text += fmt::format("{}{}", text.empty() ? "" : ", ", table.table);
   }
   return text.empty() ? "dispersion_value" : text + " and dispersion_value";
@@ -175,10 +174,10 @@ std::vector<std::string_view> status_names() {
   return names;
 }
 
-std::map<std::string_view, std::string> texts(const ResultSchema& schema) {
+std::map<std::string_view, std::string> texts(const Model& model, const ResultSchema& schema) {
   return {
-      {"data_tables", data_tables()},
-      {"digested_tables", digested_tables()},
+      {"data_tables", data_tables(model)},
+      {"digested_tables", digested_tables(model)},
       {"example_quantity", example_quantity(schema).name},
       {"truth_columns", nullable_columns(schema, "truth", "status = 4")},
       {"estimate_columns", nullable_columns(schema, "estimate", "status > 2")},
@@ -219,8 +218,8 @@ std::string has_standard_errors_sql(const ResultSchema& schema) {
   return text;
 }
 
-std::string with_quantities(std::string_view sql, const ResultSchema& schema) {
-  const std::map<std::string_view, std::string> replacements = texts(schema);
+std::string with_quantities(std::string_view sql, const Model& model, const ResultSchema& schema) {
+  const std::map<std::string_view, std::string> replacements = texts(model, schema);
   std::string text;
   while (true) {
     const std::size_t begin = std::min(sql.find('{'), sql.size());

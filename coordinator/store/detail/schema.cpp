@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/model.hpp"
 #include "proto/link/faults.hpp"
+#include "proto/model_program/described_model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -37,10 +37,10 @@ SchemaObjects schema_objects(const Database& database) {
 /// What a file has that was brought to a version, for each from oldest_schema_version. Making it
 /// takes some milliseconds, so that a thread keeps those of the last campaign: others of a
 /// directory mostly have the same.
-const std::vector<SchemaObjects>& known_schemas(const ResultSchema& results) {
+const std::vector<SchemaObjects>& known_schemas(const Model& model, const ResultSchema& results) {
   thread_local std::vector<std::string> known_migrations;
   thread_local std::vector<SchemaObjects> known;
-  std::vector<std::string> wanted = migrations(results);
+  std::vector<std::string> wanted = migrations(model, results);
   if (wanted == known_migrations) return known;
   Database fresh("new campaign", Access::memory);
   std::vector<SchemaObjects> all;
@@ -81,10 +81,9 @@ constexpr std::array<std::string_view, 9> large_tables{
     "attempt",    "audit",       "delivery", "dispersion_value", "overrun", "run_failure",
     "run_result", "run_warning", "worker"};
 
-bool is_large(const std::string& table) {
+bool is_large(const Model& model, const std::string& table) {
   return std::ranges::find(large_tables, table) != large_tables.end() ||
-         std::ranges::find(model().tables(), table, &DataTableSchema::table) !=
-             model().tables().end();
+         std::ranges::find(model.tables(), table, &DataTableSchema::table) != model.tables().end();
 }
 
 /// Names of the tables, those of SQLite's own among them.
@@ -102,30 +101,14 @@ std::uint64_t count_rows(const Database& database, const std::string& table) {
 }
 
 // SQLite holds the size of the file against its header with the first page that it reads.
-void check_small_tables(const Database& database) {
+void check_small_tables(const Database& database, const Model& model) {
   for (const std::string& table : table_names(database)) {
-    if (!is_large(table)) {
+    if (!is_large(model, table)) {
       (void)count_rows(database, table);
     } else {
       database.prepare(fmt::format("SELECT 1 FROM \"{}\" NOT INDEXED LIMIT 1", table)).finish();
     }
   }
-}
-
-/// `hardy2013` of `hardy2013-6`; empty if there is no such name.
-std::string_view name_of_model(std::string_view version) {
-  const std::size_t end = version.rfind('-');
-  return end == version.npos ? std::string_view() : version.substr(0, end);
-}
-
-/// What its results are only that other model knows.
-void refuse_other_model(const Database& database, std::string_view version) {
-  const std::string_view name = name_of_model(version);
-  if (name.empty() || name == name_of_model(model().version())) return;
-  database.refuse(
-      fmt::format("is of the model {}, and this program has {}; --model-program names "
-                  "that of another model",
-                  version, model().version()));
 }
 
 /// What SQLite sees: comments name tables of the model.
@@ -142,28 +125,36 @@ std::string without_comments(std::string_view sql) {
 
 // Nothing of a file may be evaluated before its definition has been compared. That of the table
 // `campaign` does not depend on what the results are.
-ResultSchema stored_results(const Database& database, std::int64_t version) {
+StoredKind stored_kind(const Database& database, std::int64_t version) {
   constexpr std::string_view table = "table campaign";
-  ResultSchema of_example = example_results();
+  constexpr std::int64_t first_with_description = 12;
+  StoredKind of_example{.model = &model(), .results = example_results()};
   const SchemaObjects objects = schema_objects(database);
   const auto found = objects.find(std::string(table));
-  const SchemaObjects& expected = known_schemas(of_example).at(step_to(version));
+  const SchemaObjects& expected =
+      known_schemas(*of_example.model, of_example.results).at(step_to(version));
   if (found == objects.end() ||
       without_comments(found->second) != without_comments(expected.at(found->first))) {
     return of_example;
   }
-  Statement row = database.prepare("SELECT definition, model_version FROM campaign");
+  Statement row =
+      database.prepare(fmt::format("SELECT definition, model_version, {} FROM campaign",
+                                   version < first_with_description ? "''" : "model_description"));
   if (!row.step()) return of_example;
-  refuse_other_model(database, row.text(1));
-  return model().results_of(row.text(0), row.text(1));
+  try {
+    const Model& model = wire::stored_model(row.text(1), row.text(2));
+    return {.model = &model, .results = model.results_of(row.text(0), row.text(1))};
+  } catch (const wire::ModelProgramError& error) {
+    database.refuse(error.what());
+  }
 }
 
 }  // namespace
 
-std::vector<std::string> migrations(const ResultSchema& results) {
+std::vector<std::string> migrations(const Model& model, const ResultSchema& results) {
   std::vector<std::string> steps;
   for (const std::string_view file : schema_files()) {
-    steps.push_back(with_quantities(file, results));
+    steps.push_back(with_quantities(file, model, results));
   }
   return steps;
 }
@@ -172,7 +163,7 @@ std::int64_t schema_version() {
   return oldest_schema_version + static_cast<std::int64_t>(schema_files().size()) - 1;
 }
 
-ResultSchema check_kind(Database& database) {
+StoredKind check_kind(Database& database) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
     database.refuse(fmt::format("is not a Proofmass campaign: its application_id is {}, not {}", id,
@@ -182,17 +173,17 @@ ResultSchema check_kind(Database& database) {
   const ReadTransaction one_state(database);
   const StepLimit limit(database, steps_of_schema_max);
   const std::int64_t version = version_of(database);
-  ResultSchema results = stored_results(database, version);
-  check_schema(database, version, results);
-  return results;
+  StoredKind kind = stored_kind(database, version);
+  check_schema(database, version, *kind.model, kind.results);
+  return kind;
 }
 
-ResultSchema check_campaign_file(Database& database) {
-  ResultSchema results = check_kind(database);
-  check_small_tables(database);
+StoredKind check_campaign_file(Database& database) {
+  StoredKind kind = check_kind(database);
+  check_small_tables(database, *kind.model);
   const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
   if (num_campaigns != 1) database.refuse_as_damaged(fmt::format("campaigns = {}", num_campaigns));
-  return results;
+  return kind;
 }
 
 RowCounts check_all_pages(const Database& database) {
@@ -229,8 +220,9 @@ bool is_older(const Database& database) {
   return database.integer("PRAGMA user_version") < schema_version();
 }
 
-void check_schema(const Database& database, std::int64_t version, const ResultSchema& results) {
-  SchemaObjects expected = known_schemas(results).at(step_to(version));
+void check_schema(const Database& database, std::int64_t version, const Model& model,
+                  const ResultSchema& results) {
+  SchemaObjects expected = known_schemas(model, results).at(step_to(version));
   for (const auto& [name, sql] : schema_objects(database)) {
     const auto found = expected.find(name);
     if (found == expected.end()) database.refuse("has what is no part of a campaign: " + name);
@@ -255,9 +247,9 @@ std::string plain_definition(std::string sql) {
   return sql;
 }
 
-void migrate(Database& database, const ResultSchema& results) {
+void migrate(Database& database, const Model& model, const ResultSchema& results) {
   PROOFMASS_EXPECT(database.in_transaction());
-  const std::vector<std::string> steps = migrations(results);
+  const std::vector<std::string> steps = migrations(model, results);
   const std::int64_t before = database.integer("PRAGMA user_version");  // 0 of a new file.
   for (std::int64_t version = std::max(before + 1, oldest_schema_version);
        version <= schema_version(); ++version) {
@@ -267,11 +259,11 @@ void migrate(Database& database, const ResultSchema& results) {
   }
 }
 
-void migrate_privately(Database& database, const ResultSchema& results) {
+void migrate_privately(Database& database, const StoredKind& kind) {
   database.go_on_with_private_copy();
   database.distrust_content();
   Transaction transaction(database);
-  migrate(database, results);
+  migrate(database, *kind.model, kind.results);
   transaction.commit();
   database.execute("PRAGMA query_only = ON");  // What would be written is lost.
 }

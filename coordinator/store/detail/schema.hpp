@@ -9,6 +9,7 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -22,8 +23,14 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// oldest_schema_version, each further one leads to the next version.
 [[nodiscard]] std::span<const std::string_view> schema_files();
 
+/// What the tables of a campaign database and their columns follow from.
+struct StoredKind {
+  const Model* model = nullptr;  ///< Of the campaign; lives as long as the program.
+  ResultSchema results;          ///< What the results of the campaign are.
+};
+
 /// The schema as SQL: replaces each word in braces of a file of schema/ by the text that follows
-/// from the results of the campaign.
+/// from the model and the results of the campaign.
 ///
 ///     {data_tables}         the tables of data that all runs share
 ///     {truth_columns}       columns of run_result, one a line; also {estimate_columns},
@@ -42,14 +49,15 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 ///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
 ///     {digested_tables}     names of the tables that campaign.table_digest is of
 ///     {example_quantity}    its name, for comments; see example_quantity()
-[[nodiscard]] std::string with_quantities(std::string_view sql, const ResultSchema& results);
+[[nodiscard]] std::string with_quantities(std::string_view sql, const Model& model,
+                                          const ResultSchema& results);
 
 /// What holds for a row of run_result with a standard error, or its fit; empty if the campaign has
 /// none.
 [[nodiscard]] std::string has_standard_errors_sql(const ResultSchema& results);
 
 /// The schema files as SQL, see with_quantities().
-[[nodiscard]] std::vector<std::string> migrations(const ResultSchema& results);
+[[nodiscard]] std::vector<std::string> migrations(const Model& model, const ResultSchema& results);
 
 /// The version that this program reads and writes.
 [[nodiscard]] std::int64_t schema_version();
@@ -57,15 +65,15 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// Checks that a database is a campaign database, of a version that this program reads, and that
 /// its tables, views and indexes are those of its version and that there is nothing else. Nothing
 /// that the file defines is evaluated before its definition has been compared.
-/// @return What the results of its campaign are: the columns follow from it.
-/// @throws StoreError otherwise.
-ResultSchema check_kind(Database& database);
+/// @throws StoreError otherwise, or if the program does not know the model of its campaign and the
+///         file does not tell.
+StoredKind check_kind(Database& database);
 
 /// As check_kind(), and that the file is as long as it says, that there is one campaign, and that
 /// each page of the tables that do not grow with the runs is what it should be, and the first pages
 /// of the others. Takes the same time for any number of runs.
 /// @throws StoreError otherwise.
-ResultSchema check_campaign_file(Database& database);
+StoredKind check_campaign_file(Database& database);
 
 /// Rows of each table, by its name.
 using RowCounts = std::map<std::string, std::uint64_t>;
@@ -82,7 +90,8 @@ void check_after_unclean_end(const Database& database);
 /// Checks that each table, view and index is that of a file of this version, and that there is
 /// none else. Reads sqlite_schema only, so that nothing in the file can make it take long.
 /// @throws StoreError naming the first that is not.
-void check_schema(const Database& database, std::int64_t version, const ResultSchema& results);
+void check_schema(const Database& database, std::int64_t version, const Model& model,
+                  const ResultSchema& results);
 
 /// Whether a campaign database has an older version than this program writes.
 [[nodiscard]] bool is_older(const Database& database);
@@ -91,11 +100,11 @@ void check_schema(const Database& database, std::int64_t version, const ResultSc
 [[nodiscard]] std::string plain_definition(std::string sql);
 
 /// Brings the schema up to date, step by step. @pre Inside a transaction.
-void migrate(Database& database, const ResultSchema& results);
+void migrate(Database& database, const Model& model, const ResultSchema& results);
 
 /// Goes on with a private copy of an older file that is up to date; the file stays as it is.
 /// @throws StoreError if there is no room for the copy, or the file is damaged.
-void migrate_privately(Database& database, const ResultSchema& results);
+void migrate_privately(Database& database, const StoredKind& kind);
 
 /// A run without a delivery would be lent again and come back as a second result, and a result of a
 /// run that there is not would stand for one that is missing.

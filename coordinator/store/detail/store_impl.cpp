@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/schema.hpp"
 #include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
@@ -96,23 +95,21 @@ void copy_whole(const Database& database, const std::filesystem::path& file,
   copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
 }
 
-ResultSchema prepare_reader(Database& database, const std::filesystem::path& file) {
+StoredKind prepare_reader(Database& database, const std::filesystem::path& file) {
   configure(database);
-  ResultSchema results = check_campaign_file(database);
+  StoredKind kind = check_campaign_file(database);
   if (is_older(database)) {
-    migrate_privately(database, results);
+    migrate_privately(database, kind);
   } else {
     check_that_log_is_there(database, file);
   }
-  return results;
+  return kind;
 }
 
 }  // namespace detail
 
 Store::Impl::Impl(const std::filesystem::path& file)
-    : path(file),
-      database(file, Access::read_only),
-      results(detail::prepare_reader(database, file)) {}
+    : path(file), database(file, Access::read_only), kind(detail::prepare_reader(database, file)) {}
 
 Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock)
     : path(file),
@@ -122,7 +119,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   // The log may be that of another file: until all is checked, nothing of it may reach this one.
   database.fold_log_at_close(false);
   detail::configure(database);
-  results = detail::check_campaign_file(database);
+  kind = detail::check_campaign_file(database);
   // Before anything is changed: a file that cannot be served is left as it is.
   const detail::RowCounts counts = detail::check_all_pages(database);
   detail::check_after_unclean_end(database);
@@ -133,7 +130,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   // A log that had to grow gives the disk its space back when it begins anew.
   database.execute(fmt::format("PRAGMA journal_size_limit = {}", usual_log_size));
   Transaction transaction(database);
-  detail::migrate(database, results);
+  detail::migrate(database, *kind.model, kind.results);
   transaction.commit();
   detail::check_results(database, counts);
   is_perhaps_marked_ = says_that_log_is_needed(database);

@@ -9,6 +9,7 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
@@ -25,9 +26,8 @@ void copy_whole(const Database& database, const std::filesystem::path& file,
 
 /// Prepares a connection to a campaign database for reading: checks the file, and if it is of an
 /// older version goes on with a private copy, see Database::go_on_with_private_copy().
-/// @return What the results of its campaign are.
 /// @throws StoreError as Store::open_read_only() does.
-ResultSchema prepare_reader(Database& database, const std::filesystem::path& file);
+StoredKind prepare_reader(Database& database, const std::filesystem::path& file);
 
 }  // namespace detail
 
@@ -55,7 +55,7 @@ struct Store::Impl {
   std::unique_ptr<detail::StoreLock> lock;   ///< Of a coordinator; a reader has none.
   std::unique_ptr<detail::FilePlace> place;  ///< Of a coordinator. Closed after the database.
   detail::Database database;
-  ResultSchema results;                   ///< What the results of the campaign are.
+  detail::StoredKind kind;
   std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
   bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.
 

@@ -30,6 +30,7 @@ class MicroscopeCampaign final : public Campaign {
   std::string environment_file;        ///< As written in the campaign file; empty if harmonic.
   EnvironmentTable environment_table;  ///< Rows of that file; empty if harmonic.
 
+  [[nodiscard]] const Model& model() const override;
   void validate() const override;
   /// validate() of a campaign whose `table_columns` may be absent.
   /// @throws ConfigError naming the field, its value and the rule.

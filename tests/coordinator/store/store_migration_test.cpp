@@ -1,5 +1,5 @@
 // Files that older programs made: here those of the first version of the schema, while the newest
-// has the steps of the program and one more (schema/0011_later.sql).
+// has the steps of the program and one more (schema/0013_later.sql).
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -13,6 +13,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/results/results.hpp"
+#include "core/model.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -30,7 +31,7 @@ using ::testing::Not;
 /// A file of the older version with runs 0 and 1 by `näh`, run 4 by `worker-2`, and a note.
 void make_older(const std::filesystem::path& path) {
   Database old(path, Access::create);
-  old.execute(detail::migrations(test::schema())[0]);
+  old.execute(detail::migrations(model(), test::schema())[0]);
   old.execute(
       "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
       " VALUES (7, 'old', '42', 5, 'text', 'hardy2013-3', 'b')");
@@ -56,7 +57,7 @@ class StoreMigration : public test::StoreTest {
 };
 
 // If the linker took the library's own files, there would be one version less.
-TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 12); }
+TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 13); }
 
 TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   make_older_file();
@@ -66,7 +67,7 @@ TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   EXPECT_THAT(store.finished_runs(),
               ElementsAre(RunRange{RunIndex{0}, 2}, RunRange{RunIndex{4}, 1}));
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.integer("PRAGMA user_version"), 12);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 13);
   EXPECT_EQ(
       database.text("SELECT group_concat(run_index || ' ' || worker || ' ' || attempt || ' ' || "
                     "d.compute_s || ' ' || received_unix_s, ';') "

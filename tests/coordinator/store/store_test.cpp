@@ -235,9 +235,10 @@ TEST_F(StoreTest, KeepsTheDigestOfItsTables) {
         "UPDATE campaign SET name = 'x'", "UPDATE campaign SET seed = '2'",
         "UPDATE campaign SET num_runs = 5", "UPDATE campaign SET definition = 'x'",
         "UPDATE campaign SET model_version = 'x'", "UPDATE campaign SET build = 'x'",
-        "UPDATE campaign SET created_utc = 'x'", "UPDATE campaign SET campaign_uid = 7",
-        "UPDATE campaign SET owner = 'bert'", "UPDATE campaign SET stop_rule = ''",
-        "UPDATE campaign SET num_runs_max = NULL", "UPDATE campaign SET failures_max = 3"}) {
+        "UPDATE campaign SET model_description = 'x'", "UPDATE campaign SET created_utc = 'x'",
+        "UPDATE campaign SET campaign_uid = 7", "UPDATE campaign SET owner = 'bert'",
+        "UPDATE campaign SET stop_rule = ''", "UPDATE campaign SET num_runs_max = NULL",
+        "UPDATE campaign SET failures_max = 3"}) {
     const std::filesystem::path copy = directory() / "copy.db";
     store.back_up(copy);
     test::change(copy, change);

@@ -120,7 +120,7 @@ using SchemaTest = test::StoreTest;
 
 TEST_F(SchemaTest, HasStrictTablesOnly) {
   Database database(file(), Access::create);
-  database.execute(migrations(test::schema())[0]);
+  database.execute(migrations(model(), test::schema())[0]);
   EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_table_list WHERE type = 'table' AND NOT "
                              "strict AND name NOT LIKE 'sqlite%'"),
             0);

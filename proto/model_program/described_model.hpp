@@ -1,0 +1,115 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/dispersion.hpp"
+#include "core/model.hpp"
+#include "proto/model_program/program_description.hpp"
+
+namespace proofmass::wire {
+
+class DescribedModel;
+
+/// A campaign of a model that a description tells of.
+class DescribedCampaign final : public Campaign {
+ public:
+  /// @param of  Outlives it.
+  explicit DescribedCampaign(const DescribedModel& of);
+
+  std::vector<double> parameters;  ///< Of each of the description's.
+  std::vector<Dispersion> laws;    ///< Of each drawn quantity.
+
+  /// Takes what a campaign file changes. @throws DefinitionError
+  void read(Document& document);
+
+  [[nodiscard]] const Model& model() const override;
+  void validate() const override;
+  [[nodiscard]] std::unique_ptr<Campaign> clone() const override {
+    return std::make_unique<DescribedCampaign>(*this);
+  }
+  [[nodiscard]] std::unique_ptr<const Plan> prepare() const override;
+  /// As TOML, in the one form that Model::campaign_of() takes.
+  [[nodiscard]] Definition definition(TableColumns columns) const override;
+  [[nodiscard]] std::vector<DefinitionItem> items() const override;
+  [[nodiscard]] std::vector<DefinitionDifference> differences_from(
+      const Campaign& other) const override;
+  [[nodiscard]] ResultSchema results() const override;
+  [[nodiscard]] std::vector<double> objectives() const override { return objectives_; }
+  [[nodiscard]] std::int64_t num_rounds_max() const override { return 1; }
+  [[nodiscard]] std::vector<std::size_t> table_quantities() const override { return {}; }
+  [[nodiscard]] RunDraw draw(RunIndex run) const override;
+
+  [[nodiscard]] const ProgramDescription& description() const;
+
+ private:
+  const DescribedModel* model_;
+  std::vector<double> objectives_;
+};
+
+/// What a description lacks: the program itself, which computes.
+class RunnableProgram {
+ public:
+  virtual ~RunnableProgram() = default;
+
+  [[nodiscard]] virtual std::unique_ptr<const Plan> prepare(
+      const DescribedCampaign& campaign) const = 0;
+  /// Asks the program whether it accepts the parameters.
+  /// @throws ConfigError naming the one that it refuses; ModelProgramError
+  virtual void check(const DescribedCampaign& campaign) const = 0;
+};
+
+/// A model that a description tells of, with its program or without: then it does all that needs no
+/// simulation.
+class DescribedModel final : public Model {
+ public:
+  /// @param program  Null if it is not there: what needs it throws ModelProgramError.
+  DescribedModel(ProgramDescription description, std::unique_ptr<const RunnableProgram> program);
+  DescribedModel(const DescribedModel&) = delete;
+  DescribedModel& operator=(const DescribedModel&) = delete;
+
+  [[nodiscard]] std::string_view version() const override { return parts_.version; }
+  [[nodiscard]] std::string_view purpose() const override { return parts_.purpose; }
+  [[nodiscard]] ResultSchema results_of(std::string_view, std::string_view) const override;
+  [[nodiscard]] std::span<const DataTableSchema> tables() const override { return {}; }
+  [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_; }
+  [[nodiscard]] std::string_view step_name() const override { return "steps"; }
+  [[nodiscard]] std::size_t batch_size() const override { return parts_.runs_at_once; }
+  [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override;
+  [[nodiscard]] std::string_view description() const override { return parts_.text; }
+  [[nodiscard]] bool can_simulate() const override { return program_ != nullptr; }
+  [[nodiscard]] std::unique_ptr<Campaign> campaign_of(Definition definition, TableColumns,
+                                                      std::string_view source) const override;
+  [[nodiscard]] std::unique_ptr<Campaign> read_campaign(Document& document,
+                                                        DataFiles&) const override;
+  [[nodiscard]] std::string example() const override;
+  [[nodiscard]] std::string_view example_file() const override { return example_file_; }
+
+  [[nodiscard]] const ProgramDescription& parts() const { return parts_; }
+  /// @throws ModelProgramError that says how to name it if it is not there.
+  [[nodiscard]] const RunnableProgram& program() const;
+
+ private:
+  ProgramDescription parts_;
+  std::unique_ptr<const RunnableProgram> program_;
+  std::vector<DrawnQuantity> drawn_;
+  std::string example_file_;
+};
+
+/// The model of a stored campaign: model() if that is the one; else what its database says of it.
+/// It lives as long as the program, as do the texts of its results; the same description yields
+/// the same model.
+///
+/// @param version      Of the model that began the campaign.
+/// @param description  Model::description() of that one. Both may be anything at all.
+/// @throws ModelProgramError `is of the model ...` if there is no description of it, or one that
+///         breaks a rule; or if this program has read too many.
+[[nodiscard]] const Model& stored_model(std::string_view version, std::string_view description);
+
+}  // namespace proofmass::wire
