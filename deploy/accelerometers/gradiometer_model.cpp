@@ -10,16 +10,14 @@ namespace {
 constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
 constexpr std::array<std::string_view, 3> coupling_names{"yx", "zy", "yz"};
 
-/// One of the kinds of quantities: Σ over the three sensors of factor · unknown.
+/// Quantities of one kind: an element of each is Σ factor · unknown.
 struct Group {
   std::string_view name, symbol, unit_suffix, unit;
   double display_scale;
   std::string_view display_unit;
-  std::size_t first;                   ///< Unknown of the first sensor.
-  std::array<double, 3> factors;       ///< Of the three sensors.
-  std::array<std::size_t, 3> offsets;  ///< Of the unknown of each sensor.
-  std::vector<std::string> elements;
-  double Gradiometer::*objective;  ///< Null if there is none.
+  std::vector<std::pair<std::size_t, double>> terms;  ///< Of the first element: unknown, factor.
+  std::vector<std::string> elements;                  ///< Their unknowns are neighbours.
+  double Gradiometer::*objective;                     ///< Null if there is none.
 };
 
 std::vector<std::string> matrix_elements() {
@@ -42,9 +40,7 @@ const std::vector<Group>& groups() {
        "1",
        1e-6,
        "1e-6",
-       U::matrix,
-       {-0.5, 1.0, -0.5},
-       {0, 9, 18},
+       {{U::matrix, -0.5}, {U::matrix + 9, 1.0}, {U::matrix + 18, -0.5}},
        matrix_elements(),
        &G::matrix_objective},
       {"dm_d13",
@@ -53,9 +49,7 @@ const std::vector<Group>& groups() {
        "1",
        1e-6,
        "1e-6",
-       U::matrix,
-       {0.5, 0.0, -0.5},
-       {0, 9, 18},
+       {{U::matrix, 0.5}, {U::matrix + 18, -0.5}},
        matrix_elements(),
        &G::matrix_objective},
       {"k_1",
@@ -64,9 +58,7 @@ const std::vector<Group>& groups() {
        "s²/m",
        1.0,
        "s²/m",
-       U::quadratic,
-       {1.0, 0.0, 0.0},
-       {0, 3, 6},
+       {{U::quadratic, 1.0}},
        vector,
        &G::quadratic_objective_s2_m},
       {"k_2",
@@ -75,9 +67,7 @@ const std::vector<Group>& groups() {
        "s²/m",
        1.0,
        "s²/m",
-       U::quadratic,
-       {0.0, 1.0, 0.0},
-       {0, 3, 6},
+       {{U::quadratic + 3, 1.0}},
        vector,
        &G::quadratic_objective_s2_m},
       {"k_3",
@@ -86,9 +76,7 @@ const std::vector<Group>& groups() {
        "s²/m",
        1.0,
        "s²/m",
-       U::quadratic,
-       {0.0, 0.0, 1.0},
-       {0, 3, 6},
+       {{U::quadratic + 6, 1.0}},
        vector,
        &G::quadratic_objective_s2_m},
       {"w_d13",
@@ -97,9 +85,7 @@ const std::vector<Group>& groups() {
        "m",
        1e-6,
        "µm",
-       U::coupling,
-       {0.5, 0.0, -0.5},
-       {0, 0, 3},
+       {{U::coupling, 0.5}, {U::coupling + 3, -0.5}},
        coupling,
        nullptr},
       {"w_2_c13",
@@ -108,31 +94,17 @@ const std::vector<Group>& groups() {
        "m",
        1e-6,
        "µm",
-       U::coupling,
-       {-0.5, 0.0, -0.5},
-       {0, 0, 3},
+       {{U::coupling, -0.5}, {U::coupling + 3, -0.5}},
        coupling,
        &G::coupling_objective_m},
+      {"dr_c13", "δr_c13", "_m", "m", 1e-6, "µm", {{U::place, 1.0}}, {"x"}, &G::place_objective_m},
       {"dr_c13",
        "δr_c13",
        "_m",
        "m",
        1e-6,
        "µm",
-       U::place,
-       {1.0, 0.0, 0.0},
-       {0, 0, 0},
-       {"x"},
-       &G::place_objective_m},
-      {"dr_c13",
-       "δr_c13",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       U::place + 1,
-       {0.5, 0.0, 0.5},
-       {0, 0, 2},
+       {{U::place + 1, 0.5}, {U::place + 3, 0.5}},
        {"y", "z"},
        &G::place_objective_m},
       {"dr_d13",
@@ -141,10 +113,27 @@ const std::vector<Group>& groups() {
        "m",
        1e-6,
        "µm",
-       U::place + 1,
-       {0.5, 0.0, -0.5},
-       {0, 0, 2},
-       {"y", "z"},
+       {{U::place + 1, 0.5}, {U::place + 3, -0.5}},
+       {"y"},
+       &G::place_objective_m},
+      {"dr_d13",
+       "δr_d13",
+       "_m",
+       "m",
+       1e-6,
+       "µm",
+       {{U::place + 2, 0.5}, {U::place + 4, -0.5}},
+       {"z"},
+       nullptr},
+      // The y axis reads this times ω̇_x. What tells the two apart, other unknowns imitate almost.
+      {"w_yx_dr_z",
+       "W_yx − δr_z",
+       "_m",
+       "m",
+       1e-6,
+       "µm",
+       {{U::coupling, 0.5}, {U::coupling + 3, -0.5}, {U::place + 2, -0.5}, {U::place + 4, 0.5}},
+       {"d13"},
        &G::place_objective_m},
   };
   return groups;
@@ -207,12 +196,8 @@ const std::vector<Combination>& combinations() {
     std::vector<Combination> all;
     for (const Group& group : groups()) {
       for (std::size_t element = 0; element < group.elements.size(); ++element) {
-        Combination combination;
-        for (std::size_t i = 0; i < 3; ++i) {
-          if (group.factors[i] == 0.0) continue;
-          combination.terms.emplace_back(group.first + group.offsets[i] + element,
-                                         group.factors[i]);
-        }
+        Combination combination{group.terms};
+        for (auto& [unknown, factor] : combination.terms) unknown += element;
         all.push_back(std::move(combination));
       }
     }
