@@ -10,11 +10,18 @@ namespace {
 constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
 constexpr std::array<std::string_view, 3> coupling_names{"yx", "zy", "yz"};
 
-/// Quantities of one kind: an element of each is Σ factor · unknown.
-struct Group {
-  std::string_view name, symbol, unit_suffix, unit;
+struct Unit {
+  std::string_view suffix, unit;
   double display_scale;
   std::string_view display_unit;
+};
+constexpr Unit number{"", "1", 1e-6, "1e-6"}, curvature{"_s2_m", "s²/m", 1.0, "s²/m"},
+    metres{"_m", "m", 1e-6, "µm"};
+
+/// Quantities of one kind: an element of each is Σ factor · unknown.
+struct Group {
+  std::string_view name, symbol;
+  Unit unit;
   std::vector<std::pair<std::size_t, double>> terms;  ///< Of the first element: unknown, factor.
   std::vector<std::string> elements;                  ///< Their unknowns are neighbours.
   double Gradiometer::*objective;                     ///< Null if there is none.
@@ -30,111 +37,29 @@ std::vector<std::string> matrix_elements() {
 
 const std::vector<Group>& groups() {
   using G = Gradiometer;
-  using U = Unknowns;
-  const std::vector<std::string> vector(axes.begin(), axes.end());
-  const std::vector<std::string> coupling(coupling_names.begin(), coupling_names.end());
+  constexpr std::size_t m = Unknowns::matrix, k = Unknowns::quadratic, w = Unknowns::coupling,
+                        r = Unknowns::place;
+  const std::vector<std::string> matrix = matrix_elements(), vector(axes.begin(), axes.end()),
+                                 coupling(coupling_names.begin(), coupling_names.end());
+  constexpr auto dm = &G::matrix_objective, dk = &G::quadratic_objective_s2_m,
+                 dw = &G::coupling_objective_m, dr = &G::place_objective_m;
+  constexpr std::nullptr_t none = nullptr;
+  const std::vector<std::pair<std::size_t, double>> w_yx_less_r_z{
+      {w, 0.5}, {w + 3, -0.5}, {r + 2, -0.5}, {r + 4, 0.5}};
   static const std::vector<Group> groups{
-      {"dm_2_c13",
-       "dM₂ − dM_c13",
-       "",
-       "1",
-       1e-6,
-       "1e-6",
-       {{U::matrix, -0.5}, {U::matrix + 9, 1.0}, {U::matrix + 18, -0.5}},
-       matrix_elements(),
-       &G::matrix_objective},
-      {"dm_d13",
-       "dM_d13",
-       "",
-       "1",
-       1e-6,
-       "1e-6",
-       {{U::matrix, 0.5}, {U::matrix + 18, -0.5}},
-       matrix_elements(),
-       &G::matrix_objective},
-      {"k_1",
-       "K₁",
-       "_s2_m",
-       "s²/m",
-       1.0,
-       "s²/m",
-       {{U::quadratic, 1.0}},
-       vector,
-       &G::quadratic_objective_s2_m},
-      {"k_2",
-       "K₂",
-       "_s2_m",
-       "s²/m",
-       1.0,
-       "s²/m",
-       {{U::quadratic + 3, 1.0}},
-       vector,
-       &G::quadratic_objective_s2_m},
-      {"k_3",
-       "K₃",
-       "_s2_m",
-       "s²/m",
-       1.0,
-       "s²/m",
-       {{U::quadratic + 6, 1.0}},
-       vector,
-       &G::quadratic_objective_s2_m},
-      {"w_d13",
-       "W_d13",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       {{U::coupling, 0.5}, {U::coupling + 3, -0.5}},
-       coupling,
-       nullptr},
-      {"w_2_c13",
-       "W₂ − W_c13",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       {{U::coupling, -0.5}, {U::coupling + 3, -0.5}},
-       coupling,
-       &G::coupling_objective_m},
-      {"dr_c13", "δr_c13", "_m", "m", 1e-6, "µm", {{U::place, 1.0}}, {"x"}, &G::place_objective_m},
-      {"dr_c13",
-       "δr_c13",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       {{U::place + 1, 0.5}, {U::place + 3, 0.5}},
-       {"y", "z"},
-       &G::place_objective_m},
-      {"dr_d13",
-       "δr_d13",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       {{U::place + 1, 0.5}, {U::place + 3, -0.5}},
-       {"y"},
-       &G::place_objective_m},
-      {"dr_d13",
-       "δr_d13",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       {{U::place + 2, 0.5}, {U::place + 4, -0.5}},
-       {"z"},
-       nullptr},
+      {"dm_2_c13", "dM₂ − dM_c13", number, {{m, -0.5}, {m + 9, 1.0}, {m + 18, -0.5}}, matrix, dm},
+      {"dm_d13", "dM_d13", number, {{m, 0.5}, {m + 18, -0.5}}, matrix, dm},
+      {"k_1", "K₁", curvature, {{k, 1.0}}, vector, dk},
+      {"k_2", "K₂", curvature, {{k + 3, 1.0}}, vector, dk},
+      {"k_3", "K₃", curvature, {{k + 6, 1.0}}, vector, dk},
+      {"w_d13", "W_d13", metres, {{w, 0.5}, {w + 3, -0.5}}, coupling, none},
+      {"w_2_c13", "W₂ − W_c13", metres, {{w, -0.5}, {w + 3, -0.5}}, coupling, dw},
+      {"dr_c13", "δr_c13", metres, {{r, 1.0}}, {"x"}, dr},
+      {"dr_c13", "δr_c13", metres, {{r + 1, 0.5}, {r + 3, 0.5}}, {"y", "z"}, dr},
+      {"dr_d13", "δr_d13", metres, {{r + 1, 0.5}, {r + 3, -0.5}}, {"y"}, dr},
+      {"dr_d13", "δr_d13", metres, {{r + 2, 0.5}, {r + 4, -0.5}}, {"z"}, none},
       // The y axis reads this times ω̇_x. What tells the two apart, other unknowns imitate almost.
-      {"w_yx_dr_z",
-       "W_yx − δr_z",
-       "_m",
-       "m",
-       1e-6,
-       "µm",
-       {{U::coupling, 0.5}, {U::coupling + 3, -0.5}, {U::place + 2, -0.5}, {U::place + 4, 0.5}},
-       {"d13"},
-       &G::place_objective_m},
+      {"w_yx_dr_z", "W_yx − δr_z", metres, w_yx_less_r_z, {"d13"}, dr},
   };
   return groups;
 }
@@ -267,11 +192,11 @@ ResultSchema Gradiometer::results() const {
   for (const Group& group : groups()) {
     for (const std::string& element : group.elements) {
       schema.quantities.push_back({.name = fmt::format("{}_{}", group.name, element),
-                                   .unit_suffix = group.unit_suffix,
+                                   .unit_suffix = group.unit.suffix,
                                    .symbol = symbols[schema.quantities.size()],
-                                   .unit = group.unit,
-                                   .display_scale = group.display_scale,
-                                   .display_unit = group.display_unit,
+                                   .unit = group.unit.unit,
+                                   .display_scale = group.unit.display_scale,
+                                   .display_unit = group.unit.display_unit,
                                    .has_standard_error = true});
       if (group.objective != nullptr) schema.quantities.back().objective = this->*group.objective;
     }

@@ -24,16 +24,15 @@ namespace proofmass {
 // defaults, and
 //
 //     static constexpr std::string_view name, version, purpose, step_name, example_file;
-//     static constexpr std::uint64_t num_runs;                Of the example campaign.
-//     static std::span<const SettingInfo<Settings>> infos();  Its keys, each table's together.
+//     static constexpr std::uint64_t num_runs;                // Of the example campaign.
+//     static std::span<const SettingInfo<Settings>> infos();  // Its keys, each table's together.
 //     static std::span<const DrawnQuantity> drawn();
-//     void check() const;                                     Throws ConfigError: rules about
-//     several keys. ResultSchema results() const;                           With the objectives.
+//     void check() const;                 // Throws ConfigError: the rules about several keys.
+//     ResultSchema results() const;       // With the objectives.
 //     std::int64_t num_rounds_max() const;
-//     std::vector<double> deviations() const;                 Of each drawn quantity.
-//     std::vector<double> means() const;
+//     std::vector<double> means() const;  // Of each drawn quantity; deviations() likewise.
 //     std::vector<double> truth(std::span<const double> drawn) const;
-//     Settings reference() const;                             Short, for the digest.
+//     Settings reference() const;         // Short, for the digest.
 //     using Simulator = ...;
 //
 // A Simulator is what runs share: made of Settings, with `Recording recording`, `int num_steps()`
