@@ -1,0 +1,33 @@
+#pragma once
+
+#include "core/math/vector3.hpp"
+
+namespace proofmass {
+
+/// Angular motion of the satellite in its frame: x along track, y across track, z radial.
+struct Rotation {
+  Vector3<double> rate_rad_s;           ///< ω
+  Vector3<double> acceleration_rad_s2;  ///< ω̇
+  Vector3<double> angle_rad;            ///< Of the satellite from the orbit's frame, small.
+};
+
+/// What a place r in the satellite has as acceleration more than the origin, per metre of r:
+///
+///     G = −V + Ω² + Ω̇,   Ω = [ω×],   Ω² = ωωᵀ − |ω|² I
+///
+/// V is the gravity gradient of a point mass on a circular orbit, n² diag(−1, −1, 2), turned by
+/// small angles to first order, V ← V + VΘ − ΘV with Θ = [θ×].
+///
+/// @param orbit_rate_rad_s  n > 0.
+[[nodiscard]] inline Matrix3<double> acceleration_gradient(const Rotation& rotation,
+                                                           double orbit_rate_rad_s) {
+  const double n2 = orbit_rate_rad_s * orbit_rate_rad_s;
+  const Vector3<double>& w = rotation.rate_rad_s;
+  const Vector3<double>& a = rotation.acceleration_rad_s2;
+  const double v_xz = -3.0 * n2 * rotation.angle_rad.y, v_yz = 3.0 * n2 * rotation.angle_rad.x;
+  return {{{{n2 - w.y * w.y - w.z * w.z, w.x * w.y - a.z, w.x * w.z + a.y - v_xz},
+            {w.x * w.y + a.z, n2 - w.x * w.x - w.z * w.z, w.y * w.z - a.x - v_yz},
+            {w.x * w.z - a.y - v_xz, w.y * w.z + a.x - v_yz, -2.0 * n2 - w.x * w.x - w.y * w.y}}}};
+}
+
+}  // namespace proofmass
