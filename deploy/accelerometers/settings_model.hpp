@@ -55,6 +55,7 @@ class SettingsCampaign final : public Campaign {
 
   Settings settings;
 
+  [[nodiscard]] const Model& model() const override { return built_in_model(); }
   void validate() const override {
     check_identity(*this);
     check_table_columns(*this, {});
