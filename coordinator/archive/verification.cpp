@@ -18,7 +18,7 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::string_view program_missing =
-    "its program is not here, --model-program names it: the file itself says what the model is";
+    "its program is not here; name it with --model-program";
 
 /// The checks of one file, each made once, in order.
 class Verification {

@@ -274,9 +274,9 @@ const DescribedModel& described_model(std::string_view text) {
   const auto known = models.find(text);
   if (known != models.end()) return known->second;
   if (size + text.size() > descriptions_size_max) {
-    throw ModelProgramError(fmt::format(
-        "description: this program has read {} others, of {} bytes; start it again", models.size(),
-        size));
+    throw ModelProgramError(
+        fmt::format("description: this program has read {} others, of {} bytes; start it again",
+                    models.size(), size));
   }
   const auto made = models.try_emplace(std::string(text), description_in(text), nullptr).first;
   size += text.size();

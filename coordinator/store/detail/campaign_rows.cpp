@@ -113,7 +113,7 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
           " model_description, build, campaign_uid, first_version)"
           " VALUES (1, ?, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
-           campaign.model().version(), campaign.model().description(),
+           campaign.model().version(), std::string(campaign.model().description()),
            std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
   insert_parameters(database, campaign);
   insert_data_tables(database, campaign);
