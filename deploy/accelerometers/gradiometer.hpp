@@ -35,7 +35,7 @@ inline constexpr std::array<std::array<std::size_t, 2>, 3> coupling_places{
     {{1, 0}, {2, 1}, {1, 2}}};
 
 /// An accelerometer as it is, or as it is estimated.
-struct Sensor {
+struct Accelerometer {
   Matrix3<double> matrix;     ///< M
   Vector3<double> quadratic;  ///< Diagonal of K, s²/m.
   Matrix3<double> coupling;   ///< W, m.
@@ -44,10 +44,11 @@ struct Sensor {
 
 /// @param unknowns  Shape [Unknowns::count].
 /// @param length_m  From the first sensor to the third.
-[[nodiscard]] std::array<Sensor, 3> sensors_of(std::span<const double> unknowns, double length_m);
+[[nodiscard]] std::array<Accelerometer, 3> sensors_of(std::span<const double> unknowns,
+                                                      double length_m);
 
 /// yᵢ without its noise, m/s².
-[[nodiscard]] Vector3<double> reading(const Sensor& sensor, const Vector3<double>& a_ng_m_s2,
+[[nodiscard]] Vector3<double> reading(const Accelerometer& sensor, const Vector3<double>& a_ng_m_s2,
                                       const Matrix3<double>& gradient,
                                       const Vector3<double>& angular_rad_s2);
 

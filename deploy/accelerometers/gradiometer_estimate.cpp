@@ -36,7 +36,7 @@ struct SignalTable {
 
 /// a_ng of one sample, and all that the fit takes of it.
 void add_sample(const Measurement& measurement, std::size_t sample, double orbit_rate_rad_s,
-                const std::array<Sensor, 3>& sensors, SignalTable& table) {
+                const std::array<Accelerometer, 3>& sensors, SignalTable& table) {
   const Rotation& rotation = measurement.rotation[sample];
   const Matrix3<double> gradient = acceleration_gradient(rotation, orbit_rate_rad_s);
   Vector3<double> a_ng;
@@ -63,8 +63,8 @@ void add_sample(const Measurement& measurement, std::size_t sample, double orbit
 }
 
 /// Of sensor i's reading, with a_ng held.
-AxisDerivatives derivatives_of_sensor(const std::array<Sensor, 3>& sensors, std::size_t i) {
-  const Sensor& sensor = sensors[i];
+AxisDerivatives derivatives_of_sensor(const std::array<Accelerometer, 3>& sensors, std::size_t i) {
+  const Accelerometer& sensor = sensors[i];
   AxisDerivatives of{};
   for (std::size_t p = 0; p < 3; ++p) {
     for (std::size_t q = 0; q < 3; ++q) {
@@ -101,7 +101,7 @@ void accumulate(Derivatives& target, double factor, const Derivatives& source) {
 
 /// Of y_d and y_c, x to z each, with the a_ng that follows from the estimates: it moves by minus
 /// the mean of what the readings move by.
-std::array<Derivatives, 6> derivatives(const std::array<Sensor, 3>& sensors) {
+std::array<Derivatives, 6> derivatives(const std::array<Accelerometer, 3>& sensors) {
   std::array<AxisDerivatives, 3> of;
   for (std::size_t i = 0; i < 3; ++i) of[i] = derivatives_of_sensor(sensors, i);
   AxisDerivatives a_ng{};
@@ -202,7 +202,7 @@ Fit fit(const Gradiometer& settings, const FourierTransform& transform,
   Fit fit{.unknowns = std::vector<double>(Unknowns::count)};
   while (!fit.has_converged && fit.num_rounds < settings.num_rounds_max()) {
     ++fit.num_rounds;
-    const std::array<Sensor, 3> sensors = sensors_of(fit.unknowns, settings.length_m);
+    const std::array<Accelerometer, 3> sensors = sensors_of(fit.unknowns, settings.length_m);
     SignalTable table;
     for (std::size_t j = 0; j < transform.size(); ++j) {
       add_sample(measurement, j, settings.orbit_rate_rad_s(), sensors, table);

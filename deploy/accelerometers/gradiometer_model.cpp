@@ -81,8 +81,8 @@ Matrix3<double> unit_matrix() { return {{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0
 
 }  // namespace
 
-std::array<Sensor, 3> sensors_of(std::span<const double> unknowns, double length_m) {
-  std::array<Sensor, 3> sensors{};
+std::array<Accelerometer, 3> sensors_of(std::span<const double> unknowns, double length_m) {
+  std::array<Accelerometer, 3> sensors{};
   for (std::size_t i = 0; i < 3; ++i) {
     sensors[i].matrix = unit_matrix();
     for (std::size_t p = 0; p < 3; ++p) {
@@ -103,7 +103,7 @@ std::array<Sensor, 3> sensors_of(std::span<const double> unknowns, double length
   return sensors;
 }
 
-Vector3<double> reading(const Sensor& sensor, const Vector3<double>& a_ng_m_s2,
+Vector3<double> reading(const Accelerometer& sensor, const Vector3<double>& a_ng_m_s2,
                         const Matrix3<double>& gradient, const Vector3<double>& angular_rad_s2) {
   const Vector3<double> a = gradient * sensor.place_m + a_ng_m_s2;
   return sensor.matrix * a + scaled(sensor.quadratic, scaled(a, a)) +

@@ -140,7 +140,7 @@ Measurement measure(const Gradiometer& settings, const FourierTransform& transfo
   }
   const std::vector<Rotation> rotation = rotations(true_axes, orbit_rate);
   Measurement measurement{.rotation = rotations(measured_axes, orbit_rate)};
-  const std::array<Sensor, 3> sensors = sensors_of(unknowns, settings.length_m);
+  const std::array<Accelerometer, 3> sensors = sensors_of(unknowns, settings.length_m);
   for (std::size_t i = 0; i < 3; ++i) {
     std::array<Record, 3> noise_records;
     for (std::size_t axis = 0; axis < 3; ++axis) {

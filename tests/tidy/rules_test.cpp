@@ -62,6 +62,8 @@ TEST(CheckLayers, WantIncludesWrittenFromTheRoot) {
   EXPECT_THAT(layers("coordinator/store/a.cpp", "\"core/runs.hpp\""), IsEmpty());
   EXPECT_THAT(layers("coordinator/store/a.cpp", "<core/microscope/a.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("tests/store/a.cpp", "\"tests/test.hpp\""), IsEmpty());
+  EXPECT_THAT(layers("deploy/project/a.cpp", "\"a.hpp\""), IsEmpty());
+  EXPECT_THAT(layers("deploy/project/a.cpp", "\"../b/a.hpp\""), SizeIs(1));
 }
 
 // The parts in their order: whatever comes later may include what comes earlier, never the other
