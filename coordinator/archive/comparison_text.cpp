@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -63,10 +64,16 @@ Table definition_table(std::span<const ComparedMember> members, const MemberName
   const auto keys = differing_keys(members, names);
   if (keys.empty()) return {.remarks = {{"The definitions agree."}}};
   Table table{.columns = {{"the definitions differ in", true}, {"value", true}, {"of", true}}};
+  constexpr std::size_t value_begin = 40;  // Leaves room for most keys, and for the campaigns.
   for (const auto& [key, values] : keys) {
     for (const auto& [value, of] : values) {
       const bool is_first = &value == &values.front().first;
-      table.rows.push_back({is_first ? key : "", value, fmt::format("{}", fmt::join(of, " "))});
+      table.rows.push_back({is_first ? key : "", "", fmt::format("{}", fmt::join(of, " "))});
+      std::istringstream lines(wrapped(value, value_begin, value_begin));
+      for (std::string line; std::getline(lines >> std::ws, line);) {
+        if (!table.rows.back()[1].text.empty()) table.rows.push_back({"", "", ""});
+        table.rows.back()[1] = line;
+      }
     }
   }
   return table;

@@ -77,6 +77,12 @@ Json parameters_of(const std::vector<Quantity>& quantities, const std::vector<do
                    {"unit", quantities[i].unit},
                    {"objective", objectives[i]}};  // Infinity becomes null.
     parameter.update(statistics_of(statistics.accuracy[i], statistics.num_estimated));
+    if (!std::isfinite(objectives[i])) {
+      for (const char* key : {"num_beyond_objective", "fraction_beyond_objective",
+                              "fraction_beyond_objective_interval"}) {
+        parameter[key] = nullptr;
+      }
+    }
     json.push_back(std::move(parameter));
   }
   return json;

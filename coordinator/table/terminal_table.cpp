@@ -200,10 +200,10 @@ std::string TerminalTable::text() const {
     }
   }
   for (const Remark& remark : table_.remarks) {
-    const std::string visible = wire::visible_text(remark.text);
-    text += in_tone(style_.cuts_remarks ? shortened(visible, style_.line_width_max) : visible,
-                    remark.tone, style_.paint) +
-            "\n";
+    std::string visible = wire::visible_text(remark.text);
+    if (style_.cuts_remarks) visible = shortened(visible, style_.line_width_max);
+    if (display_width(visible) > style_.line_width_max) visible = wrapped(visible, 2, 0);
+    text += in_tone(visible, remark.tone, style_.paint) + "\n";
   }
   for (const std::string& note : table_.notes)
     text += wrapped(wire::visible_text(note), 2, 0) + "\n";

@@ -178,14 +178,20 @@ class VerdictRule {
     return end_of_counts(num_runs, [&](double k) { return shows_less(k, num_runs); });
   }
 
-  /// Runs that meet it with so many exceedances among them.
+  /// The fewest runs that meet it with so many exceedances among them.
   [[nodiscard]] std::optional<std::uint64_t> runs_to_meet(const ExceedanceCount& count) const {
     const auto k = static_cast<double>(count.num_exceedances);
-    const bool is_fixed_ahead = num_fixed_ && *num_fixed_ > count.num_runs;
-    if (is_fixed_ahead &&
-        fixed_verdict(k, static_cast<double>(*num_fixed_)) == RequirementVerdict::met) {
-      return num_fixed_;
-    }
+    const std::optional<std::uint64_t> sequential = sequential_runs_to_meet(k, count);
+    const bool is_met_at_fixed =
+        num_fixed_ && *num_fixed_ > count.num_runs &&
+        fixed_verdict(k, static_cast<double>(*num_fixed_)) == RequirementVerdict::met;
+    if (!is_met_at_fixed || (sequential && *sequential < *num_fixed_)) return sequential;
+    return num_fixed_;
+  }
+
+ private:
+  [[nodiscard]] std::optional<std::uint64_t> sequential_runs_to_meet(
+      double k, const ExceedanceCount& count) const {
     std::uint64_t too_few = count.num_runs;
     std::uint64_t enough = count.num_runs;
     do {
@@ -200,7 +206,6 @@ class VerdictRule {
     return enough;
   }
 
- private:
   [[nodiscard]] RequirementVerdict fixed_verdict(double k, double n) const {
     if (tolerance_.is_shown(binomial_at_most(k, n, allowed_rate_))) return RequirementVerdict::met;
     if (tolerance_.is_shown(binomial_at_least(k, n, allowed_rate_)))

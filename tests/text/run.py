@@ -293,6 +293,7 @@ def run_file(path, programs, is_update, time_max_s=400):
 
 
 def main():
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # Past what ends the shell.
     parser = argparse.ArgumentParser(description="Runs the sessions that text files show.")
     parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
     parser.add_argument("--update", action="store_true", help="write what was printed into FILE")

@@ -3,6 +3,8 @@
 
 import contextlib
 import io
+import os
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -44,12 +46,26 @@ def passes(text, is_update=False):
         return path.read_text(encoding="utf-8") if is_update else result
 
 
+def ends_its_shell():
+    """Whether SIGTERM, as of ctest or a service manager, leaves no process of the session."""
+    with tempfile.TemporaryDirectory() as directory:
+        path, pipe = Path(directory, "a.test"), Path(directory, "pipe")
+        os.mkfifo(pipe)
+        path.write_text(f"  $ echo $$ >{pipe}; sleep 1000\n", encoding="utf-8")
+        runner = subprocess.Popen([sys.executable, run.__file__, "--programs", directory, path])
+        shell = int(pipe.read_text(encoding="utf-8"))
+        runner.terminate()
+        return runner.wait() == 143 and not Path(f"/proc/{shell}").exists()
+
+
 def main():
     wrong = [text for text in PASSING if passes(text) is not True]
     wrong += [text for text in FAILING if passes(text) is not False]
     updated = passes("  $ echo a; echo 1; date -u +%FT%TZ\n  b\n  {number}\n\n  $ echo c\n  c", True)
     if updated != "  $ echo a; echo 1; date -u +%FT%TZ\n  a\n  {number}\n  {time}\n\n  $ echo c\n  c\n":
         wrong.append(updated)
+    if not ends_its_shell():
+        wrong.append("SIGTERM leaves the shell")
     print(*wrong, sep="\n---\n")
     return 1 if wrong else 0
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
@@ -226,6 +227,13 @@ AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) 
   const std::size_t least = static_cast<std::size_t>(rule.minimum) * of_file.size();
   const std::size_t most = static_cast<std::size_t>(rule.maximum) * of_file.size();
   const auto number = static_cast<std::size_t>(in_all);
+  if (number < least && !options.num_steps) {
+    throw UsageError(
+        fmt::format("--minimum = {} (must be at most {}, as the file has {} {} for {} "
+                    "sessions; or give --{})",
+                    rule.minimum, number / of_file.size(), in_all, model().step_name(),
+                    of_file.size(), model().step_name()));
+  }
   if (number < least) refuse("more", least, fmt::format("--minimum {}", rule.minimum));
   if (number > most) refuse("fewer", most, fmt::format("at most {}", rule.maximum));
   const PlanBound bound = study.bound(of_file);
@@ -267,6 +275,15 @@ Allocated allocated(const PlanOptions& options, const PlanStudy& study) {
   return {.num_steps = std::move(num_steps), .is_interrupted = is_stopped()};
 }
 
+/// Says that the new file has another method than the campaign: that of the bound.
+void print_changed_method(const Campaign& campaign, const std::string& method) {
+  for (const DefinitionItem& item : campaign.items()) {
+    if (!item.key.ends_with(".method") || item.value == DefinitionValue(method)) continue;
+    print_lines(fmt::format("changed {}: \"{}\" to \"{}\"\n", item.key,
+                            std::get<std::string>(item.value), method));
+  }
+}
+
 /// Writes the best allocation, or the best so far if a signal ends the search.
 int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStudy& study) {
   Allocated best = allocated(options, study);
@@ -283,6 +300,7 @@ int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStu
   print_plan(options, plan);
   if (options.format == OutputFormat::text) {
     print_lines(fmt::format("wrote {}\n", options.new_file.string()));
+    print_changed_method(campaign, plan.method);
   }
   if (!best.is_interrupted) return exit_code_of(plan);
   wire::say("proofmass: interrupted; this is the best allocation found so far\n");

@@ -1,12 +1,11 @@
+#include "coordinator/cli/commands/verify.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstddef>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "coordinator/archive/verification.hpp"
-#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -31,37 +30,40 @@ Json json_of_check(const Check& check) {
           {"details", check.details}};
 }
 
-void print_checks(const std::filesystem::path& database, std::size_t num_failing,
-                  const Json& checks) {
-  print_json({{"file", database.string()}, {"num_failing", num_failing}, {"checks", checks}});
-}
-
 int verify_database(const VerifyCommandOptions& options) {
   return run_until_stopped([&](const IsStopped& is_stopped) {
     const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
-    const bool is_json = options.format == OutputFormat::json;
-    std::size_t num_failing = 0, num_checks = 0;
-    Json checks = Json::array();
-    const auto report = [&](const Check& check) {
-      ++num_checks;
-      if (check.verdict == CheckOutcome::fails) ++num_failing;
-      if (is_json) {
-        checks.push_back(json_of_check(check));
-        return;
-      }
-      write_standard_output(check_text(check, style_of(stdout).paint));
-      flush_standard_output();  // The simulation may take long.
-    };
-    const bool holds = verify(options.database, how, report, is_stopped);
-    if (is_json) print_checks(options.database, num_failing, checks);
-    if (holds) return exit_done;
-    wire::say(fmt::format("proofmass: error: {}: {} of {} checks {}\n", options.database.string(),
-                          num_failing, num_checks, num_failing == 1 ? "fails" : "fail"));
-    return exit_cannot_be_done;
+    return print_checks(options.database, options.format, [&](const auto& report) {
+      return verify(options.database, how, report, is_stopped);
+    });
   });
 }
 
 }  // namespace
+
+int print_checks(const std::filesystem::path& file, OutputFormat format,
+                 const std::function<bool(const std::function<void(const Check&)>&)>& make_checks) {
+  const bool is_json = format == OutputFormat::json;
+  std::size_t num_failing = 0, num_checks = 0;
+  Json checks = Json::array();
+  const bool holds = make_checks([&](const Check& check) {
+    ++num_checks;
+    if (check.verdict == CheckOutcome::fails) ++num_failing;
+    if (is_json) {
+      checks.push_back(json_of_check(check));
+      return;
+    }
+    write_standard_output(check_text(check, style_of(stdout).paint));
+    flush_standard_output();  // The simulation may take long.
+  });
+  if (is_json) {
+    print_json({{"file", file.string()}, {"num_failing", num_failing}, {"checks", checks}});
+  }
+  if (holds) return exit_done;
+  wire::say(fmt::format("proofmass: error: {}: {} of {} checks {}\n", file.string(), num_failing,
+                        num_checks, num_failing == 1 ? "fails" : "fail"));
+  return exit_cannot_be_done;
+}
 
 void add_verify(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<VerifyCommandOptions>(

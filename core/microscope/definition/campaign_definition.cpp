@@ -99,8 +99,10 @@ class MagnitudeCheck {
   /// @param value  That its expression has in a run.
   void run(const Dispersion& law, RunIndex run, double value) const {
     if (is_in(value)) return;
+    // The root of a negative number is none.
+    const std::string drawn = std::isnan(value) ? "no number" : fmt::format("{}", value);
     throw ConfigError(path_ + ".expression", fmt::format("\"{}\"", law.expression),
-                      fmt::format("run {} would draw {}, {}", run.value, value, rule()));
+                      fmt::format("run {} would draw {}, {}", run.value, drawn, rule()));
   }
 
   /// @param column  The values of the quantity's table, one a run.

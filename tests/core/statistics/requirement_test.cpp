@@ -158,6 +158,17 @@ TEST(CheckRequirement, SaysHowManyRunsItTakesAfterAnExceedance) {
   EXPECT_EQ(runs_to_meet({0.99, 0.95}, one_of_300, 473), 473u);
 }
 
+// A look before the fixed number may meet it, too: the fewest are those after which decide() says
+// so, of which many are tried one after the other.
+TEST(CheckRequirement, SaysTheFewestRunsWhileAFixedNumberIsAhead) {
+  for (const std::uint64_t num_fixed : {60u, 100u, 1000u}) {
+    std::uint64_t least = 10;
+    while (decide({0.95, 0.95}, {.num_runs = least}, num_fixed).verdict != RequirementVerdict::met)
+      ++least;
+    EXPECT_EQ(runs_to_meet({0.95, 0.95}, {.num_runs = 10}, num_fixed), least) << num_fixed;
+  }
+}
+
 // Two of 100 go on as often: there is no exceedance, nor a part of one, before the last run.
 TEST(CheckRequirement, DecidesWithTheRunsThatItSaysIfTheRateStays) {
   const Tolerance tolerance{0.99, 0.95};
