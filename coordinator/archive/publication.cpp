@@ -60,15 +60,18 @@ void write_file(const path& file, std::string_view text, wire::IfThere if_there)
 /// @param arguments  `$1` and so on.
 /// @return The first line of what it writes to standard error; empty if all went well.
 std::string complaint_of(const WorkDirectory& work, const char* script,
-                         std::initializer_list<std::string> arguments) {
+                         std::initializer_list<std::string> arguments,
+                         const IsStopped& is_stopped) {
   const path complaints = work.place / "complaints";
   std::vector<std::string> words{
       "/bin/sh", "-c", fmt::format("export LC_ALL=C\nexec 2>\"$0\"\n{}", script), complaints};
   words.insert(words.end(), arguments);
   const int status = wire::wait_for_end(wire::start_program({.arguments = words}));
+  if (is_stopped()) throw Interrupted();
   const std::string text = text_of(complaints);
-  if (text.empty() && status != 0) return wire::end_text(status);
-  return wire::visible_text(text.substr(0, text.find('\n')));
+  const std::size_t begin = text.find_first_not_of('\n');  // gzip begins with an empty line.
+  if (begin == std::string::npos) return status == 0 ? "" : wire::end_text(status);
+  return wire::visible_text(text.substr(begin, text.find('\n', begin) - begin));
 }
 
 // What is written.
@@ -151,10 +154,10 @@ std::string readme_of(const Store& store, std::string_view digest) {
 - `CITATION.cff`: how to cite them
 - `SHA256SUMS`: checksums of all files, for `sha256sum --check SHA256SUMS`
 
-These commands repeat the campaign and compare it bit by bit:
+These commands repeat the campaign, and print its digest again if every bit is the same:
 
     {}
-    proofmass compare campaign.db again.db
+    proofmass report again.db | grep {}
 
 `proofmass publish --check ARCHIVE` checks all files, and computes some runs again.
 
@@ -162,7 +165,7 @@ Made by {}, model {}; database schema {}; archive made on a processor with {}.
 )",
       store.name(), num_finished, store.num_runs(),
       is_whole ? "" : " **The campaign is not finished.**", digest, command_of(store.stop_plan()),
-      store.build(), store.model_version(), detail::schema_version(),
+      digest, store.build(), store.model_version(), detail::schema_version(),
       name_of(best_instruction_set()));
 }
 
@@ -216,7 +219,8 @@ chmod -R u+rwX .
 other=$(find . -mindepth 1 \( -path './*/*' \( ! -type f -o -links +1 -o -path './*/*/*' \) \
   -o ! -path './*/*' ! -type d \) -print -quit)
 [ -z "$other" ] || echo "$other: is no plain file of one folder" >&2
-[ "$(ls -A | wc -l)" = 1 ] || echo "it must have one folder" >&2)sh";
+[ "$(ls -A | wc -l)" = 1 ] || echo "it must have one folder" >&2
+[ -f ./*/campaign.db ] || echo "it has no campaign.db" >&2)sh";
 
 constexpr const char* sums_script = R"sh(
 cd "$1" || exit
@@ -224,7 +228,7 @@ sha256sum --check --quiet --strict SHA256SUMS >&2
 [ "$(ls -A | wc -l)" = $(($(wc -l <SHA256SUMS) + 1)) ] || echo "a file has no checksum" >&2)sh";
 
 /// Unpacks an archive. @return Its folder.
-path unpacked(const path& archive, const WorkDirectory& work) {
+path unpacked(const path& archive, const WorkDirectory& work, const IsStopped& is_stopped) {
   const auto refuse = [&](std::string_view why) {
     throw ArchiveError(fmt::format("archive = {} ({})", archive.string(), why));
   };
@@ -237,7 +241,8 @@ path unpacked(const path& archive, const WorkDirectory& work) {
   const std::string complaint =
       complaint_of(work, unpack_script,
                    {std::filesystem::absolute(archive),
-                    fmt::to_string(std::max(unpacked_size_max, 64 * size)), place});
+                    fmt::to_string(std::max(unpacked_size_max, 64 * size)), place},
+                   is_stopped);
   if (!complaint.empty()) refuse("cannot be unpacked: " + complaint);
   return *std::filesystem::directory_iterator(place);
 }
@@ -267,12 +272,12 @@ void publish(const path& database, const path& archive, wire::IfThere if_there,
   original.back_up(place / database_name);
   write_texts(place, authors, is_stopped);
   wire::DraftFile draft("output", archive);
-  const std::string complaint = complaint_of(
-      work, pack_script, {work.place, folder, std::filesystem::absolute(draft.draft())});
+  const std::string complaint =
+      complaint_of(work, pack_script,
+                   {work.place, folder, std::filesystem::absolute(draft.draft())}, is_stopped);
   if (!complaint.empty()) {
     throw Error(fmt::format("output = {} (cannot be written: {})", archive.string(), complaint));
   }
-  if (is_stopped()) throw Interrupted();
   draft.publish(if_there);
 }
 
@@ -280,8 +285,8 @@ bool check_publication(const path& archive, const VerifyOptions& options,
                        const std::function<void(const Check&)>& report,
                        const IsStopped& is_stopped) {
   const WorkDirectory work;
-  const path folder = unpacked(archive, work);
-  const std::string complaint = complaint_of(work, sums_script, {folder});
+  const path folder = unpacked(archive, work, is_stopped);
+  const std::string complaint = complaint_of(work, sums_script, {folder}, is_stopped);
   Check sums = complaint.empty() ? Check::holds("of every file") : Check::fails(complaint);
   Check campaign;
   try {
