@@ -115,7 +115,7 @@ void write_campaign(const Campaign& campaign, const path& folder) {
   const Definition definition = campaign.definition(TableColumns::left_out);
   Overrides overrides{.assignments = write_draws(campaign, folder)};
   for (const auto& [key, width, values] : definition.tables) {
-    const auto schema = std::ranges::find(model().tables(), key, &DataTableSchema::key);
+    const auto schema = std::ranges::find(campaign.model().tables(), key, &DataTableSchema::key);
     const std::string name = key.substr(0, key.find('.')) + ".csv";
     write_csv(folder / name, schema->columns, values.size() / width,
               [&](auto row, auto column) { return values[row * width + column]; });

@@ -25,8 +25,7 @@ void publish(const std::filesystem::path& database, const std::filesystem::path&
 ///
 /// @param report  As of verify().
 /// @return True if no check fails.
-/// @throws ArchiveError `archive = FILE (why)` if it is not one folder with plain files, is
-/// damaged,
+/// @throws ArchiveError `archive = FILE (why)` if it is not one folder with plain files, is damaged
 ///         or unpacks to over 256 MiB and 64 times its size; Interrupted.
 [[nodiscard]] bool check_publication(const std::filesystem::path& archive,
                                      const VerifyOptions& options,
