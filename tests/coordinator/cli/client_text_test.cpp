@@ -110,10 +110,10 @@ TEST(StatusTable, ShowsFactoriesAndWhyTheyDoNotSubmit) {
       text.ends_with("no campaigns\n"
                      "factory fleet (pbs) active" +
                      counts + "\nfactory fleet (pbs) waiting" + counts +
-                     "; tries again in 48 s; submission: qsub: queue\\nfull\n"
+                     ";\n  tries again in 48 s; submission: qsub: queue\\nfull\n"
                      "factory fleet (pbs) waiting" +
-                     counts + "; tries again in 0 s; late\nfactory fleet (pbs) paused" + counts +
-                     "; 3 workers in a row did not start\n"))
+                     counts + ";\n  tries again in 0 s; late\nfactory fleet (pbs) paused" + counts +
+                     "; 3\n  workers in a row did not start\n"))
       << text;
 }
 
