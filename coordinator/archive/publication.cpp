@@ -130,8 +130,10 @@ void write_campaign(const Campaign& campaign, const path& folder) {
   write_file(file, copy->definition(TableColumns::left_out).text, wire::IfThere::replace);
 }
 
-std::string command_of(const StopPlan& plan) {
+/// @param model  Its program is for the reader to name.
+std::string command_of(const StopPlan& plan, const Model& model) {
   std::string command = "proofmass run campaign.toml --db again.db";
+  if (!model.description().empty()) command += " --model-program PROGRAM";
   if (plan.num_runs_max) command += fmt::format(" --runs {}", *plan.num_runs_max);
   if (!plan.stop_rule.empty()) command += " --until " + wire::shell_word(plan.stop_rule);
   if (plan.failures_max) command += fmt::format(" --failures {}", *plan.failures_max);
@@ -164,9 +166,9 @@ These commands repeat the campaign, and print its digest again if every bit is t
 Made by {}, model {}; database schema {}; archive made on a processor with {}.
 )",
       store.name(), num_finished, store.num_runs(),
-      is_whole ? "" : " **The campaign is not finished.**", digest, command_of(store.stop_plan()),
-      digest, store.build(), store.model_version(), detail::schema_version(),
-      name_of(best_instruction_set()));
+      is_whole ? "" : " **The campaign is not finished.**", digest,
+      command_of(store.stop_plan(), store.model()), digest, store.build(), store.model_version(),
+      detail::schema_version(), name_of(best_instruction_set()));
 }
 
 std::string citation_of(const Store& store, std::string_view digest,
@@ -263,8 +265,13 @@ Check check_campaign(const path& folder) {
 
 void publish(const path& database, const path& archive, wire::IfThere if_there,
              std::span<const std::string> authors, const IsStopped& is_stopped) {
-  const WorkDirectory work;
   const Store original = Store::open_read_only(database);
+  if (!original.model().can_simulate()) {
+    throw ArchiveError(fmt::format(
+        "model = {} (its program reads the campaign file again: name it with --model-program)",
+        original.model_version()));
+  }
+  const WorkDirectory work;
   (void)walk_results(original, is_stopped, [](const RunResult&) {});  // Damage, by its own name.
   const std::string folder = "proofmass-" + original.name();
   const path place = work.place / folder;
