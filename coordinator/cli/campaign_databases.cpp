@@ -65,6 +65,7 @@ void require_no_fewer_runs(const Store& store, const Campaign& wanted,
 
 void check_independent_until(const Campaign& wanted, const std::string& stop_rule) {
   if (stop_rule.empty()) return;
+  require_objective(wanted, "until", stop_rule);
   if (wanted.table_columns.empty()) return require_independent(wanted, "until", stop_rule);
   throw UsageError(
       fmt::format("until = {} (must not be with quantities whose law is a table)", stop_rule));

@@ -333,11 +333,15 @@ Table error_table(const ResultSchema& schema, const std::vector<double>& objecti
                           {"99 %", false, 9, percentiles},
                           {"from", false, 7, "beyond, %", true},
                           {"to", false, 8, "beyond, %"}}};
+  const bool has_objective =
+      std::ranges::any_of(objectives, [](double objective) { return std::isfinite(objective); });
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
     table.rows.push_back(error_row(schema.quantities[i], objectives[i], statistics.accuracy[i]));
   }
   table.notes.push_back(bias_sentence(schema, statistics));
-  table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
+  if (has_objective) {
+    table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
+  }
   return table;
 }
 

@@ -109,8 +109,10 @@ std::string driver_of(const Review& review, std::size_t quantity) {
   if (!causes) return "what drives it is not known, as fewer than 16 draws have an estimate";
   const auto term = std::ranges::find(causes->terms, quantity, &CauseTerm::quantity);
   if (term == causes->terms.end()) {
-    return fmt::format("in {} draws no drawn quantity or product of two was found to explain it",
-                       causes->num_runs);
+    return fmt::format(
+        "in {} draws no drawn quantity or product of two was found to explain it; those that only "
+        "change its size are listed by `proofmass sensitivity`",
+        causes->num_runs);
   }
   return fmt::format("of the variance of this error over the draws, {} % follows from {}",
                      figure_text(100.0 * term->share), term->name);

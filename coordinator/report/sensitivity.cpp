@@ -41,6 +41,16 @@ void append(const RunResult& result, const RunDraw& draw, DrawnRuns& drawn) {
   }
 }
 
+/// A truth that is a drawn quantity itself counts once.
+void drop_repeated_truths(DrawnRuns& drawn, std::size_t num_drawn) {
+  for (std::size_t i = drawn.columns.size(); i-- > num_drawn;) {
+    const auto end = drawn.columns.begin() + static_cast<std::ptrdiff_t>(num_drawn);
+    if (std::find(drawn.columns.begin(), end, drawn.columns[i]) == end) continue;
+    drawn.columns.erase(drawn.columns.begin() + static_cast<std::ptrdiff_t>(i));
+    drawn.names.erase(drawn.names.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
 std::vector<double> magnitudes_of(const std::vector<double>& errors) {
   std::vector<double> magnitudes(errors.size());
   std::ranges::transform(errors, magnitudes.begin(), [](double error) { return std::abs(error); });
@@ -268,6 +278,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
     }
     append(result, draw, drawn);
   });
+  if (!drawn.runs.empty()) drop_repeated_truths(drawn, campaign.model().drawn().size());
   return drawn;
 }
 

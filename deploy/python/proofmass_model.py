@@ -37,6 +37,8 @@ class Random:
 
     def seed(self, stream):
         """The 128-bit seed of a stream that `streams` names: for numpy.random.default_rng(), say."""
+        if stream not in self._seeds:
+            raise KeyError(f"no stream {stream!r}: the model's `streams` must name it")
         return int(self._seeds[stream], 16)
 
     def stream(self, stream):
@@ -110,12 +112,21 @@ class Model:
         return {}
 
     def _run(self, question):
-        seeds = question.get("seeds", {})
-        result = self.run(self._parameters, question.get("drawn", {}), Random(seeds))
-        if result is None:
-            return {"lost": True}
-        estimate, errors = result if isinstance(result, tuple) else (result, {})
-        return {"estimate": _finite(estimate), "standard_error": _finite(errors)}
+        drawn = question.get("drawn", {})
+        try:
+            result = self.run(self._parameters, drawn, Random(question.get("seeds", {})))
+            if result is None:
+                return {"lost": True}
+            estimate, errors = result if isinstance(result, tuple) else (result, {})
+            if not isinstance(estimate, dict) or not isinstance(errors, dict):
+                raise TypeError(
+                    "run() must return {quantity: estimate}, such a dictionary and one of standard "
+                    f"errors, or None, and not {result!r}")
+            return {"estimate": _finite(estimate), "standard_error": _finite(errors)}
+        except Exception:
+            print(f"model {self.name}: run {question['run']} ends the program; it drew {drawn}",
+                  file=sys.stderr)
+            raise
 
 
 def _finite(values):
@@ -139,15 +150,16 @@ def fixed(value, unit="1"):
     return {"law": "fixed", "value": value, "unit": unit}
 
 
-def quantity(truth, unit="1", objective=None, standard_error=False, **further):
+def quantity(truth, unit="1", objective=None, standard_error=False, symbol=None, display_unit=None,
+             display_scale=None):
     """What each run estimates.
 
     `truth` is its true value as an expression of drawn quantities and parameters: + - * /,
     parentheses, sqrt(x) and pow(x, n). `objective` is the largest acceptable error, in `unit`.
-    `standard_error` says that run() returns one. `further` may have symbol, display_unit and
-    display_scale: tables show value / display_scale in display_unit.
+    `standard_error` says that run() returns one. Tables call it `symbol` and show
+    value / display_scale in display_unit.
     """
-    result = {"truth": truth, "unit": unit, "standard_error": standard_error, **further}
-    if objective is not None:
-        result["objective"] = objective
-    return result
+    optional = {"objective": objective, "symbol": symbol, "display_unit": display_unit,
+                "display_scale": display_scale}
+    return {"truth": truth, "unit": unit, "standard_error": standard_error,
+            **{name: value for name, value in optional.items() if value is not None}}

@@ -69,6 +69,16 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
   return outlook;
 }
 
+/// Empty for a campaign that `plan` knows no more of.
+std::string advice_to_plan(const CheckOptions& options, const Campaign& campaign) {
+  try {
+    if (campaign.model().study(campaign) == nullptr) return "";
+  } catch (const ConfigError&) {
+    return "";
+  }
+  return fmt::format("see `proofmass plan {}`", options.file.string());
+}
+
 std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
                          const Outlook& outlook) {
   std::string text =
@@ -87,13 +97,15 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
         "Warning   the last draw has {} of its {} runs, and reports leave it out; use --runs {}\n",
         rest, each, campaign.num_runs - rest + each);
   }
-  const std::string plan = fmt::format("see `proofmass plan {}`", options.file.string());
-  if (outlook.num_simulated == 0) return text + "Losses    not tried, as runs are long; " + plan;
+  const std::string plan = advice_to_plan(options, campaign);
+  if (outlook.num_simulated == 0) {
+    return text + "Losses    not tried, as runs are long" + (plan.empty() ? "" : "; " + plan);
+  }
   const std::string reasons = reasons_text(outlook.missing);
-  text +=
-      fmt::format("Losses    {} of the first {} runs{}{}", outlook.missing.total(),
-                  outlook.num_simulated, reasons.empty() ? "" : ", without an estimate: " + reasons,
-                  outlook.missing.num_lost == 0 ? "" : "; for the cause " + plan);
+  text += fmt::format(
+      "Losses    {} of the first {} runs{}{}", outlook.missing.total(), outlook.num_simulated,
+      reasons.empty() ? "" : ", without an estimate: " + reasons,
+      outlook.missing.num_lost == 0 || plan.empty() ? "" : ";\n          for the cause " + plan);
   return text;
 }
 

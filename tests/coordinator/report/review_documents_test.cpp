@@ -193,7 +193,8 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
   review.causes = Causes{};
   EXPECT_THAT(
       sentences_of(review)[3],
-      HasSubstr("; in 0 draws no drawn quantity or product of two was found to explain it."));
+      HasSubstr(
+          "; in 0 draws no drawn quantity or product of two was found to explain it; those "));
   review.causes->terms = {{.quantity = 0, .name = "true a × b", .slope = 1.0, .share = 0.982},
                           {.quantity = 0, .name = "c", .slope = 1.0, .share = 0.01}};
   EXPECT_THAT(sentences_of(review)[3],
