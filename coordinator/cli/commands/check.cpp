@@ -73,7 +73,7 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
 std::string advice_to_plan(const CheckOptions& options, const Campaign& campaign) {
   try {
     if (campaign.model().study(campaign) == nullptr) return "";
-  } catch (const ConfigError&) {
+  } catch (const Error&) {
     return "";
   }
   return fmt::format("see `proofmass plan {}`", options.file.string());
