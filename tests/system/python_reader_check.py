@@ -123,7 +123,8 @@ def check_accuracy(machine, campaign, numpy):
             return numpy.asarray(table[name])[i]
         assert own(accuracy, "worst") == expected["worst"] == own(statistics, "worst")
         assert own(accuracy, "worst_run") == expected["worst_run"]
-        assert own(accuracy, "num_beyond") == expected["num_beyond_objective"]
+        # Nothing is beyond an objective that there is not: null, and 0 in a column of integers.
+        assert own(accuracy, "num_beyond") == (expected["num_beyond_objective"] or 0)
         assert own(statistics, "mean") == expected["mean"]
         assert own(statistics, "mean_lower") == expected["mean_interval"][0]
         for name in ("mean", "standard_deviation"):
