@@ -1,10 +1,15 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/campaign/run_result.hpp"
+#include "core/error.hpp"
 #include "core/statistics/requirement.hpp"
 #include "core/statistics/stop_rule.hpp"
 
@@ -40,6 +45,17 @@ namespace proofmass {
 }
 [[nodiscard]] inline StopRule parse_stop_rule(std::string_view text, const ResultSchema& results) {
   return parse_stop_rule(text, quantity_names(results));
+}
+
+/// @param text  Of the requirement or of the stop rule that has it, which `field` gave.
+/// @throws ConfigError if it is about all objectives and no parameter has one: none could be
+///         missed.
+inline void require_objective(const Requirement& requirement, std::span<const double> objectives,
+                              const std::string& field, const std::string& text) {
+  const auto is_objective = [](double objective) { return std::isfinite(objective); };
+  if (requirement.subject != Requirement::Subject::all_objectives) return;
+  if (std::ranges::any_of(objectives, is_objective)) return;
+  throw ConfigError(field, text, "needs a parameter that has an objective, and none has");
 }
 
 }  // namespace proofmass

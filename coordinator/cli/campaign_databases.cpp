@@ -21,6 +21,7 @@
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "core/result_rules.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -63,9 +64,10 @@ void require_no_fewer_runs(const Store& store, const Campaign& wanted,
                   wanted.num_runs, store.num_runs(), database.string()));
 }
 
-void check_independent_until(const Campaign& wanted, const std::string& stop_rule) {
+void check_until(const Campaign& wanted, const std::string& stop_rule) {
   if (stop_rule.empty()) return;
-  require_objective(wanted, "until", stop_rule);
+  require_objective(parse_stop_rule(stop_rule, wanted.results()).requirement, wanted.objectives(),
+                    "until", stop_rule);
   if (wanted.table_columns.empty()) return require_independent(wanted, "until", stop_rule);
   throw UsageError(
       fmt::format("until = {} (must not be with quantities whose law is a table)", stop_rule));
@@ -90,7 +92,7 @@ std::shared_ptr<const Campaign> with_horizon(const Campaign& wanted, const StopP
 ServedCampaign open_same(const Campaign& wanted, const StopPlan& plan,
                          const std::filesystem::path& database, std::string_view remedy,
                          const Asker& asker) {
-  check_independent_until(wanted, plan.stop_rule);
+  check_until(wanted, plan.stop_rule);
   Store store = Store::open(database);
   require_control(asker, wanted.name, store.owner());
   const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, store.num_runs());
@@ -106,7 +108,7 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
                               const std::filesystem::path& database, std::string_view remedy,
                               const Asker& asker) {
   if (std::filesystem::exists(database)) return open_same(wanted, plan, database, remedy, asker);
-  check_independent_until(wanted, plan.stop_rule);
+  check_until(wanted, plan.stop_rule);
   const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, 0);
   std::optional<Store> store = Store::create(database, *campaign, text_of(*campaign));
   try {

@@ -28,11 +28,12 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
 void require_no_fewer_runs(const Store& store, const Campaign& wanted,
                            const std::filesystem::path& database);
 
-/// Refuses a rule that cannot end a campaign, as its draws may depend on one another.
+/// Refuses a rule that cannot end a campaign, as its draws may depend on one another or no
+/// parameter has the objective that it is about.
 ///
 /// @param stop_rule  May be empty: none.
 /// @throws UsageError or ConfigError
-void check_independent_until(const Campaign& wanted, const std::string& stop_rule);
+void check_until(const Campaign& wanted, const std::string& stop_rule);
 
 /// Gives a campaign's database as many runs as are wanted.
 /// @pre require_same() passed.

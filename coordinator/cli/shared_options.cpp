@@ -48,9 +48,7 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
 }
 
 void check_stop_rule(const std::string& rule, const Campaign& campaign) {
-  if (rule.empty()) return;
-  (void)parse_stop_rule(rule, campaign.results());
-  check_independent_until(campaign, rule);
+  check_until(campaign, rule);
 }
 
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {

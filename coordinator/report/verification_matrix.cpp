@@ -94,11 +94,12 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
     RequirementAnswer answer;
     answer.stated = std::move(each);
     answer.requirement = parse_requirement(answer.stated.requirement, schema);
+    require_objective(answer.requirement, objectives, "requirement", answer.stated.requirement);
     if (!answer.is_joint()) {
       answer.subject = requirement_subject(schema, answer.requirement.parameter);
       answer.limit = answer.requirement.limit;
     }
-    if (answer.is_joint() && has_finite(objectives)) answer.limit = 1.0;
+    if (answer.is_joint()) answer.limit = 1.0;
     exceedances_.emplace_back(answer.requirement, objectives, budget);
     subjects_.try_emplace(key_of(answer));
     answers_.push_back(std::move(answer));

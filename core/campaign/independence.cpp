@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -41,14 +40,6 @@ void require_independent(const Campaign& campaign, const std::string& field,
                          const std::string& value) {
   const std::string why = why_not_independent(campaign);
   if (!why.empty()) throw ConfigError(field, value, "needs independent draws: " + why);
-}
-
-void require_objective(const Campaign& campaign, const std::string& field,
-                       const std::string& value) {
-  const std::vector<double> objectives = campaign.objectives();
-  const auto is_objective = [](double objective) { return std::isfinite(objective); };
-  if (!value.starts_with("all objectives") || std::ranges::any_of(objectives, is_objective)) return;
-  throw ConfigError(field, value, "needs a parameter that has an objective, and none has");
 }
 
 }  // namespace proofmass

@@ -20,10 +20,4 @@ namespace proofmass {
 void require_independent(const Campaign& campaign, const std::string& field,
                          const std::string& value);
 
-/// Of a requirement or a stop rule about `all objectives`.
-/// @throws ConfigError if it is one and no parameter has an objective, so that none could be
-/// missed.
-void require_objective(const Campaign& campaign, const std::string& field,
-                       const std::string& value);
-
 }  // namespace proofmass

@@ -97,15 +97,17 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
         "Warning   the last draw has {} of its {} runs, and reports leave it out; use --runs {}\n",
         rest, each, campaign.num_runs - rest + each);
   }
-  const std::string plan = advice_to_plan(options, campaign);
   if (outlook.num_simulated == 0) {
-    return text + "Losses    not tried, as runs are long" + (plan.empty() ? "" : "; " + plan);
+    const std::string advice = advice_to_plan(options, campaign);
+    return text + "Losses    not tried, as runs are long" + (advice.empty() ? "" : "; " + advice);
   }
   const std::string reasons = reasons_text(outlook.missing);
-  text += fmt::format(
-      "Losses    {} of the first {} runs{}{}", outlook.missing.total(), outlook.num_simulated,
-      reasons.empty() ? "" : ", without an estimate: " + reasons,
-      outlook.missing.num_lost == 0 || plan.empty() ? "" : ";\n          for the cause " + plan);
+  text +=
+      fmt::format("Losses    {} of the first {} runs{}{}", outlook.missing.total(),
+                  outlook.num_simulated, reasons.empty() ? "" : ", without an estimate: ", reasons);
+  if (outlook.missing.num_lost == 0) return text;
+  const std::string advice = advice_to_plan(options, campaign);
+  if (!advice.empty()) text += ";\n          for the cause " + advice;
   return text;
 }
 
