@@ -1,17 +1,33 @@
 #include "core/model.hpp"
 
+#include <algorithm>
+#include <utility>
+
 namespace proofmass {
 namespace {
 
-const Model*& used_model() {
-  static const Model* used = nullptr;
-  return used;
+std::vector<const Model*>& all_models() {
+  static std::vector<const Model*> models{&built_in_model()};
+  return models;
 }
 
 }  // namespace
 
-const Model& model() { return used_model() != nullptr ? *used_model() : built_in_model(); }
+std::span<const Model* const> models() { return all_models(); }
 
-void use_model(const Model& other) { used_model() = &other; }
+const Model* find_model(std::string_view version) {
+  const auto found = std::ranges::find(all_models(), version, &Model::version);
+  return found == all_models().end() ? nullptr : *found;
+}
+
+std::string_view name_of_model(std::string_view version) {
+  const std::size_t end = version.rfind('-');
+  return end == version.npos ? std::string_view() : version.substr(0, end);
+}
+
+void use_models(std::vector<const Model*> others) {
+  others.push_back(&built_in_model());
+  all_models() = std::move(others);
+}
 
 }  // namespace proofmass

@@ -75,7 +75,8 @@ class Model {
   [[nodiscard]] virtual std::size_t batch_size() const = 0;
 
   /// Digest of the results of a short fixed campaign: the same number from every sound build and
-  /// processor of one version. Takes some tenths of a second.
+  /// processor of one version. Takes some tenths of a second. That of a model which cannot simulate
+  /// is what was found where it could.
   /// @param set  One of available_instruction_sets().
   [[nodiscard]] virtual std::uint64_t reference_digest(InstructionSet set) const = 0;
 
@@ -141,12 +142,21 @@ class Model {
 /// library that defines this function.
 [[nodiscard]] const Model& built_in_model();
 
-/// The model that this program runs campaigns of: the built-in one unless another is used.
-[[nodiscard]] const Model& model();
+/// The models that this program can simulate: those of use_models(), and the built-in one.
+[[nodiscard]] std::span<const Model* const> models();
 
-/// Replaces the built-in model, before anything asks for model().
-/// @param other  Lives as long as the program.
-void use_model(const Model& other);
+/// The first of models(): that of campaign files that name none, and of help texts.
+[[nodiscard]] inline const Model& model() { return *models().front(); }
+
+/// That of models() with this version; null if there is none.
+[[nodiscard]] const Model* find_model(std::string_view version);
+
+/// `hardy2013` of the version `hardy2013-6`; empty if there is no such name.
+[[nodiscard]] std::string_view name_of_model(std::string_view version);
+
+/// Puts models before the built-in one, before anything asks for models().
+/// @param others  Live as long as the program; each has another version.
+void use_models(std::vector<const Model*> others);
 
 /// The results of the campaign that Model::example() describes, for help texts and for limits that
 /// are needed before a campaign is known.

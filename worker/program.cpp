@@ -75,7 +75,7 @@ Cards open_cards(const Options& options, std::uint64_t reference_digest, const w
   Cards cards;
   for (const CudaCard& card : cuda_cards_of(options.gpus)) {
     auto device = std::make_shared<CudaDevice>(card);
-    const std::optional<Model::DeviceProof> proof = model().prove(*device);
+    const std::optional<Model::DeviceProof> proof = built_in_model().prove(*device);
     if (!proof) throw InvalidArgument("gpu = " + options.gpus + " (this build has no kernels)");
     if (proof->digest != reference_digest) {
       throw DeviceError(
@@ -101,9 +101,18 @@ proto::Hello hello_for(const Options& options, const ChildStart& start) {
                             ? wire::name_from(fmt::format("{}-{}", hello.host(), process_id))
                             : options.name);
   hello.set_process_id(process_id);
-  hello.set_model_version(std::string(model().version()));
   hello.set_build(PROOFMASS_VERSION);
-  hello.set_reference_digest(model().reference_digest(best_instruction_set()));
+  for (const Model* const model : models()) {
+    const std::uint64_t digest = model->reference_digest(best_instruction_set());
+    if (model == &built_in_model()) {
+      hello.set_model_version(std::string(model->version()));
+      hello.set_reference_digest(digest);
+    } else {
+      proto::OtherModel& other = *hello.add_other_models();
+      other.set_version(std::string(model->version()));
+      other.set_reference_digest(digest);
+    }
+  }
   if (start.former) *hello.mutable_former() = *start.former;
   if (!wire::is_name(hello.worker_name())) {
     throw InvalidArgument(fmt::format("name = {} ({})", hello.worker_name(), is_name_rule));
@@ -217,6 +226,13 @@ Prepare ending_on_crashes(const Prepare& prepare, const std::string& name) {
   };
 }
 
+/// Most runs that a thread computes together, of any model.
+std::size_t slots_per_thread() {
+  std::size_t most = 1;
+  for (const Model* const model : models()) most = std::max(most, model->batch_size());
+  return most;
+}
+
 /// The worker itself; 0, or it throws, or it ends the process because threads do not end.
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
@@ -225,10 +241,11 @@ int work(const Options& options, const Program& program, ServeConfig config,
   config.hello = hello_for(options, start);
   const Cards cards = open_cards(options, config.hello.reference_digest(), config.log);
   const unsigned num_threads = num_threads_of(options, cards.devices.size());
-  const std::size_t num_processor_slots = num_threads * model().batch_size();
+  const std::size_t num_processor_slots = num_threads * slots_per_thread();
   const std::size_t num_card_slots =
       std::min(cards.capacity, wire::slots_max - num_processor_slots);
   config.hello.set_num_slots(static_cast<std::uint32_t>(num_processor_slots + num_card_slots));
+  config.hello.set_slots_per_thread(static_cast<std::uint32_t>(slots_per_thread()));
   config.hello.set_num_card_slots(static_cast<std::uint32_t>(num_card_slots));
   config.hello.set_cards(text_of(cards));
   constexpr std::size_t num_threads_a_card = 5;  // Its own, and those of its driver.
@@ -239,7 +256,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
   Executor executor(ending_on_crashes(program.prepare, program.name),
                     [&progress] { progress.notify(); },
                     {.num_threads = num_threads,
-                     .batch_size_max = model().batch_size(),
+                     .batch_size_max = slots_per_thread(),
                      .devices = cards.devices,
                      .checked_fraction = options.gpu_check});
   const Ending ending = serve(config, executor, progress, signals);
@@ -303,7 +320,7 @@ int run_worker(int argc, char** argv, const Program& program) {
   app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
   return reporting_errors(program, [&] {
     wire::settle_surroundings();
-    wire::choose_model(argc, argv);
+    wire::choose_models(argc, argv);
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& wish) {

@@ -89,11 +89,44 @@ std::string read_campaign_text(const std::filesystem::path& file) {
 
 }  // namespace
 
+namespace {
+
+/// The model that a campaign file names; null if it names none.
+const Model* named_model(Document& document) {
+  const std::string path = "campaign.model";
+  std::string name;
+  if (!document.read(path, name)) return nullptr;
+  std::string others;
+  for (const Model* const known : models()) {
+    const std::string_view version = known->version();
+    if (name == version || name == name_of_model(version)) return known;
+    others = fmt::format("{}{}{}", version, others.empty() ? "" : " and ", others);
+  }
+  throw document.located(ConfigError(
+      path, fmt::format("\"{}\"", name),
+      fmt::format("this program has {}; --model-program names that of another model", others)));
+}
+
+std::unique_ptr<Campaign> read_campaign(Document& document, DataFiles& files) {
+  if (const Model* const named = named_model(document)) {
+    return named->read_campaign(document, files);
+  }
+  try {
+    return model().read_campaign(document, files);
+  } catch (const DefinitionError& error) {
+    if (models().size() == 1) throw;
+    throw DefinitionError(fmt::format("{}; it has no campaign.model and is taken to be of {}",
+                                      error.what(), model().version()));
+  }
+}
+
+}  // namespace
+
 std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
                                         const Overrides& overrides) {
   Document document(file.string(), read_campaign_text(file), assignments_of(overrides));
   DataFilesIn files(document, file.parent_path());
-  std::unique_ptr<Campaign> campaign = model().read_campaign(document, files);
+  std::unique_ptr<Campaign> campaign = read_campaign(document, files);
   try {
     check_campaign_name(campaign->name, NameOrigin::given);
   } catch (const ConfigError& error) {
@@ -110,13 +143,15 @@ std::string environment_file(const std::filesystem::path& file, const Overrides&
     text = detail::read_toml_text(request.physics, campaign_file_size_max);
   }
   Document physics(request.physics.string(), text, {});
-  return model().environment_file(campaign, physics, request.session);
+  const Model* const named = named_model(campaign);
+  return (named != nullptr ? *named : model()).environment_file(campaign, physics, request.session);
 }
 
-std::unique_ptr<Campaign> example_campaign() {
-  Document document("example", model().example(), {});
+std::unique_ptr<Campaign> example_campaign(const Model& of) {
+  Document document("example", of.example(), {});
   DataFilesIn files(document, {});
-  return model().read_campaign(document, files);
+  (void)named_model(document);
+  return of.read_campaign(document, files);
 }
 
 void require_identity(const Campaign& defined, const StoredIdentity& stored) {

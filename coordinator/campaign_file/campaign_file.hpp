@@ -29,7 +29,8 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 /// paths are relative to it.
 ///
 /// A key of the file replaces the nominal value of its field; the model says which values are
-/// nominal, and which keys apply before others.
+/// nominal, and which keys apply before others. `campaign.model` says which of models() it is of,
+/// by its name or version; the first one if it is left out.
 ///
 /// @throws DefinitionError naming file, line, field, value and rule, or a key that is overridden
 ///         twice.
@@ -48,8 +49,8 @@ struct EnvironmentRequest {
                                            const Overrides& overrides,
                                            const EnvironmentRequest& request);
 
-/// The campaign of the file that `proofmass init` writes.
-[[nodiscard]] std::unique_ptr<Campaign> example_campaign();
+/// The campaign of Model::example().
+[[nodiscard]] std::unique_ptr<Campaign> example_campaign(const Model& of);
 
 /// What a database says of its campaign besides the definition, as text.
 struct StoredIdentity {

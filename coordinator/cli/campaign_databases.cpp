@@ -28,6 +28,26 @@
 namespace proofmass::coordinator {
 namespace {
 
+/// What keeps the campaign of a database from going on with a model; empty if nothing does.
+std::string model_difference(const Store& store, const Model& wanted) {
+  if (store.model_version() != wanted.version()) {
+    return fmt::format("model: {} in the database, {} in this program", store.model_version(),
+                       wanted.version());
+  }
+  if (store.model().description() != wanted.description()) {
+    return fmt::format(
+        "model: {} has another description; a model that has changed needs another version",
+        wanted.version());
+  }
+  const std::uint64_t before = store.reference_digest();
+  const std::uint64_t now = before == 0 ? 0 : wanted.reference_digest(best_instruction_set());
+  if (before == now) return {};
+  return fmt::format(
+      "model: {} computes something else than where the campaign began (digest of its first runs "
+      "{:016x}, {:016x} in the database); a model that has changed needs another version",
+      wanted.version(), now, before);
+}
+
 std::string text_of(const Campaign& campaign) {
   return campaign.definition(TableColumns::left_out).text;
 }
@@ -36,17 +56,13 @@ std::string text_of(const Campaign& campaign) {
 
 void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
                   std::string_view remedy) {
-  // Definitions of two models have nothing in common that could be compared.
-  const bool is_one_model = &store.model() == &wanted.model();
   std::vector<std::string> differences;
-  if (is_one_model) differences = definition_differences(*stored_campaign(store), wanted);
-  if (store.model_version() != wanted.model().version()) {
-    differences.push_back(fmt::format("model: {} in the database, {} in this program",
-                                      store.model_version(), wanted.model().version()));
-  } else if (!is_one_model) {
-    differences.push_back(
-        fmt::format("model: {} has another description", wanted.model().version()));
+  const std::string of_model = model_difference(store, wanted.model());
+  // Definitions of two models have nothing in common that could be compared.
+  if (store.model().description() == wanted.model().description()) {
+    differences = definition_differences(*stored_campaign(store), wanted);
   }
+  if (!of_model.empty()) differences.push_back(of_model);
   if (differences.empty()) return;
   std::string text = fmt::format("{} holds another campaign:", database.string());
   for (const std::string& difference : differences) {
@@ -154,11 +170,15 @@ int lock(const std::filesystem::path& directory) {
 
 ServedCampaign load_file(const std::filesystem::path& file) {
   Store store = Store::open(file);
-  const bool is_own = store.model().can_simulate();
-  if (!is_own || store.model_version() != store.model().version()) {
-    throw Error(fmt::format("{}: model = {} (this program has {}{})", file.string(),
-                            store.model_version(), model().version(),
-                            is_own ? "" : "; --model-program names that of another model"));
+  const Model& model = store.model();
+  if (!model.can_simulate() && store.reference_digest() == 0) {
+    throw Error(fmt::format(
+        "{}: model = {} (an older Proofmass began it; --model-program names its program)",
+        file.string(), store.model_version()));
+  }
+  if (store.model_version() != model.version()) {
+    throw Error(fmt::format("{}: model = {} (this program has {})", file.string(),
+                            store.model_version(), model.version()));
   }
   std::shared_ptr<const Campaign> definition = stored_campaign(store);
   try {

@@ -120,7 +120,7 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   config.dispatch.num_workers_max = options.num_workers_max;
   config.dispatch.hosts_per_key_max =
       std::max(config.dispatch.hosts_per_key_max, options.num_workers_max);
-  config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
+  config.dispatch.reference_digest = built_in_model().reference_digest(best_instruction_set());
   scale_times(config, options.time_scale);
   return config;
 }

@@ -72,13 +72,14 @@ CostEstimate& CostEstimate::operator+=(const CostEstimate& other) {
   return *this;
 }
 
-CostEstimate estimated_cost(const ResultSchema& results, std::uint64_t num_runs, double batch_s) {
+CostEstimate estimated_cost(const Campaign& campaign, std::uint64_t num_runs, double batch_s) {
   const auto time_s = [&](std::uint64_t num_at_a_time) {
     return static_cast<double>((num_runs + num_at_a_time - 1) / num_at_a_time) * batch_s;
   };
-  return {.one_core_s = time_s(model().batch_size()),
-          .all_cores_s = time_s(model().batch_size() * wire::num_processors()),
-          .disk_mb = database_mb(results, num_runs)};
+  const std::size_t batch_size = campaign.model().batch_size();
+  return {.one_core_s = time_s(batch_size),
+          .all_cores_s = time_s(batch_size * wire::num_processors()),
+          .disk_mb = database_mb(campaign.results(), num_runs)};
 }
 
 std::string cost_text(const CostEstimate& cost) {

@@ -30,7 +30,7 @@ struct CostEstimate {
 
 /// Of a campaign with so many runs, whose batches take so long. `run` gives each core one batch of
 /// runs at a time. The last batch counts as a whole one, which it costs at most.
-[[nodiscard]] CostEstimate estimated_cost(const ResultSchema& results, std::uint64_t num_runs,
+[[nodiscard]] CostEstimate estimated_cost(const Campaign& campaign, std::uint64_t num_runs,
                                           double batch_s);
 
 /// Two lines that begin with `Time      about` and `Disk      about`.

@@ -72,7 +72,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
 
 std::optional<int> refused_model(int argc, char** argv, std::string_view program) {
   try {
-    wire::choose_model(argc, argv);
+    wire::choose_models(argc, argv);
     return std::nullopt;
   } catch (const Error& error) {
     wire::say(fmt::format("{}: error: {}\n", program, wire::visible_text(error.what())));
@@ -92,14 +92,14 @@ int run_proofmass(int argc, char** argv) {
   Command chosen;
   // As `--help` lists them: the usual ones first.
   const std::vector<std::pair<const char*, std::vector<std::function<void(CLI::App&, Command&)>>>>
-      groups{
-          {"Run a campaign", {add_run, add_init, add_check, add_plan, add_sweep, add_environment}},
-          {"Look at its results", {add_report, add_plot, add_list}},
-          {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
-          {"Serve campaigns to other machines",
-           {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
-            add_release, add_factory}},
-          {"Keep databases", {add_verify, add_backup, add_export, add_merge, add_publish}}};
+      groups{{"Run a campaign",
+              {add_run, add_init, add_check, add_plan, add_sweep, add_environment, add_models}},
+             {"Look at its results", {add_report, add_plot, add_list}},
+             {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
+             {"Serve campaigns to other machines",
+              {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
+               add_release, add_factory}},
+             {"Keep databases", {add_verify, add_backup, add_export, add_merge, add_publish}}};
   for (const auto& [title, commands] : groups) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);

@@ -59,8 +59,8 @@ void WorkerProcesses::start(const std::string& name) {
                                      name == first_name ? gpus_ : "none",
                                      "--parent",
                                      std::to_string(getpid())};
-  if (const auto program = wire::chosen_model_program()) {
-    arguments.insert(arguments.end(), {"--model-program", program->string()});
+  for (std::string& argument : wire::model_program_arguments()) {
+    arguments.push_back(std::move(argument));
   }
   const pid_t process_id = wire::start_program(
       {.arguments = std::move(arguments), .environment = wire::environment_without_settings()});

@@ -28,9 +28,10 @@ RunsByCampaign computed_runs(const State& state, const Worker& worker) {
     const Lease& lease = state.leases.at(id);
     RunSet remaining = lease.remaining;
     while (num_left > 0 && !remaining.empty()) {
-      const RunRange range = remaining.take_first(num_left);
+      const std::uint64_t slots = lease.slots_per_run;
+      const RunRange range = remaining.take_first(std::max<std::uint64_t>(1, num_left / slots));
       computed[lease.campaign].add(range);
-      num_left -= range.count;
+      num_left -= std::min(num_left, range.count * slots);
     }
   }
   return computed;

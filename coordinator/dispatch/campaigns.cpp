@@ -10,6 +10,7 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -85,6 +86,10 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
   CampaignState& campaign = state.campaigns[id];
   state.order.push_back(id);
   campaign.definition = stored.definition;
+  campaign.model = {.version = std::string(stored.definition->model().version()),
+                    .reference_digest = stored.reference_digest != 0
+                                            ? stored.reference_digest
+                                            : state.config.reference_digest};
   campaign.phase = stored.control.phase;
   campaign.priority = stored.control.priority;
   campaign.audit_fraction = stored.control.audit_fraction;

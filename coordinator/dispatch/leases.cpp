@@ -142,10 +142,13 @@ Attempt after(Attempt attempt) {
 
 LeaseId open_lease(State& state, Lease lease) {
   PROOFMASS_EXPECT(!lease.remaining.empty());
-  lease.num_runs = lease.remaining.size();
-  lease.num_slots = std::max(lease.num_slots, lease.num_runs);
-  const LeaseId id{state.next_lease++};
   CampaignState& campaign = state.campaigns.at(lease.campaign);
+  lease.num_runs = lease.remaining.size();
+  if (!lease.is_for_cards) {
+    lease.slots_per_run = slots_per_run(state.workers.at(lease.worker), campaign);
+  }
+  lease.num_slots = std::max(lease.num_slots, lease.num_runs * lease.slots_per_run);
+  const LeaseId id{state.next_lease++};
   for (const RunRange& range : lease.remaining.ranges()) {
     if (lease.kind == LeaseKind::first) {
       campaign.lent.add(range, id);

@@ -33,12 +33,16 @@ double run_time_s(const CampaignState& campaign, CampaignId id, const Worker& wo
   return own != worker.run_time_s.end() ? own->second : campaign.run_time_s;
 }
 
-/// Runs of all campaigns that wait, or somewhat more than `count_max` if they are more than that.
-std::uint64_t num_waiting_in_all(const State& state, std::uint64_t count_max) {
+/// Slots that the runs of all campaigns which wait for such a worker would fill, or somewhat more
+/// than `count_max` if they are more than that.
+std::uint64_t num_waiting_in_all(const State& state, const Worker& worker,
+                                 std::uint64_t count_max) {
   std::uint64_t count = 0;
   for (const CampaignId id : state.served) {
     const CampaignState& campaign = state.campaigns.at(id);
-    if (is_lent(campaign) && !is_backed_up(state, campaign)) count += num_waiting(campaign);
+    if (!is_lent(campaign) || is_backed_up(state, campaign)) continue;
+    if (!can_compute(worker, campaign)) continue;
+    count += num_waiting(campaign) * slots_per_run(worker, campaign);
     if (count > count_max) break;
   }
   return count;
@@ -66,7 +70,8 @@ std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignSta
   const auto rounds = static_cast<std::uint64_t>(
       std::clamp(by_time, 2.0, static_cast<double>(wire::runs_per_lease_max)));
   const std::uint64_t slots = 2 * state.num_eligible_slots;
-  const std::uint64_t by_share = ratio_rounded_up(num_waiting(campaign), slots);
+  const std::uint64_t by_share =
+      ratio_rounded_up(num_waiting(campaign) * slots_per_run(worker, campaign), slots);
   return std::max<std::uint64_t>(1,
                                  std::min({rounds, by_share, rounds_with_room(state, campaign)}));
 }
@@ -90,10 +95,15 @@ std::uint64_t num_lent_to_processors(const Worker& worker) {
   return worker.num_lent - worker.num_lent_to_cards;
 }
 
+/// Runs of the campaign that the worker's processors compute at a time.
+std::uint64_t runs_per_round(const Worker& worker, const CampaignState& campaign) {
+  return num_processor_slots(worker) / slots_per_run(worker, campaign);
+}
+
 /// True if the worker's processors need nothing yet: they would not run low before their next
 /// result.
-bool have_enough(const Worker& worker, std::uint64_t wanted) {
-  const std::uint64_t two_rounds = 2 * std::uint64_t{num_processor_slots(worker)};
+bool have_enough(const Worker& worker, const CampaignState& campaign, std::uint64_t wanted) {
+  const std::uint64_t two_rounds = 2 * runs_per_round(worker, campaign);
   const std::uint64_t num_lent = num_lent_to_processors(worker);
   return num_lent >= std::min(wanted, two_rounds) && 2 * num_lent > wanted;
 }
@@ -137,16 +147,18 @@ std::uint64_t num_slots_sharing(State& state, double time_s, TimePoint now) {
 
 /// A worker's part, by its idle slots, of the last runs: those that would fill at most half of the
 /// slots that share them. A batch of half as many runs takes about half of the time. It is at least
-/// an eighth of a run in each slot, as batches of less than that take hardly less time.
+/// an eighth of a run in each slot that runs need, as batches of less than that take hardly less
+/// time.
 /// @return Nothing if these are not the last runs.
 std::optional<Share> share_of_last(State& state, CampaignId id, const CampaignState& campaign,
                                    const Worker& worker, TimePoint now) {
   const std::uint64_t num_sharing = num_slots_sharing(state, run_time_s(campaign, id, worker), now);
-  const std::uint64_t count = num_waiting_in_all(state, num_sharing);
+  const std::uint64_t count = num_waiting_in_all(state, worker, num_sharing);
   if (count == 0 || 2 * count > num_sharing) return std::nullopt;
   const std::uint64_t num_idle = num_idle_slots(worker);
   const std::uint64_t part = ratio_rounded_up(num_waiting(campaign) * num_idle, num_sharing);
-  return Share{.num_runs = std::max(part, ratio_rounded_up(num_idle, 8)), .num_slots = num_idle};
+  const std::uint64_t least = ratio_rounded_up(num_idle, 8 * slots_per_run(worker, campaign));
+  return Share{.num_runs = std::max(part, least), .num_slots = num_idle};
 }
 
 /// Runs of a campaign that a worker may be lent beside those that it holds.
@@ -166,11 +178,11 @@ Share share_of_processors(State& state, CampaignId id, const CampaignState& camp
     return *share;
   }
   const std::uint64_t wanted =
-      std::min(num_processor_slots(worker) * rounds_wanted(state, id, campaign, worker),
+      std::min(runs_per_round(worker, campaign) * rounds_wanted(state, id, campaign, worker),
                room + num_lent_to_processors(worker));
-  if (have_enough(worker, wanted)) return {};
+  if (have_enough(worker, campaign, wanted)) return {};
   const std::uint64_t num_missing = wanted - num_lent_to_processors(worker);
-  return {.num_runs = num_missing, .num_slots = num_missing};
+  return {.num_runs = num_missing, .num_slots = num_missing * slots_per_run(worker, campaign)};
 }
 
 /// Runs a second that the cards of a worker compute; 0 if not known yet.
@@ -274,9 +286,10 @@ void lend_pending(const Borrower& borrower) {
 }
 
 /// The only worker there is checks itself: better than nothing.
-bool is_only_auditor(const State& state, WorkerId id) {
+bool is_only_auditor(const State& state, const CampaignState& campaign, WorkerId id) {
   return std::none_of(state.workers.begin(), state.workers.end(), [&](const auto& item) {
-    return item.first != id && !state.quarantined.contains(item.second.host);
+    return item.first != id && can_compute(item.second, campaign) &&
+           !state.quarantined.contains(item.second.host);
   });
 }
 
@@ -288,7 +301,7 @@ void lend_audits(const Borrower& borrower) {
       next = to_audit.upper_bound({borrower.id, {std::numeric_limits<std::uint32_t>::max()}});
     }
     if (next == to_audit.end()) {
-      if (!is_only_auditor(borrower.state, borrower.id)) return;
+      if (!is_only_auditor(borrower.state, borrower.campaign, borrower.id)) return;
       next = to_audit.begin();
     }
     const AuditKey key = next->first;
@@ -329,6 +342,7 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
   CampaignState& campaign = state.campaigns.at(campaign_id);
   if (!is_lent(campaign) || is_backed_up(state, campaign)) return false;
   Worker& worker = state.workers.at(id);
+  if (!can_compute(worker, campaign)) return false;
   const auto borrower_of = [&](const Share& share, bool is_for_cards) {
     const std::uint64_t wanted = worker.num_lent + share.num_runs;
     return Borrower{state,  id,    worker,       campaign_id, campaign,
@@ -347,9 +361,11 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
 
 /// A batch of a lease has the same part in its runs as in its slots.
 std::uint32_t batch_runs_max(const Lease& lease, const Campaign& campaign) {
-  if (lease.num_runs >= lease.num_slots) return 0;
+  const std::uint64_t num_slots_needed = lease.num_runs * lease.slots_per_run;
+  if (num_slots_needed >= lease.num_slots) return 0;
   const std::uint64_t batch_size = campaign.model().batch_size();
-  return static_cast<std::uint32_t>(ratio_rounded_up(lease.num_runs * batch_size, lease.num_slots));
+  return static_cast<std::uint32_t>(
+      ratio_rounded_up(num_slots_needed * batch_size, lease.num_slots));
 }
 
 void send_forget(WorkerId worker, CampaignId id, std::uint64_t num_runs, Outbox& outbox) {
@@ -359,12 +375,15 @@ void send_forget(WorkerId worker, CampaignId id, std::uint64_t num_runs, Outbox&
   outbox.send(worker, std::move(envelope));
 }
 
-bool has_runs_to_lend(const State& state) {
+/// True if there are runs that nobody has, of a campaign that a worker can compute.
+/// @param worker  Null: of any campaign.
+bool has_runs_to_lend(const State& state, const Worker* worker) {
   return std::any_of(state.served.begin(), state.served.end(), [&](CampaignId id) {
     const CampaignState& campaign = state.campaigns.at(id);
-    return is_lent(campaign) && !is_backed_up(state, campaign) &&
-           !(campaign.pending.empty() && campaign.pending_suspects.empty() &&
-             campaign.to_audit.empty());
+    const bool has_any = !campaign.pending.empty() || !campaign.pending_suspects.empty() ||
+                         !campaign.to_audit.empty();
+    return has_any && is_lent(campaign) && !is_backed_up(state, campaign) &&
+           (worker == nullptr || can_compute(*worker, campaign));
   });
 }
 
@@ -387,12 +406,14 @@ void lend(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
 void lend_to_hungry(State& state, TimePoint now, Outbox& outbox) {
   if (is_reattaching(state, now)) return;
   // In turn: one that gives runs back must not get them again and again.
-  for (std::size_t count = state.hungry.size(); count > 0 && has_runs_to_lend(state); --count) {
+  const Worker* const anybody = nullptr;
+  for (std::size_t count = state.hungry.size(); count > 0; --count) {
+    if (!has_runs_to_lend(state, anybody)) return;
     auto next = state.hungry.upper_bound(state.fed_last);
     if (next == state.hungry.end()) next = state.hungry.begin();
     if (next == state.hungry.end()) return;
     state.fed_last = *next;
-    lend(state, state.fed_last, now, outbox);
+    if (has_runs_to_lend(state, &state.workers.at(*next))) lend(state, *next, now, outbox);
   }
 }
 

@@ -166,7 +166,7 @@ bool is_of_short_batch(const State& state, const CampaignState& campaign, RunInd
   const std::optional<LeaseId> id = campaign.lent.find(run);
   if (!id) return false;
   const Lease& lease = state.leases.at(*id);
-  return lease.num_runs < lease.num_slots;
+  return lease.num_runs * lease.slots_per_run < lease.num_slots;
 }
 
 bool is_lent_to_cards(const State& state, const Worker& worker, const LeaseIndex& lent,

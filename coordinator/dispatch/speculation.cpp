@@ -16,27 +16,43 @@ namespace {
 
 constexpr std::size_t copies_max = 2;
 
+/// True if the worker could compute what others were lent.
+bool could_help(const State& state, const Worker& worker) {
+  return std::ranges::any_of(state.served, [&](CampaignId id) {
+    const CampaignState& campaign = state.campaigns.at(id);
+    const bool is_with_others = !campaign.lent.empty() || !campaign.audits.empty();
+    return is_with_others && can_compute(worker, campaign);
+  });
+}
+
 std::vector<WorkerId> idle_workers(const State& state, TimePoint now) {
   std::vector<WorkerId> idle;
   for (const WorkerId id : state.hungry) {
     const Worker& worker = state.workers.at(id);
-    if (worker.num_lent == 0 && !is_passed_over(state, worker, now)) idle.push_back(id);
+    if (worker.num_lent == 0 && !is_passed_over(state, worker, now) && could_help(state, worker)) {
+      idle.push_back(id);
+    }
   }
   return idle;
 }
 
-/// Of its processors, which copies are for.
+/// Slots of its processors, which copies are for.
 std::uint64_t room(const Worker& worker) {
   return std::min({num_processor_slots(worker), worker.num_runs_max, wire::runs_per_lease_max});
 }
 
-/// What the worker does not compute yet, as far as is known.
-RunsByCampaign waiting_runs(const State& state, const Worker& worker) {
+/// What the worker does not compute yet, as far as is known, and one of the idle ones could.
+RunsByCampaign waiting_runs(const State& state, const Worker& worker,
+                            const std::vector<WorkerId>& idle) {
   RunsByCampaign waiting;
   for (const LeaseId id : worker.leases) {
     const Lease& lease = state.leases.at(id);
-    const bool is_wanted = lease.kind == LeaseKind::first && !lease.is_alone;
-    if (is_wanted && is_lent(state.campaigns.at(lease.campaign))) {
+    const CampaignState& campaign = state.campaigns.at(lease.campaign);
+    const bool is_wanted = lease.kind == LeaseKind::first && !lease.is_alone &&
+                           std::ranges::any_of(idle, [&](WorkerId other) {
+                             return can_compute(state.workers.at(other), campaign);
+                           });
+    if (is_wanted && is_lent(campaign)) {
       waiting[lease.campaign].add(lease.remaining);
     }
   }
@@ -47,20 +63,32 @@ RunsByCampaign waiting_runs(const State& state, const Worker& worker) {
   return waiting;
 }
 
-/// Asks a worker that has more than its slots can hold for the rest of it, at most `count_max`
-/// runs.
-/// @return How many runs it was asked for.
-std::uint64_t retract_from(State& state, WorkerId id, std::uint64_t count_max, TimePoint now,
-                           Outbox& outbox) {
+/// Slots that the worker's runs need, if each takes no more than it must.
+std::uint64_t num_slots_held(const State& state, const Worker& worker) {
+  std::uint64_t count = 0;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = state.leases.at(id);
+    count += lease.remaining.size() * lease.slots_per_run;
+  }
+  return count;
+}
+
+/// Asks a worker that has more than its slots can hold for the rest of it, at most what
+/// `count_max` slots can hold.
+/// @return For how many slots it was asked.
+std::uint64_t retract_from(State& state, WorkerId id, const std::vector<WorkerId>& idle,
+                           std::uint64_t count_max, TimePoint now, Outbox& outbox) {
   Worker& worker = state.workers.at(id);
-  if (worker.num_lent <= worker.num_slots) return 0;
-  std::uint64_t num_left = std::min<std::uint64_t>(count_max, worker.num_lent - worker.num_slots);
+  if (num_slots_held(state, worker) <= worker.num_slots) return 0;
+  std::uint64_t num_left =
+      std::min<std::uint64_t>(count_max, num_slots_held(state, worker) - worker.num_slots);
   const std::uint64_t num_before = num_left;
-  for (auto& [campaign, waiting] : waiting_runs(state, worker)) {
-    const std::uint64_t count = std::min(num_left, waiting.size());
+  for (auto& [campaign, waiting] : waiting_runs(state, worker, idle)) {
+    const std::uint64_t slots = slots_per_run(worker, state.campaigns.at(campaign));
+    const std::uint64_t count = std::min(num_left / slots, waiting.size());
     if (count == 0) continue;
     send_retract(id, campaign, waiting.take_last(count), outbox);
-    num_left -= count;
+    num_left -= count * slots;
   }
   if (num_left < num_before) {
     worker.retracted_at = now;
@@ -77,12 +105,13 @@ bool may_be_asked(const State& state, const Worker& worker, TimePoint now) {
          now - worker.retracted_at >= state.config.heartbeat_interval;
 }
 
-std::uint64_t retract(State& state, std::uint64_t count_max, TimePoint now, Outbox& outbox) {
+std::uint64_t retract(State& state, const std::vector<WorkerId>& idle, std::uint64_t count_max,
+                      TimePoint now, Outbox& outbox) {
   std::uint64_t num_asked = 0;
   for (const auto& [id, worker] : state.workers) {
     if (num_asked >= count_max) break;
     if (!may_be_asked(state, worker, now)) continue;
-    num_asked += retract_from(state, id, count_max - num_asked, now, outbox);
+    num_asked += retract_from(state, id, idle, count_max - num_asked, now, outbox);
   }
   return num_asked;
 }
@@ -109,16 +138,18 @@ class Copying {
 
   /// Takes what there is room for of the runs of a lease.
   void take_from(const Lease& lease) {
-    if (num_left_ == 0 || lease.worker == id_) return;
-    const auto& [copies, suspects] = std::tie(state_.campaigns.at(lease.campaign).copies,
-                                              state_.campaigns.at(lease.campaign).suspects);
+    const Worker& worker = state_.workers.at(id_);
+    const CampaignState& campaign = state_.campaigns.at(lease.campaign);
+    if (lease.worker == id_ || !can_compute(worker, campaign)) return;
+    const std::uint64_t slots = slots_per_run(worker, campaign);
+    const auto& [copies, suspects] = std::tie(campaign.copies, campaign.suspects);
     for (const RunRange& range : lease.remaining.ranges()) {
-      for (RunIndex run = range.first; run.value < range.end() && num_left_ > 0; ++run.value) {
+      for (RunIndex run = range.first; run.value < range.end() && num_left_ >= slots; ++run.value) {
         const auto found = copies.find(run);
         if (suspects.contains(run) || (found != copies.end() && !may_copy(found->second))) continue;
         const Attempt newest = found == copies.end() ? lease.attempt : found->second.newest;
         runs_[{lease.campaign, after(newest)}].add({run, 1});
-        --num_left_;
+        num_left_ -= slots;
       }
     }
   }
@@ -176,6 +207,7 @@ bool is_exclusive(const State& state, const Lease& lease) {
 void take_over(State& state, LeaseId id, WorkerId idle, TimePoint now, Outbox& outbox) {
   const auto found = state.leases.find(id);
   if (found == state.leases.end() || found->second.worker == idle) return;
+  if (!can_compute(state.workers.at(idle), state.campaigns.at(found->second.campaign))) return;
   const RunSet runs = found->second.remaining;
   send_retract(found->second.worker, found->second.campaign, runs, outbox);
   for (const RunRange& range : runs.ranges()) note_unleased(state, id, range);
@@ -239,7 +271,7 @@ void speculate(State& state, TimePoint now, Outbox& outbox) {
   note_standstill(state, idle.size(), now, outbox);
   std::uint64_t num_wanted = 0;
   for (const WorkerId id : idle) num_wanted += room(state.workers.at(id));
-  std::uint64_t num_coming = retract(state, num_wanted, now, outbox);
+  std::uint64_t num_coming = retract(state, idle, num_wanted, now, outbox);
   while (!idle.empty() && num_coming > 0) {
     num_coming -= std::min(num_coming, room(state.workers.at(idle.back())));
     idle.pop_back();

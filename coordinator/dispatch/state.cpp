@@ -8,6 +8,7 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 
@@ -52,6 +53,21 @@ std::uint64_t num_settled(const CampaignState& campaign) {
 bool is_finished(const CampaignState& campaign) {
   return num_settled(campaign) == campaign.definition->num_runs && campaign.to_audit.empty() &&
          campaign.audits.empty() && campaign.num_comparing == 0;
+}
+
+bool can_compute(const Worker& worker, const CampaignState& campaign) {
+  return std::ranges::find(worker.models, campaign.model) != worker.models.end();
+}
+
+bool lacks_workers(const State& state, const CampaignState& campaign) {
+  return campaign.phase == Phase::active && !state.workers.empty() &&
+         std::ranges::none_of(state.workers,
+                              [&](const auto& item) { return can_compute(item.second, campaign); });
+}
+
+std::uint64_t slots_per_run(const Worker& worker, const CampaignState& campaign) {
+  const std::uint64_t batch_size = campaign.definition->model().batch_size();
+  return std::max<std::uint64_t>(1, worker.slots_per_thread / batch_size);
 }
 
 bool expects_no_result(const CampaignState& campaign) {

@@ -91,8 +91,15 @@ struct DispatchConfig {
   std::size_t num_workers_max = 4096;
   std::size_t hosts_per_key_max = 4096;  ///< Remembered; those with workers are not forgotten.
   double hellos_per_s_max = 500.0;       ///< More are not answered; workers repeat them.
-  /// Digest of core's reference simulation, as this coordinator computes it.
+  /// Of the built-in model, as this coordinator computes it.
   std::uint64_t reference_digest = 0;
+};
+
+/// What must be the same where the runs of a campaign are computed.
+struct ModelIdentity {
+  std::string version;                 ///< Model::version().
+  std::uint64_t reference_digest = 0;  ///< Model::reference_digest().
+  bool operator==(const ModelIdentity&) const = default;
 };
 
 /// A batch that a worker computes, and since when it has come no further.
@@ -119,8 +126,10 @@ struct Worker {
   std::string host_name;  ///< As the worker gave it.
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
-  std::uint32_t num_card_slots = 0;  ///< Among these.
-  std::string cards;                 ///< What they are, as the worker says.
+  std::uint32_t num_card_slots = 0;    ///< Among these.
+  std::uint32_t slots_per_thread = 0;  ///< Of processors; 0 if each run takes one.
+  std::string cards;                   ///< What they are, as the worker says.
+  std::vector<ModelIdentity> models;
   TimePoint registered_at;
   TimePoint heard_at;                    ///< Last message of any kind.
   std::uint64_t heartbeat_sequence = 0;  ///< Of the newest heartbeat.
@@ -175,8 +184,10 @@ struct Lease {
   bool is_for_cards = false;  ///< Otherwise for processors.
   bool is_retracted = false;  ///< The worker is asked, at each heartbeat, to give back what it can.
   bool is_adopted = false;    ///< Held before it was lent: when it began is not known.
-  std::uint64_t num_runs = 0;  ///< In `remaining` when it was opened.
-  /// Slots that these were lent for: at least one a run, and more for the last runs of a campaign.
+  std::uint64_t num_runs = 0;       ///< In `remaining` when it was opened.
+  std::uint64_t slots_per_run = 1;  ///< slots_per_run() of worker and campaign.
+  /// Slots that these were lent for: at least slots_per_run a run, and more for the last runs of a
+  /// campaign.
   std::uint64_t num_slots = 0;
   RunSet remaining;
   TimePoint lent_at;
@@ -239,6 +250,7 @@ struct AuditKey {
 /// the leases, or count.
 struct CampaignState {
   std::shared_ptr<const Campaign> definition;  ///< Shared with messages under way.
+  ModelIdentity model;
   Phase phase = Phase::active;
   int priority = 0;                   ///< Runs of a higher one are lent first.
   double audit_fraction = 0.0;        ///< Of its runs, computed a second time, by another worker.
@@ -268,6 +280,8 @@ struct CampaignState {
 /// A campaign as the store has it when the coordinator starts.
 struct StoredCampaign {
   std::shared_ptr<const Campaign> definition;
+  /// Of its model, where it began; 0 for the coordinator's own.
+  std::uint64_t reference_digest = 0;
   CampaignControl control = {};
   std::vector<RunRange> finished = {};
   std::vector<RunRange> given_up = {};
@@ -355,6 +369,16 @@ struct State {
 
 /// True if every run is settled, and every audit done.
 [[nodiscard]] bool is_finished(const CampaignState& campaign);
+
+/// True if the worker has the campaign's model.
+[[nodiscard]] bool can_compute(const Worker& worker, const CampaignState& campaign);
+
+/// True if there are workers, and none of them has the model of a campaign that is to go on.
+[[nodiscard]] bool lacks_workers(const State& state, const CampaignState& campaign);
+
+/// Slots of its processors that a worker needs for a run: more than one if a thread has more than
+/// the runs that the model computes together.
+[[nodiscard]] std::uint64_t slots_per_run(const Worker& worker, const CampaignState& campaign);
 
 /// True if no run of the campaign waits or is lent: all results have come.
 [[nodiscard]] bool expects_no_result(const CampaignState& campaign);

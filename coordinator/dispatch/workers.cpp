@@ -33,19 +33,40 @@ proto::Envelope stop_message() {
   return envelope;
 }
 
+/// Where a program of one version computes something else than it did where the campaigns of this
+/// version began.
+std::optional<proto::Envelope> refusal_of(const State& state, const proto::OtherModel& other) {
+  std::optional<std::uint64_t> expected;
+  for (const CampaignId id : state.served) {
+    const ModelIdentity& wanted = state.campaigns.at(id).model;
+    if (wanted.version != other.version()) continue;
+    if (wanted.reference_digest == other.reference_digest()) return std::nullopt;
+    expected = wanted.reference_digest;
+  }
+  if (!expected) return std::nullopt;
+  return wire::rejection(
+      proto::REJECT_REASON_INCOMPATIBLE,
+      fmt::format("reference_digest of {} = {:016x} (must be {:016x}, where its campaign began)",
+                  other.version(), other.reference_digest(), *expected));
+}
+
 /// Why a worker that says Hello cannot be taken, as a Reject; nothing if it can.
 std::optional<proto::Envelope> refusal(const State& state, const HostId& host,
                                        const proto::Hello& hello) {
-  if (hello.model_version() != model().version()) {
+  const std::string_view own_version = built_in_model().version();
+  if (hello.model_version() != own_version) {
     return wire::rejection(proto::REJECT_REASON_INCOMPATIBLE,
                            fmt::format("model_version = {} (must be {}, the coordinator's)",
-                                       hello.model_version(), model().version()));
+                                       hello.model_version(), own_version));
   }
   if (hello.reference_digest() != state.config.reference_digest) {
     return wire::rejection(
         proto::REJECT_REASON_INCOMPATIBLE,
         fmt::format("reference_digest = {:016x} (must be {:016x}, the coordinator's)",
                     hello.reference_digest(), state.config.reference_digest));
+  }
+  for (const proto::OtherModel& other : hello.other_models()) {
+    if (auto refused = refusal_of(state, other)) return refused;
   }
   if (state.quarantined.contains(host)) {
     return wire::rejection(proto::REJECT_REASON_QUARANTINED,
@@ -84,7 +105,12 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   worker.process_id = hello.process_id();
   worker.num_slots = hello.num_slots();
   worker.num_card_slots = hello.num_card_slots();
+  worker.slots_per_thread = hello.slots_per_thread();
   worker.cards = hello.cards();
+  worker.models.push_back({hello.model_version(), hello.reference_digest()});
+  for (const proto::OtherModel& other : hello.other_models()) {
+    worker.models.push_back({other.version(), other.reference_digest()});
+  }
   worker.registered_at = now;
   worker.heard_at = now;
   worker.heartbeat_at = now;
@@ -105,6 +131,9 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   if (worker.num_card_slots > 0) {
     fields.emplace_back("card_slots", worker.num_card_slots);
     fields.emplace_back("cards", worker.cards);
+  }
+  for (const proto::OtherModel& other : hello.other_models()) {
+    fields.emplace_back("model", other.version());
   }
   outbox.log({.kind = "worker_registered", .fields = std::move(fields)});
 }

@@ -96,8 +96,8 @@ Order order_for(const proto::AnswerRequest& request, const ServiceConfig& config
     require_option(command, option);
     order.arguments.push_back(option);
   }
-  if (const auto program = wire::chosen_model_program()) {
-    order.arguments.insert(order.arguments.end(), {"--model-program", program->string()});
+  for (std::string& argument : wire::model_program_arguments()) {
+    order.arguments.push_back(std::move(argument));
   }
   order.arguments.insert(order.arguments.end(),
                          {"--", std::filesystem::absolute(database).string()});

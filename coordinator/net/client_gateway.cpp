@@ -12,6 +12,7 @@
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/result_rules.hpp"
+#include "proto/model_program/described_model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -23,6 +24,15 @@ proto::ReplyEnvelope part_reply(std::uint64_t next_offset) {
   proto::ReplyEnvelope reply;
   reply.mutable_part()->set_next_offset(next_offset);
   return reply;
+}
+
+/// The one that the client has; this program need not have it.
+const Model& model_of(const proto::SubmitRequest& submit) {
+  const std::string& version = submit.definition().model_version();
+  if (version.empty()) return built_in_model();
+  return wire::recorded_model({.version = version,
+                               .description = submit.model_description(),
+                               .reference_digest = submit.reference_digest()});
 }
 
 using Decoded = std::variant<Request, wire::DecodeError>;
@@ -42,7 +52,8 @@ Decoded decode(std::string_view bytes) {
 
 Request request_of(proto::RequestEnvelope message) {
   if (!message.has_submit()) return {.message = std::move(message)};
-  std::shared_ptr<const Campaign> campaign = model().campaign_of(
+  const Model& model = model_of(message.submit());
+  std::shared_ptr<const Campaign> campaign = model.campaign_of(
       wire::take_definition(*message.mutable_submit()), TableColumns::included, "definition");
   check_campaign_name(campaign->name, NameOrigin::given);
   const std::string& rule = message.submit().stop_rule();

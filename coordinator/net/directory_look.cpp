@@ -28,9 +28,18 @@
 namespace proofmass::coordinator {
 namespace {
 
+/// One that older programs began has no digest of its model.
+std::uint64_t reference_digest_of(const ServedCampaign& campaign) {
+  const Model& model = campaign.definition->model();
+  if (model.description().empty()) return 0;
+  const std::uint64_t recorded = campaign.store.reference_digest();
+  return recorded != 0 ? recorded : model.reference_digest(best_instruction_set());
+}
+
 StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
   const Store& store = campaign.store;
   StoredCampaign stored{.definition = campaign.definition,
+                        .reference_digest = reference_digest_of(campaign),
                         .control = store.control(),
                         .finished = store.finished_runs(),
                         .elsewhere = campaign.elsewhere,

@@ -94,7 +94,7 @@ proto::StatusReply RequestService::service_status() const {
   const TimePoint now = context_.now();
   proto::StatusReply reply;
   reply.set_version(context_.config.version);
-  reply.set_model_version(std::string(model().version()));
+  reply.set_model_version(std::string(built_in_model().version()));
   reply.set_uptime_s(seconds(now - began_at_));
   reply.set_num_workers(state.workers.size());
   reply.set_num_slots(state.num_slots);

@@ -122,7 +122,7 @@ const Model& model_of(sqlite3* connection, const std::string& database) {
                   version.integer(0) < first_with_description ? "''" : "model_description",
                   quoted_name(database)));
   row.require_row();
-  return wire::stored_model(row.text(0), row.text(1));
+  return wire::recorded_model({.version = row.text(0), .description = row.text(1)});
 }
 
 std::string name_in(sqlite3* connection, const std::string& database) {

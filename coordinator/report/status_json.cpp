@@ -39,9 +39,11 @@ StatusJson campaign_object(const proto::CampaignStatus& campaign) {
   json.update({{"rate_hz", campaign.rate_hz()},
                {"remaining_s", nullptr},
                {"storage_failure", nullptr},
+               {"missing_model", nullptr},
                {"owner", nullptr}});
   if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();
   if (!campaign.storage_failure().empty()) json["storage_failure"] = campaign.storage_failure();
+  if (!campaign.missing_model().empty()) json["missing_model"] = campaign.missing_model();
   if (!campaign.owner().empty()) json["owner"] = campaign.owner();
   return json;
 }

@@ -66,6 +66,9 @@ std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
   if (!campaign.storage_failure().empty()) {
     add_trouble("nothing can be stored: " + wire::visible_text(campaign.storage_failure()));
   }
+  if (!campaign.missing_model().empty()) {
+    add_trouble("no worker has the model " + wire::visible_text(campaign.missing_model()));
+  }
   if (campaign.num_given_up() > 0) {
     add_trouble(counted(campaign.num_given_up(), "run") + " given up: too many workers crashed");
   }

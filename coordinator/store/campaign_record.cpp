@@ -74,7 +74,8 @@ CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth)
   status.set_num_given_up(database.count("SELECT count(*) FROM run_failure"));
   status.set_num_done(database.count("SELECT coalesce(max(num_finished), 0) FROM summary"));
   const bool is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
-  const bool can_go_on = kind.model->can_simulate();
+  const bool can_go_on =
+      kind.model->can_simulate() || kind.model->reference_digest(best_instruction_set()) != 0;
   if (!can_go_on && status.phase() == proto::CAMPAIGN_PHASE_ACTIVE) {
     status.set_phase(proto::CAMPAIGN_PHASE_PAUSED);
   }

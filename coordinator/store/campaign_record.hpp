@@ -34,8 +34,8 @@ struct CampaignRecord {
   std::uint64_t num_waiting = 0;  ///< Results that were delivered and are not stored yet.
   /// The campaign is finished or cancelled, its statistics are up to date, and there is no log:
   /// everything is in this one file, and nothing remains to be done. Or this program cannot go on
-  /// with it, as it has no program of its model; if it is active, the status says that it is
-  /// paused.
+  /// with it, as it has no program of its model and the file no reference digest; if it is active,
+  /// the status says that it is paused.
   bool is_closed = false;
   std::optional<FileStamp> stamp = {};  ///< Of a closed file that was looked at since.
 };

@@ -129,6 +129,11 @@ std::string Store::model_version() const {
   impl_->database.refuse_as_damaged(fmt::format("model_version = {}", version));
 }
 
+std::uint64_t Store::reference_digest() const {
+  return detail::reference_digest_in(impl_->database,
+                                     impl_->database.text("SELECT reference_digest FROM campaign"));
+}
+
 std::string Store::build() const { return impl_->database.text("SELECT build FROM campaign"); }
 
 std::string Store::created_utc() const {

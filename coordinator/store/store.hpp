@@ -128,8 +128,11 @@ class Store {
   /// campaign recorded them. It lives as long as the Store.
   [[nodiscard]] const ResultSchema& schema() const;
   [[nodiscard]] std::string model_version() const;  ///< Of the program that made the file.
-  [[nodiscard]] std::string build() const;          ///< Of the program that made the file.
-  [[nodiscard]] std::string created_utc() const;    ///< As in `2024-02-29T12:00:10Z`.
+  /// Model::reference_digest() where the campaign began; 0 if the model has no description, or an
+  /// older program began it.
+  [[nodiscard]] std::uint64_t reference_digest() const;
+  [[nodiscard]] std::string build() const;        ///< Of the program that made the file.
+  [[nodiscard]] std::string created_utc() const;  ///< As in `2024-02-29T12:00:10Z`.
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.
   [[nodiscard]] std::string owner() const;
   void set_owner(std::string_view owner);

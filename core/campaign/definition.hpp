@@ -37,6 +37,8 @@ struct Definition {
   /// Values of which each run has one of its own, a column for each `table` law, in their order.
   /// Workers get them with the runs instead.
   std::vector<std::vector<double>> table_columns = {};
+  /// Version of the model; empty: the one that programs are built with.
+  std::string model = {};
 
   bool operator==(const Definition&) const = default;
 };

@@ -20,12 +20,6 @@
 namespace proofmass::wire {
 namespace {
 
-/// `hardy2013` of `hardy2013-6`; empty if there is no such name.
-std::string_view name_of_model(std::string_view version) {
-  const std::size_t end = version.rfind('-');
-  return end == version.npos ? std::string_view() : version.substr(0, end);
-}
-
 std::string value_text(const DefinitionValue& value) {
   if (const auto* const whole = std::get_if<std::int64_t>(&value)) return fmt::to_string(*whole);
   if (const auto* const number = std::get_if<double>(&value)) return detail::number_text(*number);
@@ -110,7 +104,7 @@ Definition DescribedCampaign::definition(TableColumns) const {
     }
     text += fmt::format("{} = {}\n", item.key.substr(dot + 1), value_text(item.value));
   }
-  return {.text = std::move(text)};
+  return {.text = std::move(text), .model = std::string(model_->version())};
 }
 
 std::vector<DefinitionDifference> DescribedCampaign::differences_from(const Campaign& other) const {
@@ -203,6 +197,11 @@ ResultSchema DescribedCampaign::results() const {
   return schema;
 }
 
+DescribedModel::DescribedModel(ProgramDescription description, std::uint64_t reference_digest)
+    : DescribedModel(std::move(description), nullptr) {
+  reference_digest_ = reference_digest;
+}
+
 DescribedModel::DescribedModel(ProgramDescription description,
                                std::unique_ptr<const RunnableProgram> program)
     : parts_(std::move(description)), program_(std::move(program)) {
@@ -222,8 +221,11 @@ ResultSchema DescribedModel::results_of(std::string_view, std::string_view) cons
 }
 
 std::uint64_t DescribedModel::reference_digest(InstructionSet set) const {
+  const std::lock_guard lock(digest_mutex_);
+  if (reference_digest_) return *reference_digest_;
   constexpr std::uint64_t num_runs = 3;
   std::uint64_t digest = fnv1a_basis;
+  for (const char letter : parts_.text) digest = fnv1a(digest, static_cast<unsigned char>(letter));
   const std::unique_ptr<const Plan> plan = DescribedCampaign(*this).prepare();
   for (std::uint64_t run = 0; run < num_runs; ++run) {
     const RunRequest request{RunIndex{run}, {}};
@@ -232,7 +234,7 @@ std::uint64_t DescribedModel::reference_digest(InstructionSet set) const {
       digest = fnv1a(digest, std::bit_cast<std::uint64_t>(value));
     }
   }
-  return digest;
+  return *(reference_digest_ = digest);
 }
 
 std::unique_ptr<Campaign> DescribedModel::campaign_of(Definition definition, TableColumns,
@@ -240,6 +242,7 @@ std::unique_ptr<Campaign> DescribedModel::campaign_of(Definition definition, Tab
   Document document(std::string(source), definition.text, {});
   auto campaign = std::make_unique<DescribedCampaign>(*this);
   campaign->read(document);
+  definition.model = version();
   if (campaign->definition(TableColumns::included) == definition) return campaign;
   throw DefinitionError(fmt::format("{}: is no definition of {}", source, version()));
 }
@@ -257,7 +260,9 @@ std::unique_ptr<Campaign> DescribedModel::read_campaign(Document& document, Data
 }
 
 std::string DescribedModel::example() const {
-  return DescribedCampaign(*this).definition(TableColumns::included).text;
+  std::string text = DescribedCampaign(*this).definition(TableColumns::included).text;
+  const std::size_t second_line = text.find('\n') + 1;
+  return text.insert(second_line, fmt::format("model = \"{}\"\n", name_of_model(version())));
 }
 
 namespace {
@@ -266,43 +271,62 @@ namespace {
 /// descriptions, each of some thousand.
 constexpr std::size_t descriptions_size_max = std::size_t{64} << 20;
 
-const DescribedModel& described_model(std::string_view text) {
+const DescribedModel& described_model(const std::string& text, std::uint64_t reference_digest) {
   static std::mutex mutex;
-  static std::map<std::string, DescribedModel, std::less<>> models;
+  static std::map<std::pair<std::string, std::uint64_t>, DescribedModel> models;
   static std::size_t size = 0;
   const std::lock_guard lock(mutex);
-  const auto known = models.find(text);
+  const auto known = models.find({text, reference_digest});
   if (known != models.end()) return known->second;
   if (size + text.size() > descriptions_size_max) {
     throw ModelProgramError(
         fmt::format("description: this program has read {} others, of {} bytes; start it again",
                     models.size(), size));
   }
-  const auto made = models.try_emplace(std::string(text), description_in(text), nullptr).first;
+  ProgramDescription description = description_in(text);
+  const auto made =
+      models.try_emplace({text, reference_digest}, std::move(description), reference_digest);
   size += text.size();
-  return made->second;
+  return made.first->second;
+}
+
+/// That of this program with the same version, and the same description if it has one; or, if it is
+/// in C++, with the same name: it knows what its older versions recorded.
+const Model* own_model(const ModelRecord& record) {
+  const Model* const found = find_model(record.version);
+  if (found != nullptr && found->description() == record.description) return found;
+  // Descriptions of those that were made before there were any are empty.
+  if (!record.description.empty()) return nullptr;
+  if (found != nullptr) return found;
+  const std::string_view name = name_of_model(record.version);
+  const Model& built_in = built_in_model();
+  return name.empty() || name == name_of_model(built_in.version()) ? &built_in : nullptr;
+}
+
+/// `hardy2013-6 and oscillator-1`.
+std::string own_versions() {
+  std::string text;
+  for (const Model* const own : models()) {
+    text = fmt::format("{}{}{}", own->version(), text.empty() ? "" : " and ", text);
+  }
+  return text;
 }
 
 }  // namespace
 
-const Model& stored_model(std::string_view version, std::string_view description) {
-  const Model& own = model();
-  if (version == own.version()) return own;
-  // A model in C++ knows what its older versions recorded; one with a description is known by it.
-  const std::string_view name = name_of_model(version);
-  const bool is_own = name.empty() || name == name_of_model(own.version());
-  if (is_own && (description.empty() || own.description().empty())) return own;
-  if (description.empty()) {
+const Model& recorded_model(const ModelRecord& record) {
+  if (const Model* const own = own_model(record)) return *own;
+  if (record.description.empty()) {
     throw ModelProgramError(fmt::format(
         "is of the model {}, and this program has {}; --model-program names that of another model",
-        version, own.version()));
+        record.version, own_versions()));
   }
   try {
-    const Model& described = described_model(description);
-    if (described.version() == version) return described;
+    const Model& described = described_model(record.description, record.reference_digest);
+    if (described.version() == record.version) return described;
     throw ModelProgramError(fmt::format("description: of {}", described.version()));
   } catch (const ModelProgramError& error) {
-    throw ModelProgramError(fmt::format("is of the model {}: {}", version, error.what()));
+    throw ModelProgramError(fmt::format("is of the model {}: {}", record.version, error.what()));
   }
 }
 

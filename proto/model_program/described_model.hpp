@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -69,8 +71,11 @@ class RunnableProgram {
 /// simulation.
 class DescribedModel final : public Model {
  public:
-  /// @param program  Null if it is not there: what needs it throws ModelProgramError.
-  DescribedModel(ProgramDescription description, std::unique_ptr<const RunnableProgram> program);
+  explicit DescribedModel(ProgramDescription description,
+                          std::unique_ptr<const RunnableProgram> program);
+  /// Without its program: what needs it throws ModelProgramError.
+  /// @param reference_digest  As the program computed it.
+  DescribedModel(ProgramDescription description, std::uint64_t reference_digest);
   DescribedModel(const DescribedModel&) = delete;
   DescribedModel& operator=(const DescribedModel&) = delete;
 
@@ -81,6 +86,7 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_; }
   [[nodiscard]] std::string_view step_name() const override { return "steps"; }
   [[nodiscard]] std::size_t batch_size() const override { return parts_.runs_at_once; }
+  /// Of the description and of the first three runs of the example, which are computed once.
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override;
   [[nodiscard]] std::string_view description() const override { return parts_.text; }
   [[nodiscard]] bool can_simulate() const override { return program_ != nullptr; }
@@ -100,16 +106,23 @@ class DescribedModel final : public Model {
   std::unique_ptr<const RunnableProgram> program_;
   std::vector<DrawnQuantity> drawn_;
   std::string example_file_;
+  mutable std::mutex digest_mutex_;
+  mutable std::optional<std::uint64_t> reference_digest_;
 };
 
-/// The model of a stored campaign: model() if that is the one; else what its database says of it.
-/// It lives as long as the program, as do the texts of its results; the same description yields
-/// the same model.
-///
-/// @param version      Of the model that began the campaign.
-/// @param description  Model::description() of that one. Both may be anything at all.
+/// By which a database, or a client, says what a campaign's model is. All of it may be anything.
+struct ModelRecord {
+  std::string version = {};
+  std::string description = {};  ///< Model::description().
+  /// Model::reference_digest() of a model with a description; 0 if it was not recorded.
+  std::uint64_t reference_digest = 0;
+};
+
+/// The model of a campaign from elsewhere: that of models() if it is there; else what is said of
+/// it. It lives as long as the program, as do the texts of its results; the same record yields the
+/// same model.
 /// @throws ModelProgramError `is of the model ...` if there is no description of it, or one that
 ///         breaks a rule; or if this program has read too many.
-[[nodiscard]] const Model& stored_model(std::string_view version, std::string_view description);
+[[nodiscard]] const Model& recorded_model(const ModelRecord& record);
 
 }  // namespace proofmass::wire

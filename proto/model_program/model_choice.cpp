@@ -1,6 +1,9 @@
 #include "proto/model_program/model_choice.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
 #include <string>
@@ -10,6 +13,7 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/surroundings.hpp"
 #include "proto/model_program/program_model.hpp"
+#include "proto/wire/messages.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -17,51 +21,98 @@ namespace {
 constexpr std::string_view option = "--model-program";
 constexpr const char* variable = "PROOFMASS_MODEL_PROGRAM";
 
-struct Choice {
+struct ChosenModel {
   std::filesystem::path program;
   std::unique_ptr<const Model> model;
 };
 
-std::optional<Choice>& choice() {
-  static std::optional<Choice> choice;
-  return choice;
+std::vector<ChosenModel>& chosen_models() {
+  static std::vector<ChosenModel> chosen;
+  return chosen;
+}
+
+std::filesystem::path whole_path(std::string_view named) {
+  return std::filesystem::absolute(named).lexically_normal();
+}
+
+/// Of the arguments, or else of the variable, with colons between them.
+std::vector<std::string> named_programs(int argc, const char* const* argv) {
+  std::vector<std::string> programs;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (!argument.starts_with(option)) continue;
+    if (argument.size() == option.size() && i + 1 < argc) programs.emplace_back(argv[i + 1]);
+    if (argument.substr(option.size()).starts_with('=')) {
+      programs.emplace_back(argument.substr(option.size() + 1));
+    }
+  }
+  const char* const listed = std::getenv(variable);
+  if (programs.empty() && listed != nullptr) programs = CLI::detail::split(listed, ':');
+  std::erase(programs, "");
+  return programs;
 }
 
 }  // namespace
 
-void choose_model(int argc, const char* const* argv) {
-  const char* named = std::getenv(variable);
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view argument = argv[i];
-    if (!argument.starts_with(option)) continue;
-    if (argument.size() == option.size() && i + 1 < argc) named = argv[i + 1];
-    if (argument.substr(option.size()).starts_with('=')) named = argv[i] + option.size() + 1;
+void choose_models(int argc, const char* const* argv) {
+  std::vector<ChosenModel>& chosen = chosen_models();
+  std::vector<const Model*> used;
+  for (const std::string& named : named_programs(argc, argv)) {
+    const std::filesystem::path program = whole_path(named);
+    if (std::ranges::find(chosen, program, &ChosenModel::program) != chosen.end()) continue;
+    settle_surroundings();  // Its pipes are to be no standard descriptors.
+    std::unique_ptr<const Model> model = model_of(program);
+    const auto has_its_version = [&](const Model* other) {
+      return other->version() == model->version();
+    };
+    if (has_its_version(&built_in_model()) || std::ranges::any_of(used, has_its_version)) {
+      throw InvalidArgument(fmt::format("model-program = {} (is {}, as another model that is here)",
+                                        named, model->version()));
+    }
+    if (used.size() == other_models_max) {
+      throw InvalidArgument(
+          fmt::format("model-program = {} (must be at most {} programs)", named, other_models_max));
+    }
+    used.push_back(model.get());
+    chosen.push_back({.program = program, .model = std::move(model)});
   }
-  if (named == nullptr || *named == '\0') return;
-  settle_surroundings();  // Its pipes are to be no standard descriptors.
-  const std::filesystem::path program = std::filesystem::absolute(named).lexically_normal();
-  choice() = Choice{.program = program, .model = model_of(program)};
-  use_model(*choice()->model);
+  use_models(std::move(used));
 }
 
-std::optional<std::filesystem::path> chosen_model_program() {
-  if (!choice()) return std::nullopt;
-  return choice()->program;
+std::vector<std::string> model_program_arguments() {
+  std::vector<std::string> arguments;
+  for (const ChosenModel& chosen : chosen_models()) {
+    arguments.insert(arguments.end(), {std::string(option), chosen.program.string()});
+  }
+  return arguments;
+}
+
+std::optional<std::filesystem::path> program_of(const Model& model) {
+  for (const ChosenModel& chosen : chosen_models()) {
+    if (chosen.model.get() == &model) return chosen.program;
+  }
+  return std::nullopt;
 }
 
 void add_model_program_option(CLI::App& app) {
-  app.add_option_function<std::string>(
+  app.add_option_function<std::vector<std::string>>(
          std::string(option),
-         [](const std::string& named) {
-           const std::filesystem::path program = std::filesystem::absolute(named);
-           if (chosen_model_program() == program.lexically_normal()) return;
-           throw InvalidArgument("model-program = " + named +
-                                 " (must be an argument or the variable " + variable +
-                                 ", as it decides what other options mean)");
+         [](const std::vector<std::string>& named) {
+           for (const std::string& program : named) {
+             if (std::ranges::find(chosen_models(), whole_path(program), &ChosenModel::program) !=
+                 chosen_models().end()) {
+               continue;
+             }
+             throw InvalidArgument("model-program = " + program +
+                                   " (must be an argument or the variable " + variable +
+                                   ", as it decides what other options mean)");
+           }
          },
-         "Program that simulates in place of the built-in\nmodel")
+         "Program that simulates a model of its own; may be\ngiven several times")
       ->type_name(file_type)
-      ->envname(variable);
+      ->envname(variable)
+      ->delimiter(':')
+      ->allow_extra_args(false);
 }
 
 }  // namespace proofmass::wire

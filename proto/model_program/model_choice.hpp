@@ -2,23 +2,32 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace CLI {
 class App;
 }  // namespace CLI
 
+namespace proofmass {
+class Model;
+}  // namespace proofmass
+
 namespace proofmass::wire {
 
-/// Makes model() that of the program which the option `--model-program PATH` or the variable
-/// PROOFMASS_MODEL_PROGRAM names; leaves it as it is if there is neither. To be called first, by
-/// one thread: help texts and options depend on the model.
-/// @throws ModelProgramError as model_of() does.
-void choose_model(int argc, const char* const* argv);
+/// Puts the models of the programs before the built-in one which the options `--model-program PATH`
+/// or, without any, the variable PROOFMASS_MODEL_PROGRAM name, the latter with colons between them.
+/// To be called first, by one thread: help texts and options depend on the models.
+/// @throws ModelProgramError as model_of() does; InvalidArgument if two have one version.
+void choose_models(int argc, const char* const* argv);
 
-/// The program of choose_model(), for workers that this process starts.
-[[nodiscard]] std::optional<std::filesystem::path> chosen_model_program();
+/// The options that name the programs of choose_models(), for programs that this process starts.
+[[nodiscard]] std::vector<std::string> model_program_arguments();
 
-/// Declares `--model-program`, which choose_model() has followed; a file of options cannot set it.
+/// The program of one of models(), if it has one.
+[[nodiscard]] std::optional<std::filesystem::path> program_of(const Model& model);
+
+/// Declares `--model-program`, which choose_models() has followed; a file of options cannot set it.
 void add_model_program_option(CLI::App& app);
 
 }  // namespace proofmass::wire

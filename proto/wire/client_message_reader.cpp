@@ -38,6 +38,8 @@ void check(const proto::SubmitRequest& message) {
   require(fraction >= 0.0 && fraction <= 1.0, "audit", fmt::format("{}", fraction),
           "must be in [0, 1]");
   detail::check_definition(message.definition());
+  require_in(message.model_description().size(), 0, definition_text_size_max,
+             "model_description size");
   const std::string& rule = message.stop_rule();
   require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
           fmt::format("must be at most {}", stop_rule_size_max));
@@ -122,6 +124,7 @@ void check(const proto::CampaignStatus& message) {
   (void)checked_magnitude(message.rate_hz(), "rate_hz");
   (void)checked_magnitude(message.remaining_s(), "remaining_s");
   check_text(message.storage_failure(), "storage_failure");
+  check_text(message.missing_model(), "missing_model");
   check_owner(message.owner());
 }
 

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/model.hpp"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/conversions.hpp"
 
@@ -76,6 +75,12 @@ void check(const proto::Hello& hello) {
   check_name(hello.host(), "host");
   check_name(hello.model_version(), "model_version");
   check_name(hello.build(), "build");
+  require_in(hello.slots_per_thread(), 0, hello.num_slots() - hello.num_card_slots(),
+             "slots_per_thread");
+  require_count(hello.other_models_size(), 0, other_models_max, "other_models");
+  for (const proto::OtherModel& other : hello.other_models()) {
+    check_name(other.version(), "other_models.version");
+  }
   if (!hello.has_former()) return;
   require_in(hello.former().signal(), 0, signal_max, "former signal");
   (void)checked_id(hello.former().session(), "former session");
@@ -127,12 +132,10 @@ void check(const proto::RunLease& lease) {
   require_in(lease.num_runs(), 1, runs_per_lease_max, "num_runs");
   require_in(lease.first_run(), 0, num_runs_max - lease.num_runs(), "first_run");
   const auto& values = lease.table_values();
-  const auto num_runs = static_cast<int>(lease.num_runs());
-  const std::size_t num_drawn = model().drawn().size();
-  require(values.size() % num_runs == 0 &&
-              static_cast<std::size_t>(values.size() / num_runs) <= num_drawn,
-          "table_values", fmt::format("{} entries", values.size()),
-          fmt::format("must be the same number for each run, at most {}", num_drawn));
+  const auto num_values = static_cast<std::uint64_t>(values.size());
+  require(num_values % lease.num_runs() == 0 && num_values / lease.num_runs() <= table_columns_max,
+          "table_values", fmt::format("{} entries", num_values),
+          fmt::format("must be the same number for each run, at most {}", table_columns_max));
   const bool all_finite =
       std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   require(all_finite, "table_values", "not finite", "must be finite");

@@ -48,6 +48,7 @@ namespace detail {
 
 void write_definition(const Definition& definition, proto::Definition& message) {
   message.set_text(definition.text);
+  message.set_model_version(definition.model);
   for (const DataTable& table : definition.tables) {
     proto::DataTable& sent = *message.add_tables();
     sent.set_key(table.key);
@@ -61,6 +62,9 @@ void write_definition(const Definition& definition, proto::Definition& message) 
 
 void check_definition(const proto::Definition& message) {
   require_in(message.text().size(), 1, definition_text_size_max, "definition.text size");
+  if (!message.model_version().empty()) {
+    (void)checked_name(message.model_version(), "definition.model_version");
+  }
   require_count(message.tables_size(), 0, definition_tables_max, "definition.tables");
   require_count(message.table_columns_size(), 0, table_columns_max, "definition.table_columns");
   for (const proto::DataTable& table : message.tables()) check_table(table);
@@ -70,7 +74,7 @@ void check_definition(const proto::Definition& message) {
 }
 
 Definition read_definition(const proto::Definition& message) {
-  Definition definition{.text = message.text()};
+  Definition definition{.text = message.text(), .model = message.model_version()};
   for (const proto::DataTable& table : message.tables()) {
     definition.tables.push_back({.key = table.key(),
                                  .num_columns = table.num_columns(),

@@ -36,6 +36,7 @@ inline constexpr std::size_t router_message_size_max = std::size_t{1} << 20;
 inline constexpr std::uint64_t definition_tables_max = 64;
 inline constexpr std::uint64_t columns_of_a_table_max = 64;
 inline constexpr std::uint64_t table_columns_max = 1024;
+inline constexpr int other_models_max = 64;  ///< Of a worker, beside the built-in one.
 inline constexpr double heartbeat_interval_s_max = 3600.0;
 /// Of a run, some 30 years: the times of any number of runs can be added up.
 inline constexpr double run_time_s_max = 1e9;

@@ -53,7 +53,13 @@ class Execution {
   /// The campaign of a definition that was received; it has no table columns.
   /// @throws DefinitionError if it is none.
   [[nodiscard]] virtual std::shared_ptr<const Campaign> read(Definition definition) const {
-    return model().campaign_of(std::move(definition), TableColumns::left_out, "definition");
+    const Model* const model =
+        definition.model.empty() ? &built_in_model() : find_model(definition.model);
+    if (model == nullptr) {
+      throw DefinitionError("definition: is of the model " + definition.model +
+                            ", which this worker does not have");
+    }
+    return model->campaign_of(std::move(definition), TableColumns::left_out, "definition");
   }
   /// What the runs of a campaign compute. @pre It is not defined.
   virtual void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) = 0;

@@ -237,7 +237,8 @@ std::shared_ptr<Executor::Batch> Executor::next_batch(Place place) {
       checks_.pop_back();
       return check;
     }
-    TakenRuns assignment = queue_.take(size_max(place), is_wanted);
+    const wire::CampaignId first = queue_.first_campaign(is_wanted);
+    TakenRuns assignment = queue_.take(size_max(place, first), is_wanted);
     if (!assignment.requests.empty()) return begin_batch(std::move(assignment), place);
     if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
       prepare(campaign, lock);
@@ -251,8 +252,9 @@ std::shared_ptr<Executor::Batch> Executor::next_batch_like(const Batch& batch) {
   const RunQueue::IsWanted is_wanted = wanted_by(batch.place);
   const std::lock_guard lock(mutex_);
   if (is_ending_ || failure_) return nullptr;
-  if (queue_.first_campaign(is_wanted) != batch.assignment.campaign) return nullptr;
-  return begin_batch(queue_.take(size_max(batch.place), is_wanted), batch.place);
+  const wire::CampaignId campaign = batch.assignment.campaign;
+  if (queue_.first_campaign(is_wanted) != campaign) return nullptr;
+  return begin_batch(queue_.take(size_max(batch.place, campaign), is_wanted), batch.place);
 }
 
 std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, Place place) {
@@ -267,8 +269,11 @@ std::shared_ptr<Executor::Batch> Executor::begin_batch(TakenRuns assignment, Pla
   return batches_[batch->number] = batch;
 }
 
-std::size_t Executor::size_max(Place place) const {
-  return place == Place::processor ? config_.batch_size_max : DeviceSimulation::group_size;
+std::size_t Executor::size_max(Place place, wire::CampaignId campaign) const {
+  if (place == Place::device) return DeviceSimulation::group_size;
+  const auto known = campaigns_.find(campaign);
+  if (known == campaigns_.end()) return config_.batch_size_max;
+  return std::min(config_.batch_size_max, known->second.definition->model().batch_size());
 }
 
 RunQueue::IsWanted Executor::wanted_by(Place place) const {

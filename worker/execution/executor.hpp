@@ -41,7 +41,7 @@ using Prepare = std::function<PreparedCampaign(const Campaign& campaign)>;
 /// How much an executor computes at a time.
 struct ExecutorConfig {
   std::size_t num_threads = 1;        ///< At least 1.
-  std::size_t batch_size_max = 1;     ///< Runs that a thread computes together; at least 1.
+  std::size_t batch_size_max = 1;     ///< Runs that a thread computes together, of any model; >= 1.
   std::size_t num_campaigns_max = 4;  ///< Kept without runs of theirs at hand; at least 1.
   /// Each is served by a thread of its own, beside `num_threads`.
   std::vector<std::shared_ptr<Device>> devices{};
@@ -126,7 +126,7 @@ class Executor final : public Execution {
   [[nodiscard]] RunQueue::IsWanted wanted_by(Place place) const;
   [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
-  [[nodiscard]] std::size_t size_max(Place place) const;
+  [[nodiscard]] std::size_t size_max(Place place, wire::CampaignId campaign) const;
   void compute(Batch& batch);
   void compute_on(Device& device, const std::shared_ptr<Batch>& first);
   /// Has processors compute some of a device's runs again.

@@ -30,7 +30,7 @@ struct CheckOptions {
 /// A file that lacks what its author thinks is in it shows here: what is left out is nominal.
 std::string differences_text(const Campaign& campaign) {
   const std::vector<DefinitionDifference> differences =
-      campaign.differences_from(*example_campaign());
+      campaign.differences_from(*example_campaign(campaign.model()));
   if (differences.empty())
     return "Beside the number of runs, nothing differs from what `proofmass init` writes.\n";
   std::string text = "Beside the number of runs, these differ from what `proofmass init` writes:\n";
@@ -131,7 +131,8 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
                  {"num_simulated", outlook.num_simulated},
                  {"num_without_estimate", outlook.missing.total()},
                  {"differences", CheckJson::array()}};
-  for (const auto& [field, own, example] : campaign.differences_from(*example_campaign())) {
+  for (const auto& [field, own, example] :
+       campaign.differences_from(*example_campaign(campaign.model()))) {
     json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});
   }
   return json;
@@ -150,8 +151,7 @@ int check_campaign_file(const CheckOptions& options) {
   const std::unique_ptr<const Campaign> campaign = read_campaign(options.file, options.overrides);
   const std::unique_ptr<const Plan> plan = campaign->prepare();
   const Outlook outlook = outlook_on(*campaign, *plan);
-  const CostEstimate cost =
-      estimated_cost(campaign->results(), campaign->num_runs, outlook.batch_s);
+  const CostEstimate cost = estimated_cost(*campaign, campaign->num_runs, outlook.batch_s);
   if (options.format == OutputFormat::json) {
     print_json(check_json(options, *campaign, *plan, outlook, cost));
   } else {

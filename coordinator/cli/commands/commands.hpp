@@ -74,6 +74,7 @@ void add_init(CLI::App& app, Command& chosen);
 void add_check(CLI::App& app, Command& chosen);
 void add_plan(CLI::App& app, Command& chosen);
 void add_environment(CLI::App& app, Command& chosen);
+void add_models(CLI::App& app, Command& chosen);
 void add_keygen(CLI::App& app, Command& chosen);
 
 // Commands that read or change a database.

@@ -71,8 +71,9 @@ std::vector<RunRange> runs_beside(RunRange part, std::uint64_t num_runs) {
 }
 
 /// No more than there are quarters of batches: the runs of one take no longer than one of them.
-std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_missing) {
-  const std::uint64_t quarter = (model().batch_size() + 3) / 4;
+std::uint64_t num_workers(const RunOptions& options, const Campaign& campaign,
+                          std::uint64_t num_runs_missing) {
+  const std::uint64_t quarter = (campaign.model().batch_size() + 3) / 4;
   const std::uint64_t num_quarters = (num_runs_missing + quarter - 1) / quarter;
   return std::min<std::uint64_t>(options.num_workers.value_or(wire::num_processors()),
                                  num_quarters);
@@ -105,13 +106,15 @@ class GrowingFile final : public CampaignFiles {
 /// What takes time before the first run, and does not need the database: that of a new campaign is
 /// made meanwhile, which waits for the disk.
 struct RunStart {
-  RunStart(std::uint64_t worker_count, const std::string& gpus) : num_workers(worker_count) {
+  RunStart(std::uint64_t worker_count, const Campaign& campaign, const std::string& gpus)
+      : num_workers(worker_count), batch_size(campaign.model().batch_size()) {
     workers->start_local(num_workers, gpus);
   }
 
   std::uint64_t num_workers;
+  std::uint64_t batch_size;
   std::future<std::uint64_t> reference_digest = std::async(
-      std::launch::async, [] { return model().reference_digest(best_instruction_set()); });
+      std::launch::async, [] { return built_in_model().reference_digest(best_instruction_set()); });
   PrivateEndpoint endpoint;
   int listener = endpoint.listen();
   std::unique_ptr<WorkerProcesses> workers = std::make_unique<WorkerProcesses>(
@@ -130,7 +133,7 @@ ServiceConfig service_config(RunStart& start, CampaignFiles& files) {
   config.dispatch.reference_digest = start.reference_digest.get();
   config.dispatch.reattach_wait = Duration::zero();      // Workers of the last time ended with it.
   config.dispatch.lone_witness_wait = Duration::zero();  // No other host can connect.
-  config.dispatch.num_slots_expected = start.num_workers * model().batch_size();
+  config.dispatch.num_slots_expected = start.num_workers * start.batch_size;
   // All workers may die at once, and runs must be found guilty before the machine is.
   config.dispatch.crashes_per_host_max =
       config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(start.num_workers + 1);
@@ -210,8 +213,9 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
       num_runs_in(campaign.store.finished_runs()) - num_finished_now;
   if (options.part) campaign.elsewhere = runs_beside(part, num_runs);
   if (start == nullptr) {
-    start = std::make_unique<RunStart>(num_workers(options, part.count - num_finished_now),
-                                       options.gpus);
+    const Campaign& definition = *campaign.definition;
+    start = std::make_unique<RunStart>(
+        num_workers(options, definition, part.count - num_finished_now), definition, options.gpus);
   }
   make_active(campaign.store, options);
   const SignalThread signals;
@@ -358,8 +362,8 @@ int run_campaign(const RunOptions& options) {
   const std::uint64_t num_runs = campaign->num_runs;
   std::unique_ptr<RunStart> start;
   if (!std::filesystem::exists(database)) {
-    start = std::make_unique<RunStart>(num_workers(options, part_of(options, num_runs).count),
-                                       options.gpus);
+    start = std::make_unique<RunStart>(
+        num_workers(options, *campaign, part_of(options, num_runs).count), *campaign, options.gpus);
   }
   Outcome outcome = compute(open_or_create(*campaign, stop_plan_of(options, num_runs), database),
                             num_runs, options, std::move(start));

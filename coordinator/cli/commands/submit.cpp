@@ -12,6 +12,7 @@
 #include "coordinator/cli/shared_options.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
 
@@ -45,6 +46,11 @@ proto::RequestEnvelope submit_request(const SubmitOptions& options, const Campai
   proto::RequestEnvelope request;
   proto::SubmitRequest& submit = *request.mutable_submit();
   wire::set_definition(campaign.definition(TableColumns::included), submit);
+  const Model& model = campaign.model();
+  if (!model.description().empty()) {
+    submit.set_model_description(std::string(model.description()));
+    submit.set_reference_digest(model.reference_digest(best_instruction_set()));
+  }
   if (options.priority) submit.set_priority(*options.priority);
   if (options.audit_fraction) submit.set_audit_fraction(*options.audit_fraction);
   submit.set_stop_rule(options.stop.rule);

@@ -143,16 +143,15 @@ CostEstimate cost_of(const std::vector<const SweptCampaign*>& unfinished) {
   CostEstimate cost;
   double step_s = 0.0;  // Of a batch.
   int num_steps = 0;
-  ResultSchema results;
+  std::unique_ptr<const Campaign> campaign;
   for (std::size_t i = 0; i < unfinished.size(); ++i) {
     if (i % stride == 0) {
-      const std::unique_ptr<const Campaign> campaign = read_swept(*unfinished[i]);
+      campaign = read_swept(*unfinished[i]);
       const std::unique_ptr<const Plan> plan = campaign->prepare();
       num_steps = plan->num_steps();
-      results = campaign->results();
       if (i == 0) step_s = try_first_batch(*campaign, *plan).time_s / num_steps;
     }
-    cost += estimated_cost(results, unfinished[i]->num_missing, step_s * num_steps);
+    cost += estimated_cost(*campaign, unfinished[i]->num_missing, step_s * num_steps);
   }
   return cost;
 }

@@ -107,13 +107,19 @@ void insert_parameters(Database& database, const Campaign& campaign) {
 }
 
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
+  // Models in C++ are tested to compute the same everywhere.
+  const Model& model = campaign.model();
+  const std::string reference_digest =
+      model.description().empty()
+          ? std::string()
+          : fmt::format("{:016x}", model.reference_digest(best_instruction_set()));
   database
       .prepare(
           "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
-          " model_description, build, campaign_uid, first_version)"
-          " VALUES (1, ?, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
+          " model_description, reference_digest, build, campaign_uid, first_version)"
+          " VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
-           campaign.model().version(), std::string(campaign.model().description()),
+           model.version(), std::string(model.description()), reference_digest,
            std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
   insert_parameters(database, campaign);
   insert_data_tables(database, campaign);
@@ -174,6 +180,16 @@ std::uint64_t read_seed(const Database& database) {
     database.refuse_as_damaged(fmt::format("seed = {}", digits));
   }
   return seed;
+}
+
+std::uint64_t reference_digest_in(const Database& database, const std::string& text) {
+  std::uint64_t digest = 0;
+  const char* const end = text.data() + text.size();
+  const auto [read_end, error] = std::from_chars(text.data(), end, digest, 16);
+  if (!text.empty() && (error != std::errc() || read_end != end)) {
+    database.refuse_as_damaged(fmt::format("reference_digest = {}", text));
+  }
+  return digest;
 }
 
 CampaignControl read_control(const Database& database) {

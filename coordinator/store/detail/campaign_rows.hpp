@@ -33,6 +33,8 @@ void extend_campaign(Database& database, const Campaign& campaign, std::string_v
 
 /// @throws StoreError if the stored text is not a whole number below 2⁶⁴.
 [[nodiscard]] std::uint64_t read_seed(const Database& database);
+/// The number of campaign.reference_digest; 0 if it is empty.
+[[nodiscard]] std::uint64_t reference_digest_in(const Database& database, const std::string& text);
 
 /// How the campaign is served: columns of `campaign`.
 [[nodiscard]] CampaignControl read_control(const Database& database);

@@ -26,14 +26,15 @@ namespace {
 void add_campaign(const Database& database, Sha256& hash) {
   Statement row = database.prepare(
       "SELECT name, seed, num_runs, definition, model_version, build, created_utc, campaign_uid,"
-      " owner, stop_rule, num_runs_max, failures_max, num_runs_fixed, model_description"
-      " FROM campaign");
+      " owner, stop_rule, num_runs_max, failures_max, num_runs_fixed, model_description,"
+      " reference_digest FROM campaign");
   if (!row.step()) database.refuse_as_damaged("it has no campaign");
-  const int num_always = row.num_columns() - 2;
+  const int num_always = row.num_columns() - 3;
   for (int column = 0; column < num_always; ++column) hash.add(row.shown(column));
   if (row.optional_count(num_always)) hash.add(row.shown(num_always));
-  const std::string description = row.text(num_always + 1);
-  if (!description.empty()) hash.add(description);
+  for (const int column : {num_always + 1, num_always + 2}) {
+    if (const std::string text = row.text(column); !text.empty()) hash.add(text);
+  }
 }
 
 void add_data_tables(const Database& database, const Model& model, Sha256& hash) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/store/detail/campaign_rows.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/model_program/described_model.hpp"
 
@@ -127,7 +128,7 @@ std::string without_comments(std::string_view sql) {
 // `campaign` does not depend on what the results are.
 StoredKind stored_kind(const Database& database, std::int64_t version) {
   constexpr std::string_view table = "table campaign";
-  constexpr std::int64_t first_with_description = 12;
+  constexpr std::int64_t first_with_description = 12, first_with_digest = 13;
   StoredKind of_example{.model = &model(), .results = example_results()};
   const SchemaObjects objects = schema_objects(database);
   const auto found = objects.find(std::string(table));
@@ -138,11 +139,15 @@ StoredKind stored_kind(const Database& database, std::int64_t version) {
     return of_example;
   }
   Statement row =
-      database.prepare(fmt::format("SELECT definition, model_version, {} FROM campaign",
-                                   version < first_with_description ? "''" : "model_description"));
+      database.prepare(fmt::format("SELECT definition, model_version, {}, {} FROM campaign",
+                                   version < first_with_description ? "''" : "model_description",
+                                   version < first_with_digest ? "''" : "reference_digest"));
   if (!row.step()) return of_example;
   try {
-    const Model& model = wire::stored_model(row.text(1), row.text(2));
+    const Model& model =
+        wire::recorded_model({.version = row.text(1),
+                              .description = row.text(2),
+                              .reference_digest = reference_digest_in(database, row.text(3))});
     return {.model = &model, .results = model.results_of(row.text(0), row.text(1))};
   } catch (const wire::ModelProgramError& error) {
     database.refuse(error.what());

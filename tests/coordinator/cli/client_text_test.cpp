@@ -277,6 +277,7 @@ proto::StatusReply some_status() {
   campaign.set_rate_hz(0.5);
   campaign.set_remaining_s(2.5);
   campaign.set_storage_failure("disk full");
+  campaign.set_missing_model("ruler-1");
   campaign.set_owner("anna");
   proto::StatusReply status = test::status_with({campaign});
   status.set_version("0.1.0");
@@ -314,6 +315,7 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"rate_hz", 0.5},
                          {"remaining_s", 2.5},
                          {"storage_failure", "disk full"},
+                         {"missing_model", "ruler-1"},
                          {"owner", "anna"}}}},
                       {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
                       {"num_unserved_files", 2},
@@ -339,11 +341,13 @@ TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
   proto::StatusReply status = some_status();
   status.mutable_campaigns(0)->clear_remaining_s();
   status.mutable_campaigns(0)->clear_storage_failure();
+  status.mutable_campaigns(0)->clear_missing_model();
   status.clear_factories();
   *status.add_factories()->mutable_report() = test::factory_report("fleet", 30);
   const Json json = Json::parse(status_json(status, JsonLayout::indented));
   EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
+  EXPECT_TRUE(json["campaigns"][0]["missing_model"].is_null());
   for (const std::string key : {"wait_s", "reason", "owner"}) {
     EXPECT_TRUE(json["factories"][0][key].is_null()) << key;
   }

@@ -123,14 +123,15 @@ TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
 }
 
 TEST(CostEstimate, CountsAnIncompleteBatchAsAWhole) {
+  const MicroscopeCampaign campaign;
   const std::uint64_t batch_size = model().batch_size();
   const std::uint64_t num_at_once = batch_size * wire::num_processors();
-  EXPECT_EQ(estimated_cost(test::schema(), 1, 2.5).one_core_s, 2.5);
-  EXPECT_EQ(estimated_cost(test::schema(), batch_size, 2.5).one_core_s, 2.5);
-  EXPECT_EQ(estimated_cost(test::schema(), batch_size + 1, 2.5).one_core_s, 5.0);
-  EXPECT_EQ(estimated_cost(test::schema(), 100 * batch_size, 2.5).one_core_s, 250.0);
-  EXPECT_EQ(estimated_cost(test::schema(), num_at_once, 2.5).all_cores_s, 2.5);
-  EXPECT_EQ(estimated_cost(test::schema(), num_at_once + 1, 2.5).all_cores_s, 5.0);
+  EXPECT_EQ(estimated_cost(campaign, 1, 2.5).one_core_s, 2.5);
+  EXPECT_EQ(estimated_cost(campaign, batch_size, 2.5).one_core_s, 2.5);
+  EXPECT_EQ(estimated_cost(campaign, batch_size + 1, 2.5).one_core_s, 5.0);
+  EXPECT_EQ(estimated_cost(campaign, 100 * batch_size, 2.5).one_core_s, 250.0);
+  EXPECT_EQ(estimated_cost(campaign, num_at_once, 2.5).all_cores_s, 2.5);
+  EXPECT_EQ(estimated_cost(campaign, num_at_once + 1, 2.5).all_cores_s, 5.0);
 }
 
 TEST(CostEstimate, FitsATerminalOf80Columns) {

@@ -23,41 +23,53 @@ std::string description(const std::string& instead = {}) {
   return "{" + text + (instead.empty() ? "" : ", ") + instead + "}";
 }
 
+const Model& ruler(const std::string& description, std::uint64_t reference_digest = 0) {
+  return recorded_model(
+      {.version = "ruler-1", .description = description, .reference_digest = reference_digest});
+}
+
+std::unique_ptr<Campaign> example_of(const Model& model) {
+  std::string text = model.example();
+  const std::string line = "model = \"ruler\"\n";  // For people; it is no part of a definition.
+  const std::size_t place = text.find(line);
+  EXPECT_NE(place, text.npos);
+  text.erase(place, line.size());
+  return model.campaign_of({.text = text}, TableColumns::included, "test");
+}
+
 std::string refusal_of(const std::string& text) {
   try {
-    (void)stored_model("ruler-1", text);
+    (void)ruler(text);
   } catch (const ModelProgramError& error) {
     return error.what();
   }
   return "accepted";
 }
 
-TEST(StoredModel, IsThatOfTheProgramIfTheDatabaseIsOfIt) {
-  EXPECT_EQ(&stored_model(model().version(), ""), &model());
-  EXPECT_EQ(&stored_model("hardy2013-2", ""), &model());
-  EXPECT_EQ(&stored_model("hardy2013-2", description()), &model());
+TEST(RecordedModel, IsThatOfTheProgramIfTheDatabaseIsOfIt) {
+  EXPECT_EQ(&recorded_model({.version = std::string(model().version())}), &model());
+  EXPECT_EQ(&recorded_model({.version = "hardy2013-2"}), &model());
   EXPECT_EQ(refusal_of(""), fmt::format("is of the model ruler-1, and this program has {}; "
                                         "--model-program names that of another model",
                                         model().version()));
 }
 
-TEST(StoredModel, DrawsAndKnowsTheTruthWithoutItsProgram) {
-  const Model& ruler = stored_model("ruler-1", description());
-  EXPECT_EQ(ruler.version(), "ruler-1");
-  const std::unique_ptr<Campaign> campaign =
-      ruler.campaign_of({.text = ruler.example()}, TableColumns::included, "test");
-  EXPECT_EQ(&campaign->model(), &ruler);
+TEST(RecordedModel, DrawsAndKnowsTheTruthWithoutItsProgram) {
+  const Model& known = ruler(description());
+  EXPECT_EQ(known.version(), "ruler-1");
+  const std::unique_ptr<Campaign> campaign = example_of(known);
+  EXPECT_EQ(&campaign->model(), &known);
+  EXPECT_EQ(campaign->definition(TableColumns::included).model, "ruler-1");
   const RunDraw draw = campaign->draw(RunIndex{0});
   EXPECT_THAT(draw.values, ElementsAre(3.0));
   EXPECT_THAT(draw.truth, ElementsAre(6.5));
   EXPECT_EQ(campaign->results().quantities.front().unit, "m");
 }
 
-TEST(StoredModel, ComputesNothingAndSaysWhatWould) {
-  const Model& ruler = stored_model("ruler-1", description());
-  EXPECT_FALSE(ruler.can_simulate());
-  const auto campaign =
-      ruler.campaign_of({.text = ruler.example()}, TableColumns::included, "test");
+TEST(RecordedModel, ComputesNothingAndSaysWhatWould) {
+  const Model& known = ruler(description());
+  EXPECT_FALSE(known.can_simulate());
+  const std::unique_ptr<Campaign> campaign = example_of(known);
   try {
     (void)campaign->prepare();
     FAIL();
@@ -68,16 +80,24 @@ TEST(StoredModel, ComputesNothingAndSaysWhatWould) {
   }
 }
 
-TEST(StoredModel, IsOneForOneText) {
-  EXPECT_EQ(&stored_model("ruler-1", description()), &stored_model("ruler-1", description()));
-  const Model& other = stored_model("ruler-1", description(R"("purpose": "Measures.")"));
-  EXPECT_NE(&stored_model("ruler-1", description()), &other);
-  // Its text begins with the first key of the alphabet, and describes it again.
-  EXPECT_EQ(other.description().substr(0, 9), R"({"drawn":)");
-  EXPECT_EQ(stored_model("ruler-1", other.description()).description(), other.description());
+TEST(RecordedModel, ComputesWhatItDidWhereItsProgramWas) {
+  const Model& known = ruler(description(), 0x1234);
+  EXPECT_EQ(known.reference_digest(best_instruction_set()), 0x1234U);
+  EXPECT_EQ(&ruler(description(), 0x1234), &known);
+  EXPECT_EQ(ruler(description(), 0x5678).reference_digest(best_instruction_set()), 0x5678U);
+  EXPECT_EQ(known.reference_digest(best_instruction_set()), 0x1234U);
 }
 
-TEST(StoredModel, IsRefusedIfItsDescriptionBreaksARule) {
+TEST(RecordedModel, IsOneForOneText) {
+  EXPECT_EQ(&ruler(description()), &ruler(description()));
+  const Model& other = ruler(description(R"("purpose": "Measures.")"));
+  EXPECT_NE(&ruler(description()), &other);
+  // Its text begins with the first key of the alphabet, and describes it again.
+  EXPECT_EQ(other.description().substr(0, 9), R"({"drawn":)");
+  EXPECT_EQ(ruler(std::string(other.description())).description(), other.description());
+}
+
+TEST(RecordedModel, IsRefusedIfItsDescriptionBreaksARule) {
   const std::string quantity = R"({"name": "q", "truth": "scale"})";
   std::string many = quantity;
   for (int i = 1; i < 1000; ++i) many += "," + quantity;

@@ -309,7 +309,7 @@ TEST(MalformedRunLease, HasRunsThatExist) {
 
 TEST(MalformedRunLease, HasFiniteTableValuesForEachRun) {
   EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.add_table_values(1.0); }),
-            "table_values = 3 entries (must be the same number for each run, at most 61)");
+            "table_values = 3 entries (must be the same number for each run, at most 1024)");
   EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_table_values(0, nan); }),
             "table_values = not finite (must be finite)");
 }

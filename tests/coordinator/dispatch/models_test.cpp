@@ -1,0 +1,115 @@
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/model.hpp"
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+// Campaigns of several models. A model that computes something else stands for another one.
+
+class ModelsTest : public DispatchFixture {
+ protected:
+  static constexpr std::uint64_t other_digest = 0xabcdef;
+
+  void add_campaign_of_other_model(CampaignId id, std::uint64_t num_runs) {
+    StoredCampaign stored = stored_campaign(num_runs);
+    stored.reference_digest = other_digest;
+    on_campaign(state, id, stored, now, outbox);
+  }
+
+  static proto::Hello hello_with_other(std::uint32_t num_slots, std::uint64_t digest) {
+    proto::Hello said = hello(num_slots, "other-host");
+    proto::OtherModel& other = *said.add_other_models();
+    other.set_version(std::string(model_version));
+    other.set_reference_digest(digest);
+    return said;
+  }
+
+  void add_worker_with_other(WorkerId id, std::uint32_t num_slots) {
+    say_hello(id, hello_with_other(num_slots, other_digest));
+    outbox.drop_sent<proto::Welcome>(id);
+    (void)outbox.take_events();
+    heartbeat(id);
+  }
+};
+
+TEST_F(ModelsTest, AreLentToWorkersThatHaveThem) {
+  add_campaign_of_other_model(one, 10);
+  add_worker(first, 4);  // Is lent nothing, whatever happens.
+  heartbeat(first);
+  add_campaign(two, 10);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
+  add_worker_with_other(second, 4);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(second).campaign(), one.value) << "the first of both";
+  complete(second, one, {0, 1, 2, 3});
+  EXPECT_EQ(runs_held_text(state, first), "0..3");
+  EXPECT_EQ(campaign(one).lent.size() + campaign(one).committed.size(), 10U);
+}
+
+// However long it takes: an idle worker that cannot help takes nothing off another one.
+TEST_F(ModelsTest, AreNotCopiedToWorkersWithoutThem) {
+  state.config.lease_duration_max = std::chrono::seconds(1);
+  add_campaign_of_other_model(one, 12);
+  add_worker_with_other(second, 4);
+  outbox.drop_sent<proto::RunLease>(second);
+  deliver(second, one, {0});
+  commit(one);
+  outbox.forget();
+  const std::string held_before = runs_held_text(state, second);
+  add_worker(first, 4);
+  for (int i = 0; i < 10; ++i) {
+    now += std::chrono::seconds(4);
+    on_heartbeat(state, second, make_heartbeat(4096, {held(one, {{1}, 8})}, {}), ++sequence, now,
+                 outbox);
+    heartbeat(first);
+    on_tick(state, now, outbox);
+  }
+  outbox.drop_sent<proto::HeartbeatAck>(second);
+  for (int i = 1; i < 10; ++i) outbox.drop_sent<proto::HeartbeatAck>(second);
+  EXPECT_EQ(runs_held_text(state, first), "none");
+  EXPECT_EQ(runs_held_text(state, second), held_before);
+}
+
+TEST_F(ModelsTest, MustComputeWhatTheyDidWhereTheCampaignBegan) {
+  add_campaign_of_other_model(one, 10);
+  say_hello(first, hello_with_other(1, 0x123));
+  const auto reject = outbox.take_sent<proto::Reject>(first);
+  EXPECT_EQ(reject.reason(), proto::REJECT_REASON_INCOMPATIBLE);
+  EXPECT_EQ(reject.text(), "reference_digest of " + std::string(model_version) +
+                               " = 0000000000000123 (must be 0000000000abcdef, where its campaign "
+                               "began)");
+  EXPECT_FALSE(state.workers.contains(first));
+  (void)outbox.take_events();
+  // The other campaign of this version began with it.
+  StoredCampaign stored = stored_campaign(1);
+  stored.reference_digest = 0x123;
+  on_campaign(state, two, stored, now, outbox);
+  say_hello(first, hello_with_other(1, 0x123));
+  outbox.drop_sent<proto::Welcome>(first);
+  (void)outbox.take_events();
+}
+
+// A thread of the worker computes four times as many runs of another model together.
+TEST_F(ModelsTest, TakeSeveralSlotsARunWhereOthersTakeOne) {
+  const auto batch_size = static_cast<std::uint32_t>(model().batch_size());
+  add_campaign(one, 100'000);
+  proto::Hello said = hello(8 * batch_size);
+  said.set_slots_per_thread(4 * batch_size);
+  say_hello(first, said);
+  outbox.drop_sent<proto::Welcome>(first);
+  (void)outbox.take_events();
+  heartbeat(first);
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)),
+            (RunRange{{0}, 2 * batch_size}))
+      << "a batch for each of two threads";
+  EXPECT_EQ(state.num_idle_slots, 0U);
+  deliver(first, one, {0});
+  commit(one);
+  outbox.drop_sent<proto::ResultAck>(first);
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)),
+            (RunRange{{2 * batch_size}, 2 * batch_size + 1}))
+      << "and another to wait";
+}
+
+}  // namespace
+}  // namespace proofmass::test
