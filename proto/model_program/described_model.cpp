@@ -290,14 +290,14 @@ const DescribedModel& described_model(const std::string& text, std::uint64_t ref
   return made.first->second;
 }
 
-/// That of this program with the same version, and the same description if it has one; or, if it is
-/// in C++, with the same name: it knows what its older versions recorded.
+/// One of this program with the same version, and the same description if both have one; or the
+/// built-in one if it has the same name: one in C++ knows what its older versions recorded.
 const Model* own_model(const ModelRecord& record) {
   const Model* const found = find_model(record.version);
-  if (found != nullptr && found->description() == record.description) return found;
-  // Descriptions of those that were made before there were any are empty.
-  if (!record.description.empty()) return nullptr;
-  if (found != nullptr) return found;
+  if (found != nullptr && (found->description().empty() || record.description.empty() ||
+                           found->description() == record.description)) {
+    return found;
+  }
   const std::string_view name = name_of_model(record.version);
   const Model& built_in = built_in_model();
   return name.empty() || name == name_of_model(built_in.version()) ? &built_in : nullptr;

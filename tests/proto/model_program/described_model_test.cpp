@@ -49,6 +49,7 @@ std::string refusal_of(const std::string& text) {
 TEST(RecordedModel, IsThatOfTheProgramIfTheDatabaseIsOfIt) {
   EXPECT_EQ(&recorded_model({.version = std::string(model().version())}), &model());
   EXPECT_EQ(&recorded_model({.version = "hardy2013-2"}), &model());
+  EXPECT_EQ(&recorded_model({.version = "hardy2013-2", .description = description()}), &model());
   EXPECT_EQ(refusal_of(""), fmt::format("is of the model ruler-1, and this program has {}; "
                                         "--model-program names that of another model",
                                         model().version()));
