@@ -143,7 +143,7 @@ Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistic
     json["parameters"].push_back({{"parameter", schema.quantities[of.quantity].name},
                                   {"num_runs", of.num_runs},
                                   {"mean", of.mean},
-                                  {"squared_ratio", of.squared_ratio},
+                                  {"squared_ratio", or_null(of.squared_ratio)},
                                   {"squared_ratio_standard_error", or_null(of.squared_ratio_error)},
                                   {"num_within_95", of.num_within},
                                   {"fraction_within_95_interval", bounds_of(of.within)}});

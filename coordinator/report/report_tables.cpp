@@ -66,7 +66,6 @@ Row accuracy_row(const Quantity& quantity, double objective, const AccuracyStati
                       ? count_cell(beyond, beyond > 0 ? Tone::bad : Tone::plain)
                       : no_figure());
   }
-  add_published(quantity, row);
   return row;
 }
 
@@ -266,16 +265,21 @@ Table accuracy_table(const ResultSchema& schema, std::span<const double> objecti
                           {"in run", false, 8, ours, false, true},
                           {"mean", false, 8, ours},
                           {"std", false, 8, ours},
-                          {"beyond", false, 8, ours},
-                          {"worst", false, 6, theirs, true},
-                          {"mean", false, 6, theirs},
-                          {"std", false, 6, theirs}},
+                          {"beyond", false, 8, ours}},
               .notes = {"beyond: runs whose error exceeds the objective"}};
+  const bool has_published = std::ranges::any_of(
+      schema.quantities, [](const Quantity& quantity) { return quantity.published.has_value(); });
+  if (has_published) {
+    table.columns.insert(
+        table.columns.end(),
+        {{"worst", false, 6, theirs, true}, {"mean", false, 6, theirs}, {"std", false, 6, theirs}});
+  }
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     table.rows.push_back(
         accuracy_row(schema.quantities[i], objectives[i],
                      statistics.num_estimated > 0 ? &statistics.accuracy[i] : nullptr,
                      statistics.num_estimated));
+    if (has_published) add_published(schema.quantities[i], table.rows.back());
   }
   if (!schema.published_source.empty()) {
     table.notes.back() += fmt::format("; {}: {}", theirs, schema.published_source);

@@ -15,6 +15,7 @@ CampaignIdentity identity_of(const Store& store) {
           .seed = store.seed(),
           .num_runs = store.num_runs(),
           .model_version = store.model_version(),
+          .is_of_program = !store.model().description().empty(),
           .build = store.build(),
           .created_utc = store.created_utc(),
           .definition_digest = store.table_digest()};

@@ -23,6 +23,7 @@ struct CampaignIdentity {
   std::uint64_t seed = 0;
   std::uint64_t num_runs = 0;  ///< Wanted.
   std::string model_version;
+  bool is_of_program = false;  ///< Its model needs one to be simulated again.
   std::string build;
   std::string created_utc;
   std::string definition_digest;

@@ -160,15 +160,15 @@ Table host_table(const Review& review) {
 
 std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
   const std::string database = wire::shell_word(review.database);
+  const char* const program = review.identity.is_of_program ? " --model-program PROGRAM" : "";
   std::vector<std::pair<std::string, std::string>> commands{
-      {fmt::format("proofmass verify {} --fraction 0.1", database),
+      {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),
        "checks the database, simulates a tenth of the runs again and compares all bits"},
       {fmt::format("proofmass report {} --html report.html", database), "makes this report anew"}};
   if (!review.matrix.empty() && review.matrix.back().worst) {
-    commands.emplace_back(
-        fmt::format("proofmass replay {} --run {} --output run{}.h5", database,
-                    review.matrix.back().worst->run.value, review.matrix.back().worst->run.value),
-        "writes the time series of the worst run");
+    commands.emplace_back(fmt::format("proofmass replay {0} --run {1} --output run{1}.h5{2}",
+                                      database, review.matrix.back().worst->run.value, program),
+                          "writes the time series of the worst run");
   }
   return commands;
 }

@@ -80,7 +80,9 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
     const Sums& sums = quantities_[i];
     const double mean_square = sums.squares / n, squared_error = sums.squared_errors / n;
     const double scatter = sums.fourth_powers / n - squared_error * squared_error;
-    const auto over_square = [&](double x) { return mean_square > 0.0 ? x / mean_square : 0.0; };
+    const auto over_square = [&](double x) {
+      return mean_square > 0.0 ? std::optional(x / mean_square) : std::nullopt;
+    };
     statistics.quantities.push_back(
         {.quantity = indices_[i],
          .num_runs = num_runs_,
@@ -96,11 +98,20 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
   return statistics;
 }
 
+namespace {
+
+Cell ratio_cell(const std::optional<double>& ratio) {
+  return ratio ? figure_cell(*ratio) : no_figure();
+}
+
+}  // namespace
+
 Table standard_error_table(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   // Draws that are not independent have no standard error of the ratio; those of a design may have
   // intervals from its replicates.
-  const bool have_ratio_errors = statistics.quantities.front().squared_ratio_error.has_value();
+  const bool have_ratio_errors = std::ranges::any_of(
+      statistics.quantities, [](const auto& of) { return of.squared_ratio_error.has_value(); });
   const bool have_intervals = std::ranges::any_of(
       statistics.quantities, [](const auto& of) { return of.within.has_value(); });
   constexpr const char* ratio = "Σerror²/Σσ²";
@@ -126,8 +137,8 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
     const Quantity& quantity = schema.quantities[statistic.quantity];
     Row row{quantity.symbol, unit_cell(quantity),
             figure_cell(statistic.mean, quantity.display_scale),
-            figure_cell(statistic.squared_ratio)};
-    if (have_ratio_errors) row.push_back(figure_cell(*statistic.squared_ratio_error));
+            ratio_cell(statistic.squared_ratio)};
+    if (have_ratio_errors) row.push_back(ratio_cell(statistic.squared_ratio_error));
     row.push_back(figure_cell(share_within(statistic), 0.01));
     if (have_intervals) add_ends(statistic.within, 0.01, row);
     table.rows.push_back(std::move(row));

@@ -20,8 +20,9 @@ namespace proofmass::coordinator {
 struct StandardErrorStatistic {
   std::size_t quantity = 0;  ///< Index into the quantities of the ResultSchema.
   std::uint64_t num_runs = 0;
-  double mean = 0.0;           ///< Of the standard errors, SI.
-  double squared_ratio = 0.0;  ///< Mean of error² over the mean of the standard errors' squares.
+  double mean = 0.0;  ///< Of the standard errors, SI.
+  /// Mean of error² over the mean of the standard errors' squares; nothing if these are 0.
+  std::optional<double> squared_ratio;
   std::optional<double> squared_ratio_error;  ///< Its standard error.
   std::uint64_t num_within = 0;  ///< Runs whose |error| is within normal_95 standard errors.
   /// Of their share among all draws, 95 %; of a sampling design from its replicates.

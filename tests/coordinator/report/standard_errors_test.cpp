@@ -40,7 +40,7 @@ TEST(StandardErrors, AreHeldAgainstTheErrors) {
   for (const StandardErrorStatistic& of : statistics.quantities) {
     EXPECT_EQ(of.num_runs, 5U);
     EXPECT_NEAR(of.mean / objectives[of.quantity], 0.1, 1e-15);
-    EXPECT_NEAR(of.squared_ratio, 3.3, 1e-12);
+    EXPECT_NEAR(of.squared_ratio.value(), 3.3, 1e-12);
     EXPECT_NEAR(of.squared_ratio_error.value(),
                 std::sqrt(103.125 / 5.0 - 3.3 * 3.3) / std::sqrt(5.0), 1e-12);
     EXPECT_EQ(of.num_within, 3U);
@@ -52,6 +52,23 @@ TEST(StandardErrors, AreHeldAgainstTheErrors) {
   ASSERT_EQ(statistics.fit.size(), 1U);  // 30 to 34 of 32.
   EXPECT_EQ(statistics.fit[0].chi_squared, 32.0);
   EXPECT_EQ(statistics.fit[0].ratio, 1.0);
+}
+
+// Without noise there is nothing to hold the errors against.
+TEST(StandardErrors, HaveNoRatioWhereTheyAreZero) {
+  RunningStandardErrors running(test::schema());
+  for (std::size_t run = 0; run < pulls.size(); ++run) {
+    RunResult result = test::result_off_by(run, pulls[run]);
+    std::ranges::fill(result.standard_error, 0.0);
+    running.add(result);
+  }
+  const StandardErrorStatistics statistics = running.statistics();
+  for (const StandardErrorStatistic& of : statistics.quantities) {
+    EXPECT_EQ(of.squared_ratio, std::nullopt);
+    EXPECT_EQ(of.squared_ratio_error, std::nullopt);
+  }
+  EXPECT_THAT(terminal_text(standard_error_table(test::schema(), statistics), {}),
+              ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 +- +0 "));
 }
 
 // 3 of 5 by Clopper and Pearson: 14.7 % to 94.7 %.
