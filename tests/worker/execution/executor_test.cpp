@@ -3,6 +3,7 @@
 #include <semaphore>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/model.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
@@ -146,6 +147,21 @@ TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
   const Indices size_of_its_batch{1, 4, 4, 4, 4, 2, 2};
   for (std::size_t i = 0; i < runs.size(); ++i) {
     EXPECT_EQ(runs[i].computed.result.num_rounds, size_of_its_batch[i]);
+  }
+}
+
+// Another model may have larger batches.
+TEST(Executor, TakesNoMoreRunsThanTheirModelComputesTogether) {
+  const std::uint64_t batch_size = model().batch_size();
+  Gate gate;
+  Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4 * batch_size});
+  submit(bench.executor, lease(0, 1));
+  gate.entered.acquire();
+  submit(bench.executor, lease(10, 2 * batch_size));
+  gate.open.release(3);
+  const std::vector<FinishedRun> runs = bench.wait_for(2 * batch_size + 1);
+  for (std::size_t i = 1; i < runs.size(); ++i) {
+    EXPECT_EQ(runs[i].computed.result.num_rounds, batch_size);
   }
 }
 
