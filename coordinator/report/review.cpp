@@ -5,6 +5,7 @@
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

@@ -109,9 +109,12 @@ Cell ratio_cell(const std::optional<double>& ratio) {
 Table standard_error_table(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   // Draws that are not independent have no standard error of the ratio; those of a design may have
-  // intervals from its replicates.
-  const bool have_ratio_errors = std::ranges::any_of(
-      statistics.quantities, [](const auto& of) { return of.squared_ratio_error.has_value(); });
+  // intervals from its replicates. Without noise there is not even a ratio.
+  const bool have_ratio_errors =
+      std::ranges::any_of(statistics.quantities,
+                          [](const auto& of) { return of.squared_ratio_error.has_value(); }) ||
+      std::ranges::none_of(statistics.quantities,
+                           [](const auto& of) { return of.squared_ratio.has_value(); });
   const bool have_intervals = std::ranges::any_of(
       statistics.quantities, [](const auto& of) { return of.within.has_value(); });
   constexpr const char* ratio = "Σerror²/Σσ²";

@@ -1,92 +1,9 @@
-#include "worker/execution/executor.hpp"
-
-#include <semaphore>
-
-#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/model.hpp"
-#include "tests/support/messages.hpp"
-#include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
+#include "tests/worker/execution/executor_bench.hpp"
 
 namespace proofmass::worker {
 namespace {
-
-using Indices = std::vector<std::uint64_t>;
-
-constexpr wire::CampaignId first_campaign{1};
-constexpr wire::CampaignId second_campaign{2};
-
-std::shared_ptr<const Campaign> definition() {
-  return std::make_shared<const MicroscopeCampaign>();
-}
-
-proto::RunLease lease(std::uint64_t first, std::uint64_t count,
-                      wire::CampaignId campaign = first_campaign) {
-  return test::make_lease(campaign, {{first}, count}, {3});
-}
-
-void submit(Executor& executor, const proto::RunLease& lease) {
-  executor.submit(lease, std::array{wire::runs_of(lease)});
-}
-/// Runs that yield their index as number of draws, the size of their batch as number of rounds and
-/// their first table value as truth.
-std::vector<RunResult> results_of(std::span<const RunRequest> requests) {
-  std::vector<RunResult> results;
-  for (const RunRequest& request : requests) {
-    RunResult result = test::zero_result({.run = request.run});
-    result.num_draws = static_cast<std::uint32_t>(request.run.value);
-    result.num_rounds = static_cast<std::uint32_t>(requests.size());
-    result.truth[0] = request.table_values.empty() ? 0.0 : request.table_values.front();
-    results.push_back(result);
-  }
-  return results;
-}
-
-/// Such runs, after `num_steps` steps, of each of which they report twice.
-Prepare prepare_counting(int num_steps) {
-  return [num_steps](const Campaign&) -> PreparedCampaign {
-    return {.simulate =
-                [num_steps](std::span<const RunRequest> requests,
-                            const std::function<void(int)>& progress) {
-                  for (int half = 1; half <= 2 * num_steps; ++half) progress(half / 2);
-                  return results_of(requests);
-                },
-            .num_steps = num_steps};
-  };
-}
-
-/// An executor whose finished runs can be waited for; its first campaign is defined.
-class Bench {
- public:
-  explicit Bench(Prepare prepare, const ExecutorConfig& config = {})
-      : executor(
-            std::move(prepare), [this] { changed_.release(); }, config) {
-    executor.define(first_campaign, definition());
-  }
-
-  std::vector<FinishedRun> wait_for(std::size_t count) {
-    std::vector<FinishedRun> all;
-    while (all.size() < count) {
-      changed_.acquire();
-      for (FinishedRun& run : executor.take_finished()) all.push_back(std::move(run));
-    }
-    return all;
-  }
-
-  void wait_for_change() { changed_.acquire(); }
-
- private:
-  std::counting_semaphore<> changed_{0};
-
- public:
-  Executor executor;
-};
-
-Indices indices_of(const std::vector<FinishedRun>& runs) {
-  Indices indices;
-  for (const FinishedRun& run : runs) indices.push_back(run.computed.result.run.value);
-  return indices;
-}
 
 TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
   Bench bench(prepare_counting(2));
@@ -112,27 +29,6 @@ TEST(Executor, HandsEachRunItsTableValues) {
   EXPECT_EQ(runs[1].computed.result.truth[0], 2.5);
 }
 
-/// Batches of ten steps that wait, after their first, until they are let go.
-struct Gate {
-  std::counting_semaphore<> entered{0};
-  std::counting_semaphore<> open{0};
-
-  Prepare prepare() {
-    return [this](const Campaign&) -> PreparedCampaign {
-      return {.simulate =
-                  [this](std::span<const RunRequest> requests,
-                         const std::function<void(int)>& progress) {
-                    progress(1);
-                    entered.release();
-                    open.acquire();
-                    progress(10);
-                    return results_of(requests);
-                  },
-              .num_steps = 10};
-    };
-  }
-};
-
 // The first batch holds the thread while the leases come.
 TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
   Gate gate;
@@ -153,15 +49,10 @@ TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
 // Another model may have larger batches.
 TEST(Executor, TakesNoMoreRunsThanTheirModelComputesTogether) {
   const std::uint64_t batch_size = model().batch_size();
-  Gate gate;
-  Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4 * batch_size});
-  submit(bench.executor, lease(0, 1));
-  gate.entered.acquire();
-  submit(bench.executor, lease(10, 2 * batch_size));
-  gate.open.release(3);
-  const std::vector<FinishedRun> runs = bench.wait_for(2 * batch_size + 1);
-  for (std::size_t i = 1; i < runs.size(); ++i) {
-    EXPECT_EQ(runs[i].computed.result.num_rounds, batch_size);
+  Bench bench(prepare_counting(1), {.num_threads = 1, .batch_size_max = 4 * batch_size});
+  submit(bench.executor, lease(0, 2 * batch_size));
+  for (const FinishedRun& run : bench.wait_for(2 * batch_size)) {
+    EXPECT_EQ(run.computed.result.num_rounds, batch_size);
   }
 }
 
