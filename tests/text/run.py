@@ -131,16 +131,18 @@ class Session:
         paths = [Path(self._streams, name) for name in ("script", "output", "error")]
         paths[0].write_text(script, encoding="utf-8")
         with open(paths[1], "wb") as output, open(paths[2], "wb") as error:
-            shell = subprocess.Popen(
-                [*prefix, "sh", paths[0]], cwd=self.directory, env=self._environment, stdout=output,
-                stderr=error, stdin=subprocess.DEVNULL, start_new_session=True)
-            try:
+            shell = None
+            try:  # A signal may come while the shell, which has begun, is still being started.
+                shell = subprocess.Popen(
+                    [*prefix, "sh", paths[0]], cwd=self.directory, env=self._environment,
+                    stdout=output, stderr=error, stdin=subprocess.DEVNULL, start_new_session=True)
                 shell.wait(time_max_s)
             except subprocess.TimeoutExpired:
                 print(f"not finished after {time_max_s} s")
             finally:
                 self._end_all()
-                shell.wait()
+                if shell is not None:
+                    shell.wait()
         texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths[1:]]
         outputs = re.split(rf"\n{mark} (\d+)\n", texts[0])
         errors = re.split(rf"\n{mark}\n", texts[1])
