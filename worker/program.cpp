@@ -226,13 +226,6 @@ Prepare ending_on_crashes(const Prepare& prepare, const std::string& name) {
   };
 }
 
-/// Most runs that a thread computes together, of any model.
-std::size_t slots_per_thread() {
-  std::size_t most = 1;
-  for (const Model* const model : models()) most = std::max(most, model->batch_size());
-  return most;
-}
-
 /// The worker itself; 0, or it throws, or it ends the process because threads do not end.
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
@@ -241,11 +234,11 @@ int work(const Options& options, const Program& program, ServeConfig config,
   config.hello = hello_for(options, start);
   const Cards cards = open_cards(options, config.hello.reference_digest(), config.log);
   const unsigned num_threads = num_threads_of(options, cards.devices.size());
-  const std::size_t num_processor_slots = num_threads * slots_per_thread();
+  const std::size_t num_processor_slots = num_threads * wire::slots_per_thread();
   const std::size_t num_card_slots =
       std::min(cards.capacity, wire::slots_max - num_processor_slots);
   config.hello.set_num_slots(static_cast<std::uint32_t>(num_processor_slots + num_card_slots));
-  config.hello.set_slots_per_thread(static_cast<std::uint32_t>(slots_per_thread()));
+  config.hello.set_slots_per_thread(static_cast<std::uint32_t>(wire::slots_per_thread()));
   config.hello.set_num_card_slots(static_cast<std::uint32_t>(num_card_slots));
   config.hello.set_cards(text_of(cards));
   constexpr std::size_t num_threads_a_card = 5;  // Its own, and those of its driver.
@@ -256,7 +249,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
   Executor executor(ending_on_crashes(program.prepare, program.name),
                     [&progress] { progress.notify(); },
                     {.num_threads = num_threads,
-                     .batch_size_max = slots_per_thread(),
+                     .batch_size_max = wire::slots_per_thread(),
                      .devices = cards.devices,
                      .checked_fraction = options.gpu_check});
   const Ending ending = serve(config, executor, progress, signals);

@@ -11,6 +11,7 @@
 #include "coordinator/archive/result_scan.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -99,13 +100,15 @@ class Verification {
   Check check_model() {
     const std::string model = store_->model_version();
     can_simulate_ = store_->model().can_simulate();
-    is_same_model_ = model == options_.model_version || !can_simulate_;
+    const std::string_view own =
+        options_.model_version.empty() ? store_->model().version() : options_.model_version;
+    is_same_model_ = model == own || !can_simulate_;
     if (!can_simulate_) return Check::not_checked(fmt::format("{}; {}", model, program_missing));
     if (is_same_model_) return Check::holds(fmt::format("{}; {}", model, store_->build()));
     return Check::fails(
         fmt::format("{} made this file and this program has {}: its runs cannot be "
                     "simulated again",
-                    model, options_.model_version));
+                    model, own));
   }
 
   Check check_results() {

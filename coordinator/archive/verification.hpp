@@ -10,7 +10,6 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/table/terminal_table.hpp"
-#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 
@@ -42,7 +41,7 @@ struct Check {
 struct VerifyOptions {
   double fraction = 0.01;       ///< Of the finished runs, simulated again; in [0, 1], one at least.
   std::size_t num_threads = 1;  ///< That draw and simulate; at least 1.
-  std::string_view model_version = model().version();  ///< The model that simulates.
+  std::string_view model_version = {};  ///< The model that simulates; empty: Store::model().
 };
 
 /// Checks whether a campaign database is whole and holds what its definition yields, in this order:

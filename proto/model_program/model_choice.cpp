@@ -94,6 +94,12 @@ std::optional<std::filesystem::path> program_of(const Model& model) {
   return std::nullopt;
 }
 
+std::size_t slots_per_thread() {
+  std::size_t most = 1;
+  for (const Model* const model : models()) most = std::max(most, model->batch_size());
+  return most;
+}
+
 void add_model_program_option(CLI::App& app) {
   app.add_option_function<std::vector<std::string>>(
          std::string(option),

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,6 +27,9 @@ void choose_models(int argc, const char* const* argv);
 
 /// The program of one of models(), if it has one.
 [[nodiscard]] std::optional<std::filesystem::path> program_of(const Model& model);
+
+/// Most runs that a worker's thread computes together, of any of models(): its slots.
+[[nodiscard]] std::size_t slots_per_thread();
 
 /// Declares `--model-program`, which choose_models() has followed; a file of options cannot set it.
 void add_model_program_option(CLI::App& app);

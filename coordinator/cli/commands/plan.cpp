@@ -150,7 +150,7 @@ Table bound_table(const Planned& plan) {
 
 Table session_table(const Planned& plan) {
   Table table{.columns = {{.title = "session", .is_text = true},
-                          {.title = std::string(model().step_name())}},
+                          {.title = std::string(built_in_model().step_name())}},
               .has_total = true};
   for (std::size_t i = 0; i < plan.sessions.size(); ++i) {
     table.rows.push_back({plan.sessions[i], fmt::to_string(plan.num_steps[i])});
@@ -159,7 +159,7 @@ Table session_table(const Planned& plan) {
   if (plan.num_steps_beside > 0) {
     table.notes.push_back(
         fmt::format("{} {} of sessions that calibrate nothing are left as they are",
-                    plan.num_steps_beside, model().step_name()));
+                    plan.num_steps_beside, built_in_model().step_name()));
   }
   return table;
 }
@@ -175,7 +175,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
   Json json{{"file", options.file.string()},
             {"method", plan.method},
             {"num_steps", plan.num_steps_in_all},
-            {"step_name", model().step_name()},
+            {"step_name", built_in_model().step_name()},
             {"num_instruments", plan.num_instruments},
             {"num_probed", plan.num_probed},
             {"misses_any", plan.bound.misses_any},
@@ -222,7 +222,8 @@ AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) 
       .num_steps = in_all, .minimum = options.minimum, .maximum = study.num_steps_max()};
   const auto refuse = [&](std::string_view limit, std::size_t number, std::string_view each) {
     throw UsageError(fmt::format("--{} = {} (must be {} or {}, {} for each of {} sessions)",
-                                 model().step_name(), in_all, number, limit, each, of_file.size()));
+                                 built_in_model().step_name(), in_all, number, limit, each,
+                                 of_file.size()));
   };
   const std::size_t least = static_cast<std::size_t>(rule.minimum) * of_file.size();
   const std::size_t most = static_cast<std::size_t>(rule.maximum) * of_file.size();
@@ -231,8 +232,8 @@ AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) 
     throw UsageError(
         fmt::format("--minimum = {} (must be at most {}, as the file has {} {} for {} "
                     "sessions; or give --{})",
-                    rule.minimum, number / of_file.size(), in_all, model().step_name(),
-                    of_file.size(), model().step_name()));
+                    rule.minimum, number / of_file.size(), in_all, built_in_model().step_name(),
+                    of_file.size(), built_in_model().step_name()));
   }
   if (number < least) refuse("more", least, fmt::format("--minimum {}", rule.minimum));
   if (number > most) refuse("fewer", most, fmt::format("at most {}", rule.maximum));
@@ -267,7 +268,7 @@ Allocated allocated(const PlanOptions& options, const PlanStudy& study) {
   if (takes_escapes(stderr)) {
     wire::say(
         fmt::format("allocating {} {} to {} sessions; Ctrl-C ends with the best found so far\n",
-                    rule.num_steps, model().step_name(), num_sessions));
+                    rule.num_steps, built_in_model().step_name(), num_sessions));
   }
   const auto is_stopped = [&stop] { return stop != StopRequest::none; };
   const auto merit = [&](std::span<const int> num_steps) { return study.merit(goal, num_steps); };
@@ -295,7 +296,7 @@ int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStu
     throw UsageError(
         fmt::format("no campaign file can hold the best allocation: {}; choose another "
                     "--{} or --minimum",
-                    error.what(), model().step_name()));
+                    error.what(), built_in_model().step_name()));
   }
   print_plan(options, plan);
   if (options.format == OutputFormat::text) {
@@ -330,7 +331,7 @@ void add_plan(CLI::App& app, Command& chosen) {
                          "Allocate the time to the sessions as is best, and\nwrite the new "
                          "campaign file; Ctrl-C ends\nthe search with the best found so far");
   optimise->type_name(campaign_file_type);
-  const std::string steps(model().step_name());
+  const std::string steps(built_in_model().step_name());
   command
       .add_option("--" + steps, options.num_steps,
                   "Number to allocate; by default that of the file")

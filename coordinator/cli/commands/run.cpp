@@ -38,6 +38,7 @@
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/link/surroundings.hpp"
+#include "proto/model_program/model_choice.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -106,13 +107,11 @@ class GrowingFile final : public CampaignFiles {
 /// What takes time before the first run, and does not need the database: that of a new campaign is
 /// made meanwhile, which waits for the disk.
 struct RunStart {
-  RunStart(std::uint64_t worker_count, const Campaign& campaign, const std::string& gpus)
-      : num_workers(worker_count), batch_size(campaign.model().batch_size()) {
+  RunStart(std::uint64_t worker_count, const std::string& gpus) : num_workers(worker_count) {
     workers->start_local(num_workers, gpus);
   }
 
   std::uint64_t num_workers;
-  std::uint64_t batch_size;
   std::future<std::uint64_t> reference_digest = std::async(
       std::launch::async, [] { return built_in_model().reference_digest(best_instruction_set()); });
   PrivateEndpoint endpoint;
@@ -133,7 +132,7 @@ ServiceConfig service_config(RunStart& start, CampaignFiles& files) {
   config.dispatch.reference_digest = start.reference_digest.get();
   config.dispatch.reattach_wait = Duration::zero();      // Workers of the last time ended with it.
   config.dispatch.lone_witness_wait = Duration::zero();  // No other host can connect.
-  config.dispatch.num_slots_expected = start.num_workers * start.batch_size;
+  config.dispatch.num_slots_expected = start.num_workers * wire::slots_per_thread();
   // All workers may die at once, and runs must be found guilty before the machine is.
   config.dispatch.crashes_per_host_max =
       config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(start.num_workers + 1);
@@ -213,9 +212,8 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
       num_runs_in(campaign.store.finished_runs()) - num_finished_now;
   if (options.part) campaign.elsewhere = runs_beside(part, num_runs);
   if (start == nullptr) {
-    const Campaign& definition = *campaign.definition;
     start = std::make_unique<RunStart>(
-        num_workers(options, definition, part.count - num_finished_now), definition, options.gpus);
+        num_workers(options, *campaign.definition, part.count - num_finished_now), options.gpus);
   }
   make_active(campaign.store, options);
   const SignalThread signals;
@@ -363,7 +361,7 @@ int run_campaign(const RunOptions& options) {
   std::unique_ptr<RunStart> start;
   if (!std::filesystem::exists(database)) {
     start = std::make_unique<RunStart>(
-        num_workers(options, *campaign, part_of(options, num_runs).count), *campaign, options.gpus);
+        num_workers(options, *campaign, part_of(options, num_runs).count), options.gpus);
   }
   Outcome outcome = compute(open_or_create(*campaign, stop_plan_of(options, num_runs), database),
                             num_runs, options, std::move(start));
