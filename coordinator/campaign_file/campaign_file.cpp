@@ -87,10 +87,6 @@ std::string read_campaign_text(const std::filesystem::path& file) {
       "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
 }
 
-}  // namespace
-
-namespace {
-
 /// The model that a campaign file names; null if it names none.
 const Model* named_model(Document& document) {
   const std::string path = "campaign.model";

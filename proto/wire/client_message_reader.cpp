@@ -124,7 +124,9 @@ void check(const proto::CampaignStatus& message) {
   (void)checked_magnitude(message.rate_hz(), "rate_hz");
   (void)checked_magnitude(message.remaining_s(), "remaining_s");
   check_text(message.storage_failure(), "storage_failure");
-  check_text(message.missing_model(), "missing_model");
+  if (!message.missing_model().empty()) {
+    (void)checked_name(message.missing_model(), "missing_model");
+  }
   check_owner(message.owner());
 }
 

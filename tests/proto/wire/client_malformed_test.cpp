@@ -336,6 +336,14 @@ TEST(MalformedSubmitRequest, HasADefinition) {
               submit.mutable_definition()->add_table_columns()->add_values(nan);
             }),
             "definition.table_columns.values = nan (must be finite)");
+  EXPECT_EQ(refusal_of_submit(
+                [](auto& submit) { submit.mutable_definition()->set_model_version("a b"); }),
+            "definition.model_version = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or "
+            "digit first)");
+  EXPECT_EQ(refusal_of_submit([](auto& submit) {
+              submit.set_model_description(std::string(definition_text_size_max + 1, 'x'));
+            }),
+            "model_description size = 1048577 (must be in [0, 1048576])");
 }
 
 TEST(MalformedControlRequest, HasAnActionAndACampaign) {
@@ -401,6 +409,9 @@ TEST(MalformedTexts, AreBoundedAndHarmlessToATerminal) {
   EXPECT_EQ(refusal_of_campaign(
                 [](auto& campaign) { campaign.set_storage_failure(std::string(4097, 'x')); }),
             "storage_failure = 4097 bytes (must be at most 4096)");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_missing_model("\x1b[2J"); }),
+            "missing_model = 4 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit "
+            "first)");
   EXPECT_EQ(refusal(done_reply("a"),
                     [](auto& envelope) { envelope.mutable_done()->set_text("\x1b[2J"); }),
             "text = 4 bytes (must be printable ASCII and line ends)");

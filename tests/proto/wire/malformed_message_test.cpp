@@ -119,11 +119,28 @@ TEST(MalformedHello, SaysOnlyOfACrashHowTheFormerProcessEnded) {
             "former signal = 65 (must be in [0, 64])");
 }
 
+TEST(MalformedHello, HasABoundedNumberOfOtherModels) {
+  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.add_other_models(); }),
+            "other_models.version = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit "
+            "first)");
+  EXPECT_EQ(refusal(good_hello,
+                    [](auto& hello) {
+                      for (int i = 0; i < 65; ++i) hello.add_other_models()->set_version("a-1");
+                    }),
+            "other_models = 65 entries (must be in [0, 64])");
+}
+
 TEST(MalformedHello, HasSlots) {
   EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(0); }),
             "num_slots = 0 (must be in [1, 65536])");
   EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(65537); }),
             "num_slots = 65537 (must be in [1, 65536])");
+  const auto with_more_a_thread = [](auto& hello) {
+    hello.set_num_slots(5);
+    hello.set_num_card_slots(2);
+    hello.set_slots_per_thread(4);
+  };
+  EXPECT_EQ(refusal(good_hello, with_more_a_thread), "slots_per_thread = 4 (must be in [0, 3])");
   const auto of_cards_alone = [](auto& hello) { hello.set_num_card_slots(hello.num_slots()); };
   EXPECT_THAT(refusal(good_hello, of_cards_alone), HasSubstr("num_card_slots = "));
   EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_cards("H100\x1b"); }),
