@@ -49,4 +49,24 @@ double* number_at(Dispersion& dispersion, std::string_view key) {
   return nullptr;
 }
 
+std::string* text_at(Dispersion& dispersion, std::string_view key) {
+  if (key == "file") return &dispersion.file;
+  if (key == "column") return &dispersion.column;
+  if (key == "expression") return &dispersion.expression;
+  return nullptr;
+}
+
+std::vector<double>* numbers_at(Dispersion& dispersion, std::string_view key) {
+  if (key == "values") return &dispersion.values;
+  if (key == "probabilities") return &dispersion.probabilities;
+  if (key == "correlations") return &dispersion.correlations;
+  return nullptr;
+}
+
+std::vector<std::string>* texts_at(Dispersion& dispersion, std::string_view key) {
+  return key == "with" ? &dispersion.with : nullptr;
+}
+
+std::string_view name_of(Law law) { return names_of(law)[static_cast<std::size_t>(law) - 1]; }
+
 }  // namespace proofmass

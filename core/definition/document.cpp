@@ -209,6 +209,17 @@ bool Document::read(const std::string& path, int& value) {
   return true;
 }
 
+bool Document::read(const std::string& path, bool& value) {
+  const toml::node* const found = find(path);
+  if (found == nullptr) return false;
+  if (!found->is_boolean()) {
+    refuse(path, "must be true or false");
+    return false;
+  }
+  value = found->as_boolean()->get();
+  return true;
+}
+
 bool Document::read(const std::string& path, std::string& value) {
   const toml::node* const found = find(path);
   if (found == nullptr) return false;

@@ -52,6 +52,7 @@ class Document {
   bool read(const std::string& path, double& value, const Range& range = range::any);
   bool read(const std::string& path, std::int64_t& value, const Range& range = range::any);
   bool read(const std::string& path, int& value);
+  bool read(const std::string& path, bool& value);
   bool read(const std::string& path, std::string& value);
 
   /// Reads an enumerator by its spelling.

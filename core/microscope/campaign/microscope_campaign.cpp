@@ -31,51 +31,19 @@ void check_environment(const MicroscopeCampaign& campaign) {
   }
 }
 
-std::string path_of(std::size_t drawn) { return "dispersion." + drawn_names()[drawn]; }
-
-void check_design(const MicroscopeCampaign& campaign) {
-  const auto refuse = [&](std::string_view reason) {
-    throw ConfigError("campaign.design", fmt::format("\"{}\"", name_of(campaign.design.kind)),
-                      reason);
-  };
-  campaign.design.validate(campaign.num_runs);
-  if (campaign.design.kind == DesignKind::random) return;
-  if (campaign.realisations > 1) {
-    refuse("must be \"random\" with campaign.realisations, which needs independent instruments");
-  }
-  for (const std::size_t element : campaign.table_quantities()) {
-    if (campaign.dispersions[element].is_independent) continue;
-    refuse(fmt::format("must be \"random\" with a table that is not declared independent, {}",
-                       path_of(element)));
-  }
-}
-
-std::vector<TableSource> table_sources(const MicroscopeCampaign& campaign) {
-  std::vector<TableSource> sources;
-  for (const std::size_t element : campaign.table_quantities()) {
-    sources.push_back({.path = path_of(element), .column = campaign.dispersions[element].column});
-  }
-  return sources;
-}
-
 }  // namespace
 
 void MicroscopeCampaign::validate() const {
   validate_without_columns();
-  check_table_columns(*this, table_sources(*this));
+  check_table_columns(*this, table_sources(law_set(dispersions)));
 }
 
 void MicroscopeCampaign::validate_without_columns() const {
   check_identity(*this);
-  if (realisations < 1 || realisations > realisations_max) {
-    throw ConfigError("campaign.realisations", fmt::format("{}", realisations),
-                      fmt::format("must be in [1, {}]", realisations_max));
-  }
   scenario.validate();
   check_environment(*this);
-  for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
-  check_relations(dispersions);
-  check_design(*this);
+  check_laws(law_set(dispersions));
+  check_design(law_set(dispersions), *this);
 }
 
 Interpretation MicroscopeCampaign::interpretation() const {

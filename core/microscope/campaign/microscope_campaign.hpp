@@ -54,9 +54,6 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] Warner warner() const override;
 };
 
-/// Most realisations of the noise for one instrument.
-inline constexpr std::uint64_t realisations_max = 4096;
-
 /// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
 [[nodiscard]] MicroscopeCampaign hardy2013_campaign();
 

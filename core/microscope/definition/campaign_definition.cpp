@@ -12,6 +12,7 @@
 #include "core/definition/csv.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
+#include "core/definition/law_reader.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/estimation/methods.hpp"
@@ -43,27 +44,6 @@ void read_environment(MicroscopeCampaign& campaign, DataFiles& files) {
   const std::string& text = files.text_of(campaign.environment_file, "environment.file");
   campaign.environment_table = parse_environment(text, files.name_of(campaign.environment_file),
                                                  campaign.scenario.orbit.period_s);
-}
-
-/// A row of a file is the value of one instrument, and a column has one for each run.
-std::vector<double> of_each_run(std::vector<double> rows, const MicroscopeCampaign& campaign) {
-  if (campaign.realisations == 1) return rows;
-  const std::uint64_t num_covered = rows.size() * campaign.realisations;
-  std::vector<double> column(std::min(num_covered, campaign.num_runs));
-  for (std::size_t run = 0; run < column.size(); ++run)
-    column[run] = rows[run / campaign.realisations];
-  return column;
-}
-
-void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
-  for (const std::size_t element : campaign.table_quantities()) {
-    const Dispersion& dispersion = campaign.dispersions[element];
-    const std::string path = fmt::format("dispersion.{}.file", drawn_names()[element]);
-    campaign.table_columns.push_back(
-        of_each_run(parse_column(files.text_of(dispersion.file, path),
-                                 files.name_of(dispersion.file), dispersion.column),
-                    campaign));
-  }
 }
 
 void check_environment_headings(CsvReader& reader) {
@@ -155,30 +135,6 @@ void check_magnitudes(const MicroscopeCampaign& campaign) {
   check_derived(campaign);
 }
 
-/// @throws ConfigError if a column that is declared independent is none such.
-void check_independence(const MicroscopeCampaign& campaign) {
-  const std::vector<std::size_t> drawn = campaign.table_quantities();
-  for (std::size_t i = 0; i < drawn.size(); ++i) {
-    const Dispersion& law = campaign.dispersions[drawn[i]];
-    if (!law.is_independent) continue;
-    std::vector<double> rows;
-    for (std::size_t run = 0; run < campaign.table_columns[i].size();
-         run += campaign.realisations) {
-      rows.push_back(campaign.table_columns[i][run]);
-    }
-    const IndependencePValues p_values = independence_p_values(rows);
-    const bool is_serial = p_values.serial < independence_p_value_min;
-    if (!is_serial && p_values.regular >= independence_p_value_min) continue;
-    throw ConfigError(
-        fmt::format("dispersion.{}.independent", drawn_names()[drawn[i]]), "true",
-        fmt::format("column \"{}\" {}, p = {:.1g}; leave the key out, or draw each row anew",
-                    law.column,
-                    is_serial ? "depends on the order of its rows"
-                              : "covers its range more evenly than independent draws do",
-                    is_serial ? p_values.serial : p_values.regular));
-  }
-}
-
 }  // namespace
 
 EnvironmentTable parse_environment(std::string_view text, const std::string& name,
@@ -213,12 +169,12 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     document.check();
   }
   read_environment(campaign, files);
-  read_columns(campaign, files);
+  campaign.table_columns = read_table_columns(law_set(campaign.dispersions), files, campaign);
   try {
     campaign.validate();
     check_magnitudes(campaign);
     check_regressors(campaign.scenario);
-    check_independence(campaign);
+    check_independence(law_set(campaign.dispersions), campaign);
     if (estimation_method(campaign.scenario.estimation.method).name == joint_method.name) {
       check_joint_orbit(campaign.scenario.orbit.eccentricity);
     }
@@ -294,10 +250,12 @@ MicroscopeCampaign parse_campaign(const std::string& name, std::string_view text
 }
 
 Definition definition_of(const MicroscopeCampaign& campaign, TableColumns columns) {
+  const Model& model = campaign.model();
   Definition definition{.text = canonical_definition(campaign),
                         .tables = tables_of(campaign.environment_table),
                         .table_columns = {}};
   if (columns == TableColumns::included) definition.table_columns = campaign.table_columns;
+  if (&model != &built_in_model()) definition.model = model.version();
   return definition;
 }
 
@@ -312,11 +270,7 @@ MicroscopeCampaign recorded_campaign(std::string_view text) {
 
 MicroscopeCampaign campaign_of(Definition definition, TableColumns columns,
                                std::string_view source) {
-  if (columns == TableColumns::left_out && !definition.table_columns.empty()) {
-    throw DefinitionError(fmt::format(
-        "definition.table_columns = {} of them (must be none, as they come with the runs)",
-        definition.table_columns.size()));
-  }
+  check_columns(definition, columns);
   const std::string text = without_former_limits(std::move(definition.text));
   MicroscopeCampaign campaign =
       parsed_campaign(std::string(source), text, environment_of(definition.tables),

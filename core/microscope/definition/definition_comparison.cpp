@@ -138,36 +138,15 @@ class Comparison {
       const Dispersion& second = second_.dispersions[i];
       if (first.law == Law::table && second.law == Law::table &&
           first.is_independent == second.is_independent) {
-        compare_column(i);
+        if (auto difference = table_difference({first_, law_set(first_.dispersions)},
+                                               {second_, law_set(second_.dispersions)}, i)) {
+          differences_.push_back(*std::move(difference));
+        }
       } else if (detail::dispersion_text(first) != detail::dispersion_text(second)) {
         differ("dispersion." + drawn_names()[i], detail::dispersion_text(first),
                detail::dispersion_text(second));
       }
     }
-  }
-
-  // Values of the runs that both campaigns have.
-  void compare_column(std::size_t element) {
-    const std::vector<double>& first = column_of(first_, element);
-    const std::vector<double>& second = column_of(second_, element);
-    const std::uint64_t num_shared =
-        std::min({std::min(first_.num_runs, second_.num_runs), std::uint64_t{first.size()},
-                  std::uint64_t{second.size()}});
-    for (std::size_t run = 0; run < num_shared; ++run) {
-      if (std::bit_cast<std::uint64_t>(first[run]) == std::bit_cast<std::uint64_t>(second[run])) {
-        continue;
-      }
-      differ(fmt::format("dispersion.{} of run {}", drawn_names()[element], run),
-             fmt::format("{}", first[run]), fmt::format("{}", second[run]));
-      return;
-    }
-  }
-
-  static const std::vector<double>& column_of(const MicroscopeCampaign& campaign,
-                                              std::size_t element) {
-    const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
-    const auto position = std::ranges::find(elements, element) - elements.begin();
-    return campaign.table_columns[static_cast<std::size_t>(position)];
   }
 
   const MicroscopeCampaign& first_;

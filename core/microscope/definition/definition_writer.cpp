@@ -175,7 +175,7 @@ class CommentedWriter {
       text_ += fmt::format(", {}", element_of(i));
     }
     text_ += fmt::format("\n[dispersion.{}]\n", group.name);
-    for (const Entry& entry : detail::dispersion_entries(of_group)) text_ += assignment(entry);
+    for (const Entry& entry : detail::law_entries(of_group)) text_ += assignment(entry);
     for (std::size_t i = group.first + 1; i < group.first + group.count; ++i) {
       if (campaign_.dispersions[i] == of_group) continue;
       text_ += fmt::format("{} = {}\n", element_of(i),

@@ -6,9 +6,9 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/law_set.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass {
@@ -41,28 +41,18 @@ inline constexpr std::size_t index_of_eotvos_parameter = num_drawn - 1;
 using DrawnValues = std::array<double, num_drawn>;
 using DispersionSet = std::array<Dispersion, num_drawn>;
 
+/// @param dispersions  Outlive it.
+[[nodiscard]] LawSet law_set(const DispersionSet& dispersions);
+
 /// Uniform laws inside the construction bounds of MICROSCOPE, and no violation of the equivalence
 /// principle.
 [[nodiscard]] DispersionSet nominal_dispersions();
 
-/// Indices of the quantities with law `table`, ascending.
-[[nodiscard]] std::vector<std::size_t> table_elements(const DispersionSet& dispersions);
-
-/// The values of a run's draw number `draw` (from 0), before any acceptance rule: a pure function
-/// of its arguments. Draw 0 is in the strata of the design, whose dimension of a quantity is its
-/// index; later ones are independent of other runs.
-///
-/// @param table_values  The run's values of the `table` quantities, in the order of
-/// table_elements().
+/// As draw_values() of any laws.
 [[nodiscard]] DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed,
                                       RunIndex run, std::uint32_t draw,
                                       std::span<const double> table_values,
                                       const SamplingDesign& design = {});
-
-/// Checks what the laws say of one another: names in expressions and correlations, cycles, and
-/// that the correlations make a positive definite matrix.
-/// @throws ConfigError naming `dispersion.<quantity>.<key>`.
-void check_relations(const DispersionSet& dispersions);
 
 /// Unit of a drawn quantity, for people: `rad`, `m`, `s²/m`, `m/s²`, `rad/s²` or `1`.
 /// @param quantity  Index into drawn_names().
