@@ -6,8 +6,14 @@
 namespace proofmass {
 namespace {
 
+void add_linked(std::vector<const Model*>& models) {
+  models.push_back(&built_in_model());
+  for (const Model* const further : further_models()) models.push_back(further);
+}
+
 std::vector<const Model*>& all_models() {
-  static std::vector<const Model*> models{&built_in_model()};
+  static std::vector<const Model*> models;
+  if (models.empty()) add_linked(models);
   return models;
 }
 
@@ -26,7 +32,7 @@ std::string_view name_of_model(std::string_view version) {
 }
 
 void use_models(std::vector<const Model*> others) {
-  others.push_back(&built_in_model());
+  add_linked(others);
   all_models() = std::move(others);
 }
 

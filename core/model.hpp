@@ -83,9 +83,12 @@ class Model {
   /// The text by which others know the model who do not have its program, see
   /// proto/model_program/README.md. Empty if it has none, as models in C++.
   [[nodiscard]] virtual std::string_view description() const { return {}; }
-  /// False for a model that is known by its description alone: whatever computes runs or asks the
-  /// program throws an Error that names it.
-  [[nodiscard]] virtual bool can_simulate() const { return true; }
+  /// Why nothing computes runs of a model that is known by its description alone, and what to do;
+  /// empty for one that can. What needs it to compute throws an Error with this text.
+  [[nodiscard]] virtual std::string why_no_runs() const { return {}; }
+  [[nodiscard]] bool can_simulate() const { return why_no_runs().empty(); }
+  /// True if another program computed the results of its only campaign, and nothing computes more.
+  [[nodiscard]] virtual bool is_imported() const { return false; }
 
   /// What a device proves before it computes anything that counts.
   struct DeviceProof {
@@ -142,7 +145,11 @@ class Model {
 /// library that defines this function.
 [[nodiscard]] const Model& built_in_model();
 
-/// The models that this program can simulate: those of use_models(), and the built-in one.
+/// Further models that a program is linked with; it is defined where built_in_model() is chosen.
+[[nodiscard]] std::vector<const Model*> further_models();
+
+/// The models that this program can simulate: those of use_models(), the built-in one, and
+/// further_models().
 [[nodiscard]] std::span<const Model* const> models();
 
 /// The first of models(): that of campaign files that name none, and of help texts.

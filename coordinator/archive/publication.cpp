@@ -251,11 +251,19 @@ path unpacked(const path& archive, const WorkDirectory& work, const IsStopped& i
 
 Check check_campaign(const path& folder) {
   const Store store = Store::open_read_only(folder / database_name);
-  std::vector<std::string> details =
-      definition_differences(*stored_campaign(store), *read_campaign(folder / "campaign.toml"));
+  const std::string why_not_read = store.model().why_no_runs();
+  std::vector<std::string> details;
+  if (why_not_read.empty()) {
+    details =
+        definition_differences(*stored_campaign(store), *read_campaign(folder / "campaign.toml"));
+  }
   for (const char* name : {"README.md", "CITATION.cff"}) {
     if (text_of(folder / name).find(digest_of(store)) != std::string::npos) continue;
     details.push_back(fmt::format("{} names another digest", name));
+  }
+  if (details.empty() && !why_not_read.empty()) {
+    return Check::not_checked(
+        fmt::format("digests are those of the database; campaign.toml: {}", why_not_read));
   }
   if (details.empty()) return Check::holds("campaign.toml and digests are those of the database");
   return Check::fails("the files are of another campaign than the database", std::move(details));
@@ -267,9 +275,8 @@ void publish(const path& database, const path& archive, wire::IfThere if_there,
              std::span<const std::string> authors, const IsStopped& is_stopped) {
   const Store original = Store::open_read_only(database);
   if (!original.model().can_simulate()) {
-    throw ArchiveError(fmt::format(
-        "model = {} (its program reads the campaign file again: name it with --model-program)",
-        original.model_version()));
+    throw ArchiveError(
+        fmt::format("model = {} ({})", original.model_version(), original.model().why_no_runs()));
   }
   const WorkDirectory work;
   (void)walk_results(original, is_stopped, [](const RunResult&) {});  // Damage, by its own name.

@@ -21,8 +21,7 @@ void require_model_of_this_program(const Store& store) {
   const std::string stored = store.model_version();
   const Model& model = store.model();
   if (!model.can_simulate()) {
-    throw ArchiveError(fmt::format(
-        "model = {} (its program computes runs: name it with --model-program)", stored));
+    throw ArchiveError(fmt::format("model = {} ({})", stored, model.why_no_runs()));
   }
   if (stored == model.version()) return;
   throw ArchiveError(

@@ -18,9 +18,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-constexpr std::string_view program_missing =
-    "its program is not here; name it with --model-program";
-
 /// The checks of one file, each made once, in order.
 class Verification {
  public:
@@ -99,11 +96,13 @@ class Verification {
 
   Check check_model() {
     const std::string model = store_->model_version();
-    can_simulate_ = store_->model().can_simulate();
+    why_no_runs_ = store_->model().why_no_runs();
     const std::string_view own =
         options_.model_version.empty() ? store_->model().version() : options_.model_version;
-    is_same_model_ = model == own || !can_simulate_;
-    if (!can_simulate_) return Check::not_checked(fmt::format("{}; {}", model, program_missing));
+    is_same_model_ = model == own || !why_no_runs_.empty();
+    if (!why_no_runs_.empty()) {
+      return Check::not_checked(fmt::format("{}; {}", model, why_no_runs_));
+    }
     if (is_same_model_) return Check::holds(fmt::format("{}; {}", model, store_->build()));
     return Check::fails(
         fmt::format("{} made this file and this program has {}: its runs cannot be "
@@ -184,7 +183,7 @@ class Verification {
 
   Check check_simulation() {
     if (!is_same_model_) return Check::not_checked("another model made the file");
-    if (!can_simulate_) return Check::not_checked(std::string(program_missing));
+    if (!why_no_runs_.empty()) return Check::not_checked(why_no_runs_);
     if (!scan_) return Check::not_checked("the results cannot be read");
     ChosenRuns chosen(scan_->runs, options_.fraction);
     if (chosen.size() == 0) return Check::not_checked("no run is finished");
@@ -248,7 +247,7 @@ class Verification {
   std::optional<Store> store_;
   std::shared_ptr<const Campaign> campaign_;
   bool is_same_model_ = false;
-  bool can_simulate_ = false;
+  std::string why_no_runs_;  ///< Of the file's model.
   std::optional<ResultScan> scan_;
 };
 

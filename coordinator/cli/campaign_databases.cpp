@@ -29,7 +29,8 @@ namespace proofmass::coordinator {
 namespace {
 
 /// What keeps the campaign of a database from going on with a model; empty if nothing does.
-std::string model_difference(const Store& store, const Model& wanted) {
+std::string model_difference(const Store& store, const Campaign& campaign) {
+  const Model& wanted = campaign.model();
   if (store.model_version() != wanted.version()) {
     return fmt::format("model: {} in the database, {} in this program", store.model_version(),
                        wanted.version());
@@ -39,6 +40,7 @@ std::string model_difference(const Store& store, const Model& wanted) {
         "model: {} has another description; a model that has changed needs another version",
         wanted.version());
   }
+  if (campaign.tolerates_digests()) return {};
   const std::uint64_t before = store.reference_digest();
   const std::uint64_t now = before == 0 ? 0 : wanted.reference_digest(best_instruction_set());
   if (before == now) return {};
@@ -57,7 +59,7 @@ std::string text_of(const Campaign& campaign) {
 void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
                   std::string_view remedy) {
   std::vector<std::string> differences;
-  const std::string of_model = model_difference(store, wanted.model());
+  const std::string of_model = model_difference(store, wanted);
   // Definitions of two models have nothing in common that could be compared.
   if (store.model().description() == wanted.model().description()) {
     differences = definition_differences(*stored_campaign(store), wanted);
@@ -172,9 +174,8 @@ ServedCampaign load_file(const std::filesystem::path& file) {
   Store store = Store::open(file);
   const Model& model = store.model();
   if (!model.can_simulate() && store.reference_digest() == 0) {
-    throw Error(fmt::format(
-        "{}: model = {} (an older Proofmass began it; --model-program names its program)",
-        file.string(), store.model_version()));
+    throw Error(fmt::format("{}: model = {} ({})", file.string(), store.model_version(),
+                            model.why_no_runs()));
   }
   if (store.model_version() != model.version()) {
     throw Error(fmt::format("{}: model = {} (this program has {})", file.string(),

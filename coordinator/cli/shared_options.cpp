@@ -26,6 +26,10 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
                   "Replace a value of the file: TABLE.KEY=VALUE;\nmay be repeated")
       ->take_all()
       ->allow_extra_args(false);
+  command.add_flag_callback(
+      "--tolerate-digest",
+      [&overrides] { overrides.assignments.emplace_back("campaign.tolerate_digest=true"); },
+      "Accept machines where a model program computes\nother bits; the report says so");
 }
 
 std::string example_requirement() {

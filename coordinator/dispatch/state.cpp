@@ -56,7 +56,10 @@ bool is_finished(const CampaignState& campaign) {
 }
 
 bool can_compute(const Worker& worker, const CampaignState& campaign) {
-  return std::ranges::find(worker.models, campaign.model) != worker.models.end();
+  return std::ranges::any_of(worker.models, [&](const ModelIdentity& model) {
+    return model == campaign.model ||
+           (campaign.definition->tolerates_digests() && model.version == campaign.model.version);
+  });
 }
 
 bool lacks_workers(const State& state, const CampaignState& campaign) {

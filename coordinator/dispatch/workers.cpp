@@ -38,15 +38,18 @@ proto::Envelope stop_message() {
 std::optional<proto::Envelope> refusal_of(const State& state, const proto::OtherModel& other) {
   std::optional<std::uint64_t> expected;
   for (const CampaignId id : state.served) {
-    const ModelIdentity& wanted = state.campaigns.at(id).model;
+    const CampaignState& campaign = state.campaigns.at(id);
+    const ModelIdentity& wanted = campaign.model;
     if (wanted.version != other.version()) continue;
+    if (campaign.definition->tolerates_digests()) return std::nullopt;
     if (wanted.reference_digest == other.reference_digest()) return std::nullopt;
     expected = wanted.reference_digest;
   }
   if (!expected) return std::nullopt;
   return wire::rejection(
       proto::REJECT_REASON_INCOMPATIBLE,
-      fmt::format("reference_digest of {} = {:016x} (must be {:016x}, where its campaign began)",
+      fmt::format("reference_digest of {} = {:016x} (must be {:016x}, where its campaign began, "
+                  "unless that has tolerate_digest = true)",
                   other.version(), other.reference_digest(), *expected));
 }
 

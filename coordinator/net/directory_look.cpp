@@ -28,10 +28,11 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// One that older programs began has no digest of its model.
+/// 0 for the built-in model. One that older programs began has no digest of its model, nor has one
+/// of a model in C++.
 std::uint64_t reference_digest_of(const ServedCampaign& campaign) {
   const Model& model = campaign.definition->model();
-  if (model.description().empty()) return 0;
+  if (&model == &built_in_model()) return 0;
   const std::uint64_t recorded = campaign.store.reference_digest();
   return recorded != 0 ? recorded : model.reference_digest(best_instruction_set());
 }

@@ -197,6 +197,12 @@ class Campaign {
   [[nodiscard]] virtual SamplingDesign sampling_design() const { return {}; }
   /// What differs from run to run.
   [[nodiscard]] virtual Interpretation interpretation() const { return Interpretation::mixed; }
+  /// Whether runs may be computed where the model's reference digest is another one: then a result
+  /// need not be the same on each machine.
+  [[nodiscard]] virtual bool tolerates_digests() const { return false; }
+  /// What whoever reads its results must know of how they came about: a sentence without its full
+  /// stop; usually empty.
+  [[nodiscard]] virtual std::string note() const { return {}; }
   /// Nothing if the model has none.
   [[nodiscard]] virtual std::optional<ErrorBudget> error_budget() const { return std::nullopt; }
   /// Null if the model gives no warnings.
@@ -213,7 +219,10 @@ class Campaign {
   Campaign& operator=(Campaign&&) = default;
 };
 
-/// The rules for the name, the seed and the number of runs.
+/// Most runs that share one draw.
+inline constexpr std::uint64_t realisations_max = 4096;
+
+/// The rules for the name, the seed and the numbers of runs and realisations.
 /// @throws ConfigError naming the field, its value and the rule.
 void check_identity(const Campaign& campaign);
 

@@ -1,3 +1,5 @@
+#include "core/microscope/microscope_model.hpp"
+
 #include <array>
 #include <charconv>
 #include <memory>
@@ -16,11 +18,10 @@
 #include "core/microscope/planning/plan_study.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
-#include "core/model.hpp"
 
 namespace proofmass {
 
-const Model& MicroscopeCampaign::model() const { return built_in_model(); }
+const Model& MicroscopeCampaign::model() const { return microscope_model(); }
 
 std::unique_ptr<Campaign> MicroscopeCampaign::clone() const {
   return std::make_unique<MicroscopeCampaign>(*this);
@@ -39,7 +40,7 @@ std::vector<DefinitionItem> MicroscopeCampaign::items() const { return definitio
 std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
     const Campaign& other) const {
   const auto* const second = dynamic_cast<const MicroscopeCampaign*>(&other);
-  PROOFMASS_EXPECT(second != nullptr);
+  if (second == nullptr) return {};
   return compare_definitions(*this, *second);
 }
 
@@ -209,7 +210,7 @@ class MicroscopeModel final : public Model {
 
 }  // namespace
 
-const Model& built_in_model() {
+const Model& microscope_model() {
   static const MicroscopeModel microscope;
   return microscope;
 }

@@ -1,7 +1,7 @@
 # proofmass_add_programs(NAME name MODEL target)
 #
-# The three programs with a model: `target` is an object library that defines proofmass::built_in_model()
-# (core/model.hpp). They have the names proofmass, proofmass-coordinator and proofmass-worker, as
+# The three programs with a model, and that of MICROSCOPE: `target` is an object library that defines
+# proofmass::built_in_model() (core/model.hpp). They have the names proofmass, proofmass-coordinator and proofmass-worker, as
 # `proofmass run` finds its worker beside itself, and are built in a directory of their own, `name`
 # below the current binary directory. Their targets are name_proofmass, name_proofmass-coordinator
 # and name_proofmass-worker.
@@ -13,10 +13,12 @@ function(proofmass_add_programs)
   set(proofmass-worker_main worker/main.cpp)
   foreach(program proofmass proofmass-coordinator proofmass-worker)
     set(target ${programs_NAME}_${program})
-    add_executable(${target} ${PROOFMASS_SOURCES}/${${program}_main})
+    add_executable(${target} ${PROOFMASS_SOURCES}/${${program}_main}
+      ${PROOFMASS_SOURCES}/core/microscope/further_model.cpp)
     set_target_properties(${target} PROPERTIES
       OUTPUT_NAME ${program} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${programs_NAME})
-    target_link_libraries(${target} PRIVATE proofmass::cli proofmass::worker_program ${programs_MODEL})
+    target_link_libraries(${target} PRIVATE proofmass::cli proofmass::worker_program proofmass::microscope
+      ${programs_MODEL})
   endforeach()
   add_dependencies(${programs_NAME}_proofmass ${programs_NAME}_proofmass-worker)
 endfunction()

@@ -19,6 +19,8 @@ struct ProgramStart {
   std::array<int, 3> descriptors{0, 1, 2};
   /// `NAME=value` each; that of this process by default.
   std::optional<std::vector<std::string>> environment = {};
+  /// Signals of the terminal, such as that of Ctrl-C, do not reach it.
+  bool has_own_group = false;
 };
 
 /// Starts the program with no signal blocked and SIGPIPE not ignored, whatever holds here.

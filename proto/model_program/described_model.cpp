@@ -9,48 +9,14 @@
 #include <mutex>
 #include <optional>
 #include <utility>
-#include <variant>
 
 #include "core/campaign/expression.hpp"
-#include "core/campaign/law_keys.hpp"
-#include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
+#include "core/definition/entry.hpp"
+#include "core/definition/law_reader.hpp"
 #include "core/math/hash.hpp"
 
 namespace proofmass::wire {
-namespace {
-
-std::string value_text(const DefinitionValue& value) {
-  if (const auto* const whole = std::get_if<std::int64_t>(&value)) return fmt::to_string(*whole);
-  if (const auto* const number = std::get_if<double>(&value)) return detail::number_text(*number);
-  return detail::quoted_text(std::get<std::string>(value));
-}
-
-std::string_view name_of(Law law) { return names_of(law)[static_cast<std::size_t>(law) - 1]; }
-
-void read_law(Document& document, const std::string& path, Dispersion& law) {
-  const Law before = law.law;
-  if (document.read(path + ".law", law.law)) {
-    if (!is_law_of_programs(law.law)) {
-      document.refuse(path + ".law", laws_of_programs_rule);
-      law.law = before;
-    }
-    if (law.law != before) {
-      Dispersion other;
-      other.law = law.law;
-      law = other;
-    }
-  }
-  for (const std::string_view key : keys_of(law.law)) {
-    const std::string key_path = fmt::format("{}.{}", path, key);
-    if (!document.read(key_path, *number_at(law, key)) && law.law != before) {
-      document.refuse_absence(key_path, fmt::format("the law {} needs it", name_of(law.law)));
-    }
-  }
-}
-
-}  // namespace
-
 DescribedCampaign::DescribedCampaign(const DescribedModel& of) : model_(&of) {
   name = name_of_model(of.version());
   for (const ProgramParameter& parameter : description().parameters) {
@@ -70,110 +36,143 @@ std::unique_ptr<const Plan> DescribedCampaign::prepare() const {
   return model_->program().prepare(*this);
 }
 
-std::vector<DefinitionItem> DescribedCampaign::items() const {
+std::string DescribedCampaign::note() const {
+  if (model_->is_imported()) {
+    return fmt::format("imported from {}: another program computed these results",
+                       description().imported_from);
+  }
+  if (!is_digest_tolerated) return {};
+  return "machines with another reference digest were accepted (campaign.tolerate_digest): what a "
+         "run computes may depend on its machine";
+}
+
+LawSet DescribedCampaign::law_set() const {
+  return {.names = model_->drawn_names(), .laws = laws, .table = "drawn"};
+}
+
+std::vector<detail::Entry> DescribedCampaign::entries() const {
   const ProgramDescription& of = description();
-  std::vector<DefinitionItem> items{{"campaign.name", name},
-                                    {"campaign.seed", static_cast<std::int64_t>(seed)},
-                                    {"campaign.runs", static_cast<std::int64_t>(num_runs)}};
+  std::vector<detail::Entry> entries = detail::campaign_entries(*this);
+  if (is_digest_tolerated) entries.push_back({"campaign.tolerate_digest", "true", "", "true"});
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    items.push_back({"parameters." + of.parameters[i].name, parameters[i]});
+    entries.push_back(detail::real_entry("parameters." + of.parameters[i].name, parameters[i]));
   }
   for (std::size_t i = 0; i < laws.size(); ++i) {
-    const std::string path = "drawn." + of.drawn[i].name;
-    Dispersion law = laws[i];
-    items.push_back({path + ".law", std::string(name_of(law.law))});
-    for (const std::string_view key : keys_of(law.law)) {
-      items.push_back({fmt::format("{}.{}", path, key), *number_at(law, key)});
+    for (detail::Entry& entry : detail::law_entries(laws[i])) {
+      entry.path = fmt::format("{}.{}", law_set().path_of(i), entry.path);
+      entries.push_back(std::move(entry));
     }
   }
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    if (std::isfinite(objectives_[i])) {
-      items.push_back({"objectives." + of.quantities[i].name, objectives_[i]});
-    }
+    if (!std::isfinite(objectives_[i])) continue;
+    entries.push_back(detail::real_entry("objectives." + of.quantities[i].name, objectives_[i]));
+  }
+  return entries;
+}
+
+std::vector<DefinitionItem> DescribedCampaign::items() const {
+  std::vector<DefinitionItem> items;
+  for (detail::Entry& entry : entries()) {
+    items.push_back({std::move(entry.path), std::move(entry.value)});
   }
   return items;
 }
 
-Definition DescribedCampaign::definition(TableColumns) const {
-  std::string text, table;
-  for (const DefinitionItem& item : items()) {
-    const std::size_t dot = item.key.rfind('.');
-    const std::string of = item.key.substr(0, dot);
+Definition DescribedCampaign::definition(TableColumns columns) const {
+  Definition definition{.text = {}, .model = std::string(model_->version())};
+  std::string table;
+  for (const detail::Entry& entry : entries()) {
+    const std::size_t dot = entry.path.rfind('.');
+    const std::string of = entry.path.substr(0, dot);
     if (std::exchange(table, of) != of) {
-      text += fmt::format("{}[{}]\n", text.empty() ? "" : "\n", of);
+      definition.text += fmt::format("{}[{}]\n", definition.text.empty() ? "" : "\n", of);
     }
-    text += fmt::format("{} = {}\n", item.key.substr(dot + 1), value_text(item.value));
+    definition.text += fmt::format("{} = {}\n", entry.path.substr(dot + 1), entry.text);
   }
-  return {.text = std::move(text), .model = std::string(model_->version())};
+  if (columns == TableColumns::included) definition.table_columns = table_columns;
+  return definition;
 }
 
 std::vector<DefinitionDifference> DescribedCampaign::differences_from(const Campaign& other) const {
-  // Laws may have different keys: a key that one campaign lacks is a difference, too.
-  std::vector<DefinitionItem> others = other.items();
+  const auto* const described = dynamic_cast<const DescribedCampaign*>(&other);
+  if (described == nullptr) return {};
+  const DescribedCampaign& second = *described;
+  // Laws may have different keys: a key that one campaign lacks is a difference, too. The name of a
+  // data file, or of a column, is none.
+  std::vector<detail::Entry> others = second.entries();
+  const auto is_source = [](std::string_view key) {
+    return key.starts_with("drawn.") && (key.ends_with(".file") || key.ends_with(".column"));
+  };
   std::vector<DefinitionDifference> differences;
-  const auto differ = [&](const std::string& key, std::string first, std::string second) {
-    if (key == "campaign.runs" || first == second) return;
+  const auto differ = [&](const std::string& key, std::string first, std::string second_text) {
+    if (key == "campaign.runs" || first == second_text) return;
     const std::string_view prefix = "campaign.";
     differences.push_back({key.starts_with(prefix) ? key.substr(prefix.size()) : key,
-                           std::move(first), std::move(second)});
+                           std::move(first), std::move(second_text)});
   };
-  for (const DefinitionItem& item : items()) {
-    const auto same = std::ranges::find(others, item.key, &DefinitionItem::key);
-    differ(item.key, value_text(item.value),
-           same == others.end() ? "none" : value_text(same->value));
-    if (same != others.end()) others.erase(same);
+  const bool are_same_drawn = model_->drawn_names() == second.model_->drawn_names();
+  for (std::size_t i = 0; are_same_drawn && i < laws.size(); ++i) {
+    if (laws[i].law != Law::table || second.laws[i].law != Law::table) continue;
+    const auto difference = table_difference({*this, law_set()}, {second, second.law_set()}, i);
+    if (difference) differences.push_back(*difference);
   }
-  for (const DefinitionItem& item : others) differ(item.key, "none", value_text(item.value));
+  for (const detail::Entry& entry : entries()) {
+    const auto same = std::ranges::find(others, entry.path, &detail::Entry::path);
+    if (same == others.end()) {
+      differ(entry.path, entry.text, "none");
+    } else {
+      if (!is_source(entry.path)) differ(entry.path, entry.text, same->text);
+      others.erase(same);
+    }
+  }
+  for (const detail::Entry& entry : others) differ(entry.path, "none", entry.text);
   return differences;
 }
 
 void DescribedCampaign::read(Document& document) {
   const ProgramDescription& of = description();
-  auto whole_seed = static_cast<std::int64_t>(seed);
-  auto whole_runs = static_cast<std::int64_t>(num_runs);
-  document.read("campaign.name", name);
-  document.read("campaign.seed", whole_seed, range::not_negative);
-  document.read("campaign.runs", whole_runs, range::between(1, double{num_runs_max}));
-  seed = static_cast<std::uint64_t>(whole_seed);
-  num_runs = static_cast<std::uint64_t>(whole_runs);
+  read_identity(document, *this, realisations, design);
+  document.read("campaign.tolerate_digest", is_digest_tolerated);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     document.read("parameters." + of.parameters[i].name, parameters[i]);
   }
+  const LawSet set = law_set();
+  std::vector<std::size_t> with_covariances;
   for (std::size_t i = 0; i < laws.size(); ++i) {
-    read_law(document, "drawn." + of.drawn[i].name, laws[i]);
+    const std::string path = set.path_of(i);
+    laws[i] = read_law(document, path, laws[i], document.is_assigned(path + ".law"));
+    if (has_covariances(document, path)) with_covariances.push_back(i);
   }
+  for (const std::size_t i : with_covariances) as_correlations(set, laws[i]);
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     document.read("objectives." + of.quantities[i].name, objectives_[i], range::positive);
   }
   document.check();
-  try {
-    validate();
-  } catch (const ConfigError& error) {
-    throw document.located(error);
-  }
 }
 
 void DescribedCampaign::validate() const {
-  check_identity(*this);
-  check_table_columns(*this, {});
-  for (std::size_t i = 0; i < laws.size(); ++i) {
-    laws[i].validate("drawn." + description().drawn[i].name);
-  }
+  validate_without_columns();
+  check_table_columns(*this, table_sources(law_set()));
 }
 
-RunDraw DescribedCampaign::draw(RunIndex run) const {
+void DescribedCampaign::validate_without_columns() const {
+  check_identity(*this);
+  check_laws(law_set());
+  check_design(law_set(), *this);
+}
+
+RunDraw DescribedCampaign::drawn(RunIndex run, std::span<const double> table_values) const {
   const ProgramDescription& of = description();
-  RunDraw draw{.num_draws = 1};
-  for (std::size_t i = 0; i < laws.size(); ++i) {
-    draw.values.push_back(draw_value(laws[i], of.drawn[i].name, seed, run, 0, 0.0));
-  }
+  RunDraw draw{.num_draws = 1, .values = std::vector<double>(laws.size())};
+  draw_values(law_set(), seed, RunIndex{run.value / realisations}, 0, table_values, design,
+              draw.values);
+  if (!std::ranges::all_of(draw.values, is_in_range)) return {.num_draws = 1};
   for (const ProgramQuantity& quantity : of.quantities) {
     draw.truth.push_back(evaluate_expression(quantity.truth, [&](std::string_view input) {
       for (std::size_t i = 0; i < parameters.size(); ++i) {
         if (of.parameters[i].name == input) return parameters[i];
       }
-      return draw.values[static_cast<std::size_t>(
-          std::ranges::find(of.drawn, input, &ProgramDraw::name) - of.drawn.begin())];
+      return draw.values[law_set().index_of(input)];
     }));
   }
   if (!std::ranges::all_of(draw.truth, is_in_range)) return {.num_draws = 1};
@@ -205,15 +204,23 @@ DescribedModel::DescribedModel(ProgramDescription description, std::uint64_t ref
 DescribedModel::DescribedModel(ProgramDescription description,
                                std::unique_ptr<const RunnableProgram> program)
     : parts_(std::move(description)), program_(std::move(program)) {
-  for (const ProgramDraw& draw : parts_.drawn) drawn_.push_back({draw.name, draw.unit});
+  for (const ProgramDraw& draw : parts_.drawn) {
+    drawn_names_.push_back(draw.name);
+    drawn_.push_back({draw.name, draw.unit});
+  }
   example_file_ = DescribedCampaign(*this).name + ".toml";
+}
+
+std::string DescribedModel::why_no_runs() const {
+  if (program_) return {};
+  if (!is_imported()) return "its program is not here; name it with --model-program";
+  return fmt::format("its results were imported from {}; no more can be computed",
+                     parts_.imported_from);
 }
 
 const RunnableProgram& DescribedModel::program() const {
   if (program_) return *program_;
-  throw ModelProgramError(fmt::format(
-      "model = {} (its program is needed to compute runs: name it with --model-program)",
-      version()));
+  throw ModelProgramError(fmt::format("model = {} ({})", version(), why_no_runs()));
 }
 
 ResultSchema DescribedModel::results_of(std::string_view, std::string_view) const {
@@ -237,21 +244,37 @@ std::uint64_t DescribedModel::reference_digest(InstructionSet set) const {
   return *(reference_digest_ = digest);
 }
 
-std::unique_ptr<Campaign> DescribedModel::campaign_of(Definition definition, TableColumns,
+std::unique_ptr<Campaign> DescribedModel::campaign_of(Definition definition, TableColumns columns,
                                                       std::string_view source) const {
+  check_columns(definition, columns);
   Document document(std::string(source), definition.text, {});
   auto campaign = std::make_unique<DescribedCampaign>(*this);
   campaign->read(document);
+  campaign->table_columns = definition.table_columns;
+  try {
+    if (columns == TableColumns::included) {
+      campaign->validate();
+    } else {
+      campaign->validate_without_columns();
+    }
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
   definition.model = version();
   if (campaign->definition(TableColumns::included) == definition) return campaign;
   throw DefinitionError(fmt::format("{}: is no definition of {}", source, version()));
 }
 
 // The program itself has a say, which it has where it runs in all other cases.
-std::unique_ptr<Campaign> DescribedModel::read_campaign(Document& document, DataFiles&) const {
+std::unique_ptr<Campaign> DescribedModel::read_campaign(Document& document,
+                                                        DataFiles& files) const {
   auto campaign = std::make_unique<DescribedCampaign>(*this);
   campaign->read(document);
   try {
+    campaign->validate_without_columns();
+    campaign->table_columns = read_table_columns(campaign->law_set(), files, *campaign);
+    campaign->validate();
+    check_independence(campaign->law_set(), *campaign);
     program().check(*campaign);
   } catch (const ConfigError& error) {
     throw document.located(error);
@@ -290,8 +313,8 @@ const DescribedModel& described_model(const std::string& text, std::uint64_t ref
   return made.first->second;
 }
 
-/// One of this program with the same version, and the same description if both have one; or the
-/// built-in one if it has the same name: one in C++ knows what its older versions recorded.
+/// One of this program with the same version, and the same description if both have one; or one in
+/// C++ with the same name, which knows what its older versions recorded.
 const Model* own_model(const ModelRecord& record) {
   const Model* const found = find_model(record.version);
   if (found != nullptr && (found->description().empty() || record.description.empty() ||
@@ -299,8 +322,11 @@ const Model* own_model(const ModelRecord& record) {
     return found;
   }
   const std::string_view name = name_of_model(record.version);
-  const Model& built_in = built_in_model();
-  return name.empty() || name == name_of_model(built_in.version()) ? &built_in : nullptr;
+  if (name.empty()) return &built_in_model();
+  const auto in_cpp = std::ranges::find_if(models(), [&](const Model* model) {
+    return model->description().empty() && name_of_model(model->version()) == name;
+  });
+  return in_cpp == models().end() ? nullptr : *in_cpp;
 }
 
 /// `hardy2013-6 and oscillator-1`.

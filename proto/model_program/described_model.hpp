@@ -12,8 +12,14 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/law_set.hpp"
+#include "core/campaign/sampling_design.hpp"
 #include "core/model.hpp"
 #include "proto/model_program/program_description.hpp"
+
+namespace proofmass::detail {
+struct Entry;
+}  // namespace proofmass::detail
 
 namespace proofmass::wire {
 
@@ -27,9 +33,14 @@ class DescribedCampaign final : public Campaign {
 
   std::vector<double> parameters;  ///< Of each of the description's.
   std::vector<Dispersion> laws;    ///< Of each drawn quantity.
+  std::uint64_t realisations = 1;  ///< Consecutive runs that share one draw.
+  SamplingDesign design = {};
+  bool is_digest_tolerated = false;
 
   /// Takes what a campaign file changes. @throws DefinitionError
   void read(Document& document);
+  /// validate() of a campaign whose `table_columns` may be absent.
+  void validate_without_columns() const;
 
   [[nodiscard]] const Model& model() const override;
   void validate() const override;
@@ -45,12 +56,23 @@ class DescribedCampaign final : public Campaign {
   [[nodiscard]] ResultSchema results() const override;
   [[nodiscard]] std::vector<double> objectives() const override { return objectives_; }
   [[nodiscard]] std::int64_t num_rounds_max() const override { return 1; }
-  [[nodiscard]] std::vector<std::size_t> table_quantities() const override { return {}; }
-  [[nodiscard]] RunDraw draw(RunIndex run) const override;
+  [[nodiscard]] std::vector<std::size_t> table_quantities() const override {
+    return table_elements(laws);
+  }
+  [[nodiscard]] std::uint64_t num_realisations() const override { return realisations; }
+  [[nodiscard]] SamplingDesign sampling_design() const override { return design; }
+  [[nodiscard]] RunDraw draw(RunIndex run) const override { return drawn(run, table_values(run)); }
+  [[nodiscard]] bool tolerates_digests() const override { return is_digest_tolerated; }
+  [[nodiscard]] std::string note() const override;
+  /// @param table_values  As table_values() of the run.
+  [[nodiscard]] RunDraw drawn(RunIndex run, std::span<const double> table_values) const;
 
   [[nodiscard]] const ProgramDescription& description() const;
+  [[nodiscard]] LawSet law_set() const;
 
  private:
+  [[nodiscard]] std::vector<detail::Entry> entries() const;
+
   const DescribedModel* model_;
   std::vector<double> objectives_;
 };
@@ -89,7 +111,8 @@ class DescribedModel final : public Model {
   /// Of the description and of the first three runs of the example, which are computed once.
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override;
   [[nodiscard]] std::string_view description() const override { return parts_.text; }
-  [[nodiscard]] bool can_simulate() const override { return program_ != nullptr; }
+  [[nodiscard]] std::string why_no_runs() const override;
+  [[nodiscard]] bool is_imported() const override { return !parts_.imported_from.empty(); }
   [[nodiscard]] std::unique_ptr<Campaign> campaign_of(Definition definition, TableColumns,
                                                       std::string_view source) const override;
   [[nodiscard]] std::unique_ptr<Campaign> read_campaign(Document& document,
@@ -98,12 +121,14 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::string_view example_file() const override { return example_file_; }
 
   [[nodiscard]] const ProgramDescription& parts() const { return parts_; }
+  [[nodiscard]] const std::vector<std::string>& drawn_names() const { return drawn_names_; }
   /// @throws ModelProgramError that says how to name it if it is not there.
   [[nodiscard]] const RunnableProgram& program() const;
 
  private:
   ProgramDescription parts_;
   std::unique_ptr<const RunnableProgram> program_;
+  std::vector<std::string> drawn_names_;
   std::vector<DrawnQuantity> drawn_;
   std::string example_file_;
   mutable std::mutex digest_mutex_;

@@ -9,7 +9,9 @@
 
 #include "core/campaign/expression.hpp"
 #include "core/campaign/law_keys.hpp"
+#include "core/campaign/law_set.hpp"
 #include "core/campaign/name.hpp"
+#include "core/definition/definition_text.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
@@ -30,6 +32,17 @@ constexpr int questions_version = 1;
       fmt::format("description: {} = {} ({})", field, value.is_null() ? "nothing" : shown, rule));
 }
 
+std::string text_in(const Json& value, const std::string& field, std::size_t size_max) {
+  const bool is_text = value.is_string() && value.get_ref<const std::string&>().size() <= size_max;
+  if (is_text && visible_text(value.get_ref<const std::string&>()) == value) return value;
+  refuse(field, value, fmt::format("must be a text of one line, at most {} bytes", size_max));
+}
+
+double number_in(const Json& value, const std::string& field) {
+  if (value.is_number() && is_in_range(value.get<double>())) return value;
+  refuse(field, value, "must be a number");
+}
+
 /// An object of the answer, of which each key is asked for by its name.
 class Part {
  public:
@@ -42,14 +55,7 @@ class Part {
   }
   [[nodiscard]] std::string text(const std::string& key,
                                  std::size_t size_max = text_size_max) const {
-    const Json& value = at(key);
-    const bool is_text =
-        value.is_string() && value.get_ref<const std::string&>().size() <= size_max;
-    if (!is_text || visible_text(value.get_ref<const std::string&>()) != value) {
-      refuse(field(key), value,
-             fmt::format("must be a text of one line, at most {} bytes", size_max));
-    }
-    return value;
+    return text_in(at(key), field(key), size_max);
   }
   /// A name in files and SQL.
   [[nodiscard]] std::string name() const {
@@ -67,10 +73,7 @@ class Part {
     return has(key) ? number(key) : otherwise;
   }
   [[nodiscard]] double number(const std::string& key) const {
-    if (!at(key).is_number() || !is_in_range(at(key).get<double>())) {
-      refuse(field(key), at(key), "must be a number");
-    }
-    return at(key);
+    return number_in(at(key), field(key));
   }
   [[nodiscard]] std::size_t count(const std::string& key, std::size_t otherwise,
                                   std::size_t most) const {
@@ -112,7 +115,8 @@ class Part {
   std::string path_;
 };
 
-ProgramDraw draw_in(const Part& part) {
+/// @param may_be_table  The law may be a table: its values are stored with the campaign.
+ProgramDraw draw_in(const Part& part, bool may_be_table) {
   ProgramDraw draw;
   draw.name = part.name();
   draw.unit = part.text_or("unit", "1");
@@ -120,16 +124,27 @@ ProgramDraw draw_in(const Part& part) {
   const std::span<const std::string_view> names = names_of(Law{});
   const auto found = std::ranges::find(names, law);
   draw.law.law = static_cast<Law>(found - names.begin() + 1);
-  if (found == names.end() || !is_law_of_programs(draw.law.law)) {
-    refuse(part.field("law"), law, laws_of_programs_rule);
+  if (found == names.end() || (draw.law.law == Law::table && !may_be_table)) {
+    refuse(part.field("law"), law,
+           fmt::format("must be {}; a table is named by a campaign file",
+                       detail::alternatives(names)));
   }
-  for (const std::string_view key : keys_of(draw.law.law)) {
-    *number_at(draw.law, key) = part.number(std::string(key));
-  }
-  try {
-    draw.law.validate(part.field("law"));
-  } catch (const ConfigError& error) {
-    throw ModelProgramError(fmt::format("description: {}", error.what()));
+  draw.law.is_independent = draw.law.law == Law::table && part.flag("independent");
+  for (const std::string_view name : keys_of(draw.law.law)) {
+    const std::string key(name);
+    if (double* const number = number_at(draw.law, key)) {
+      *number = part.number(key);
+    } else if (auto* const numbers = numbers_at(draw.law, key)) {
+      part.each(key, law_list_size_max, [&](const Json& entry, const std::string& path) {
+        numbers->push_back(number_in(entry, path));
+      });
+    } else if (auto* const texts = texts_at(draw.law, key)) {
+      part.each(key, law_list_size_max, [&](const Json& entry, const std::string& path) {
+        texts->push_back(text_in(entry, path, text_size_max));
+      });
+    } else {
+      *text_at(draw.law, key) = part.text(key, expression_size_max);
+    }
   }
   return draw;
 }
@@ -176,21 +191,30 @@ void check_names(const ProgramDescription& description) {
   if (names.empty()) refuse("quantities", nullptr, "must be at least one");
 }
 
-}  // namespace
-
-bool is_law_of_programs(Law law) {
-  return law == Law::uniform || law == Law::normal || law == Law::truncated_normal ||
-         law == Law::truncated || law == Law::fixed;
+void check_drawn(const ProgramDescription& description) {
+  std::vector<std::string> names;
+  std::vector<Dispersion> laws;
+  for (const ProgramDraw& draw : description.drawn) {
+    names.push_back(draw.name);
+    laws.push_back(draw.law);
+  }
+  try {
+    check_laws({.names = names, .laws = laws, .table = "drawn"});
+  } catch (const ConfigError& error) {
+    throw ModelProgramError(fmt::format("description: {}", error.what()));
+  }
 }
+
+}  // namespace
 
 ProgramDescription description_in(std::string_view answer) {
   if (answer.size() > answer_size_max) {
     throw ModelProgramError(
         fmt::format("description: {} bytes (must be at most {})", answer.size(), answer_size_max));
   }
-  // What is nested deeper than the entry of a list is no part of it, and would have to be written
-  // by a recursive function.
-  const auto is_kept = [](int depth, Json::parse_event_t, const Json&) { return depth <= 3; };
+  // What is nested deeper than a list of a law is no part of it, and would have to be written by a
+  // recursive function.
+  const auto is_kept = [](int depth, Json::parse_event_t, const Json&) { return depth <= 4; };
   const Json json = Json::parse(answer, is_kept, false);
   if (json.is_discarded()) throw ModelProgramError("description: no JSON");
   const Part part(json, "");
@@ -203,6 +227,7 @@ ProgramDescription description_in(std::string_view answer) {
   description.version = fmt::format("{}-{}", part.text("name"), part.text("version"));
   description.purpose =
       part.text_or("purpose", fmt::format("Runs campaigns of {}.", part.text("name")));
+  description.imported_from = part.text_or("imported_from", "");
   description.runs_at_once = part.count("runs_at_once", 1, runs_at_once_max);
   description.limits = {
       .answer_time_max = std::chrono::seconds(part.count("run_time_max_s", 600, 86400)),
@@ -213,7 +238,7 @@ ProgramDescription description_in(std::string_view answer) {
     description.parameters.push_back({.name = of.name(), .value = of.number("value")});
   });
   part.each("drawn", drawn_max, [&](const Json& entry, const std::string& path) {
-    description.drawn.push_back(draw_in(Part(entry, path)));
+    description.drawn.push_back(draw_in(Part(entry, path), !description.imported_from.empty()));
   });
   part.each("quantities", quantities_max, [&](const Json& entry, const std::string& path) {
     description.quantities.push_back(quantity_in(Part(entry, path)));
@@ -222,6 +247,7 @@ ProgramDescription description_in(std::string_view answer) {
     description.streams.push_back(Part(entry, path).name());
   });
   check_names(description);
+  check_drawn(description);
   return description;
 }
 

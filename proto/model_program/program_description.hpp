@@ -34,11 +34,6 @@ struct ProgramParameter {
   double value = 0.0;  ///< Unless the campaign file has another one.
 };
 
-/// Whether runs of programs may be drawn by a law: its values need no file and no other quantity.
-[[nodiscard]] bool is_law_of_programs(Law law);
-inline constexpr std::string_view laws_of_programs_rule =
-    "must be uniform, normal, truncated_normal, truncated or fixed";
-
 /// Most runs that a program is asked for together.
 inline constexpr std::size_t runs_at_once_max = 64;
 
@@ -67,6 +62,9 @@ struct ProgramDescription {
   std::string text;     ///< All of it as JSON without blanks, keys in alphabetical order.
   std::string version;  ///< NAME-VERSION, as Model::version().
   std::string purpose;
+  /// The file that results of another program came from, which are all that there is of the model:
+  /// no program computes it again. Empty for a model program.
+  std::string imported_from;
   std::vector<ProgramParameter> parameters;
   std::vector<ProgramDraw> drawn;
   std::vector<ProgramQuantity> quantities;

@@ -171,7 +171,7 @@ std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> r
   std::vector<std::size_t> asked;  // All but those whose truth is out of range.
   std::vector<std::string> questions;
   for (std::size_t i = 0; i < requests.size(); ++i) {
-    RunDraw draw = campaign_.draw(requests[i].run);
+    RunDraw draw = campaign_.drawn(requests[i].run, requests[i].table_values);
     if (draw.truth.empty()) {
       results[i] = {.run = requests[i].run, .status = RunStatus::no_draw, .num_draws = 1};
       continue;
@@ -225,6 +225,9 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path) {
   const std::string question = Json{{"ask", "describe"}}.dump();
   process.ask({&question, 1},
               [&](std::string_view answer) { description = description_in(answer); });
+  if (!description.imported_from.empty()) {
+    throw ModelProgramError("description: imported_from (must not be there: a program computes)");
+  }
   return std::make_unique<DescribedModel>(std::move(description),
                                           std::make_unique<Program>(program));
 }

@@ -39,7 +39,8 @@ ProgramProcess::ProgramProcess(const std::filesystem::path& program, const Progr
   try {
     process_id_ = start_program({.arguments = {name_},
                                  .descriptors = {in[1], out[1], STDERR_FILENO},
-                                 .environment = environment_without_settings()});
+                                 .environment = environment_without_settings(),
+                                 .has_own_group = true});
   } catch (const Error& error) {
     for (const int end : {in[0], in[1], out[0], out[1]}) close(end);
     throw ModelProgramError(fmt::format("model program = {}", error.what()));
@@ -75,6 +76,8 @@ std::string ProgramProcess::how_it_ended() {
 }
 
 void ProgramProcess::fail(std::string_view reason) const {
+  // Whoever ends by this error may do so without destructors.
+  if (process_id_ != 0) kill(process_id_, SIGKILL);
   throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
 }
 

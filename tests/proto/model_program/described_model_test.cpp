@@ -10,6 +10,7 @@
 namespace proofmass::wire {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -76,8 +77,7 @@ TEST(RecordedModel, ComputesNothingAndSaysWhatWould) {
     FAIL();
   } catch (const ModelProgramError& error) {
     EXPECT_EQ(std::string(error.what()),
-              "model = ruler-1 (its program is needed to compute runs: name it with "
-              "--model-program)");
+              "model = ruler-1 (its program is not here; name it with --model-program)");
   }
 }
 
@@ -96,6 +96,43 @@ TEST(RecordedModel, IsOneForOneText) {
   // Its text begins with the first key of the alphabet, and describes it again.
   EXPECT_EQ(other.description().substr(0, 9), R"({"drawn":)");
   EXPECT_EQ(ruler(std::string(other.description())).description(), other.description());
+}
+
+/// As many quantities, each of which is the next one.
+std::string chain(int count) {
+  std::string drawn = R"({"name": "scale", "law": "fixed", "value": 3})";
+  for (int i = count; i > 0; --i) {
+    const std::string next = i == count ? "scale" : fmt::format("x{}", i + 1);
+    drawn += fmt::format(R"(,{{"name": "x{}", "law": "derived", "expression": "{}"}})", i, next);
+  }
+  return R"("drawn": [)" + drawn + "]";
+}
+
+TEST(RecordedModel, FollowsAChainOfExpressionsThatTheStackHolds) {
+  EXPECT_THAT(example_of(ruler(description(chain(64))))->draw(RunIndex{0}).values, Each(3.0));
+  EXPECT_THAT(refusal_of(description(chain(66))),
+              HasSubstr("more than 64 need one another in a row"));
+}
+
+// Whoever reads a database of them need not have the file.
+TEST(RecordedModel, OfImportedResultsHasItsDrawsInTheCampaign) {
+  const Model& imported = ruler(description(
+      R"("drawn": [{"name": "scale", "law": "table", "file": "/etc/passwd", "column": "s"}],)"
+      R"( "imported_from": "theirs.csv")"));
+  EXPECT_TRUE(imported.is_imported());
+  EXPECT_EQ(imported.why_no_runs(),
+            "its results were imported from theirs.csv; no more can be computed");
+  Definition definition{.text = DescribedCampaign(static_cast<const DescribedModel&>(imported))
+                                    .definition(TableColumns::left_out)
+                                    .text,
+                        .table_columns = {std::vector<double>(100, 4.0)}};
+  const auto campaign = imported.campaign_of(definition, TableColumns::included, "test");
+  EXPECT_THAT(campaign->draw(RunIndex{99}).truth, ElementsAre(8.5));
+  definition.table_columns.front().pop_back();
+  EXPECT_THROW((void)imported.campaign_of(definition, TableColumns::included, "test"),
+               DefinitionError);
+  EXPECT_THROW((void)imported.campaign_of(definition, TableColumns::left_out, "test"),
+               DefinitionError);
 }
 
 TEST(RecordedModel, IsRefusedIfItsDescriptionBreaksARule) {
