@@ -202,6 +202,9 @@ std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
       first.campaign->differences_from(*second.campaign);
   if (first.model_version != second.model_version) {
     differences.push_back({"model", first.model_version, second.model_version});
+  } else if (first.reference_digest != second.reference_digest) {
+    differences.push_back({"reference_digest", fmt::format("{:016x}", first.reference_digest),
+                           fmt::format("{:016x}", second.reference_digest)});
   }
   if (first.build != second.build) differences.push_back({"build", first.build, second.build});
   return differences;
@@ -253,6 +256,7 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
           .compared = {.campaign = campaign,
                        .quantities = store.schema().quantities,
                        .model_version = store.model_version(),
+                       .reference_digest = store.reference_digest(),
                        .build = store.build(),
                        .open_results = open_results}};
 }

@@ -32,6 +32,7 @@ struct ComparedCampaign {
   std::shared_ptr<const Campaign> campaign;
   std::vector<Quantity> quantities;  ///< Of its results.
   std::string model_version;
+  std::uint64_t reference_digest = 0;  ///< Store::reference_digest().
   std::string build;
   /// Begins with the first result, the same ones each time.
   std::function<ResultStream()> open_results;

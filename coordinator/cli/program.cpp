@@ -99,7 +99,8 @@ int run_proofmass(int argc, char** argv) {
              {"Serve campaigns to other machines",
               {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
                add_release, add_factory}},
-             {"Keep databases", {add_verify, add_backup, add_export, add_merge, add_publish}}};
+             {"Keep databases",
+              {add_verify, add_backup, add_export, add_import, add_merge, add_publish}}};
   for (const auto& [title, commands] : groups) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);

@@ -88,9 +88,9 @@ std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) 
   DrawnRuns drawn = read_drawn_runs(store, campaign, cause_runs_max);
   if (drawn.runs.size() < sensitivity_values_min) return std::nullopt;
   const std::vector<Quantity>& quantities = drawn.quantities;
-  for (std::size_t i = 0; i < quantities.size(); ++i) {  // The last columns are the truths.
-    drawn.names.end()[static_cast<std::ptrdiff_t>(i) - std::ssize(quantities)] =
-        fmt::format("true {}", quantities[i].symbol);
+  for (const Quantity& quantity : quantities) {  // A truth that is drawn itself has no column.
+    const std::string of_truth = "truth_" + quantity.column();
+    std::ranges::replace(drawn.names, of_truth, fmt::format("true {}", quantity.symbol));
   }
   Causes causes{.num_runs = drawn.runs.size(),
                 .num_with_estimate = drawn.num_with_estimate,

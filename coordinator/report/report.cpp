@@ -12,6 +12,13 @@
 namespace proofmass::coordinator {
 namespace {
 
+/// Lines as those of summary_text().
+std::string note_text(const Campaign& campaign) {
+  const std::string note = campaign.note();
+  if (note.empty()) return {};
+  return wire::visible_lines("Note      " + wrapped(note, 10, 10) + "\n");
+}
+
 std::string report_of_one_state(const Store& store, const Campaign& campaign, Paint paint) {
   const auto [results, check, given_up] = read_checked_results(store, campaign);
   const ResultSchema& schema = store.schema();
@@ -20,7 +27,7 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
   std::string text =
       wire::visible_lines(summary_text(store.name(), store.seed(), store.num_runs(), statistics,
                                        results.digests.results, check)) +
-      given_up_text(given_up, paint) +
+      given_up_text(given_up, paint) + note_text(campaign) +
       wire::visible_lines(warnings_text(schema, results.warnings) + stop_text(store));
   const InstrumentStatistics instruments = results.instruments.value_or(InstrumentStatistics{});
   for (const Table& table :

@@ -11,12 +11,14 @@
 namespace proofmass::coordinator {
 namespace {
 
-CampaignIdentity identity_of(const Store& store) {
+CampaignIdentity identity_of(const Store& store, const Campaign& campaign) {
   return {.name = store.name(),
           .seed = store.seed(),
           .num_runs = store.num_runs(),
           .model_version = store.model_version(),
           .is_of_program = !store.model().description().empty(),
+          .is_imported = store.model().is_imported(),
+          .note = campaign.note(),
           .build = store.build(),
           .created_utc = store.created_utc(),
           .definition_digest = store.table_digest()};
@@ -25,7 +27,7 @@ CampaignIdentity identity_of(const Store& store) {
 Review read_of_one_state(const Store& store, const Campaign& campaign,
                          std::vector<StatedRequirement> stated) {
   Review review{.database = {},
-                .identity = identity_of(store),
+                .identity = identity_of(store, campaign),
                 .schema = store.schema(),
                 .results = {},
                 .missing = {},

@@ -24,6 +24,8 @@ struct CampaignIdentity {
   std::uint64_t num_runs = 0;  ///< Wanted.
   std::string model_version;
   bool is_of_program = false;  ///< Its model needs one to be simulated again.
+  bool is_imported = false;    ///< Model::is_imported().
+  std::string note;            ///< Campaign::note().
   std::string build;
   std::string created_utc;
   std::string definition_digest;

@@ -106,6 +106,7 @@ Table identity_table(const Review& review) {
        {"SHA-256 of the results", digest_words(review)},
        {"SHA-256 of the definition", identity.definition_digest}});
   if (!review.stop.empty()) table.rows.push_back({"stop rule", review.stop});
+  if (!identity.note.empty()) table.rows.push_back({"note", identity.note});
   return table;
 }
 
@@ -160,6 +161,11 @@ Table host_table(const Review& review) {
 
 std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
   const std::string database = wire::shell_word(review.database);
+  if (review.identity.is_imported) {
+    return {{fmt::format("proofmass verify {}", database), "checks the database"},
+            {fmt::format("proofmass report {} --html report.html", database),
+             "makes this report anew"}};
+  }
   const char* const program = review.identity.is_of_program ? " --model-program PROGRAM" : "";
   std::vector<std::pair<std::string, std::string>> commands{
       {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),

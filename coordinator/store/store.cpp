@@ -45,6 +45,14 @@ void check_name(const std::filesystem::path& path) {
 }
 
 /// @param fill  Writes what a new campaign does not have.
+void check_deliveries(std::span<const Entry> entries, const ResultSchema& results,
+                      std::uint64_t num_runs) {
+  for (const Entry& entry : entries) {
+    const auto* delivery = std::get_if<Delivery>(&entry);
+    if (delivery != nullptr) detail::check_delivery(*delivery, results, num_runs);
+  }
+}
+
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition, const std::function<void(Database&)>& fill) {
   Database database(draft, Access::create);
@@ -80,8 +88,17 @@ Store Store::create_filled(const std::filesystem::path& path, const Campaign& ca
 }
 
 Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
-                    std::string_view definition) {
-  return create_filled(path, campaign, definition, [](Database&) {});
+                    std::string_view definition,
+                    const std::function<std::vector<Entry>()>& next_entries) {
+  return create_filled(path, campaign, definition, [&](Database& database) {
+    if (!next_entries) return;
+    const ResultSchema results = campaign.results();
+    detail::EntryRows rows(database, results);
+    for (std::vector<Entry> entries; !(entries = next_entries()).empty();) {
+      check_deliveries(entries, results, campaign.num_runs);
+      (void)rows.write(entries);
+    }
+  });
 }
 
 Store Store::open(const std::filesystem::path& path) {
@@ -176,11 +193,7 @@ void Store::extend(const Campaign& campaign, std::string_view definition) {
 }
 
 CommitSummary Store::write(std::span<const Entry> entries) {
-  const std::uint64_t num_runs_wanted = num_runs();
-  for (const Entry& entry : entries) {
-    const auto* delivery = std::get_if<Delivery>(&entry);
-    if (delivery != nullptr) detail::check_delivery(*delivery, schema(), num_runs_wanted);
-  }
+  check_deliveries(entries, schema(), num_runs());
   CommitSummary summary;
   try {
     impl_->commit([&](Database& database) {

@@ -64,11 +64,14 @@ class Store {
  public:
   /// Makes a new campaign database, complete or not at all, and opens it like open().
   ///
-  /// @param campaign    Validated.
-  /// @param definition  The campaign as canonical TOML, for those who open the file.
-  /// @throws StoreError if the file exists.
+  /// @param campaign      Validated.
+  /// @param definition    The campaign as canonical TOML, for those who open the file.
+  /// @param next_entries  Asked, until it has none, for what the file holds from the beginning, as
+  ///                      of write(); null if that is nothing.
+  /// @throws StoreError if the file exists; as write() does.
   static Store create(const std::filesystem::path& path, const Campaign& campaign,
-                      std::string_view definition);
+                      std::string_view definition,
+                      const std::function<std::vector<Entry>()>& next_entries = {});
 
   /// Makes a new campaign database of all that several databases of the campaign hold of its runs,
   /// complete or not at all, and opens it like open(). Events stay where they are.

@@ -18,6 +18,7 @@ import math
 import os
 import random as standard_random
 import sys
+import traceback
 
 
 class Refused(Exception):
@@ -67,7 +68,8 @@ class Model:
         """Simulates a run and estimates what its quantities are.
 
         Returns {quantity: estimate}, or also {quantity: standard error} as a second value; None if
-        the run is lost. `parameters` and `drawn` are dictionaries of numbers in SI units, `random`
+        the run is lost. It is lost, too, if an ArithmeticError, ValueError or RuntimeError is
+        raised, which are those of numbers; any other error ends the program. `parameters` and `drawn` are dictionaries of numbers in SI units, `random`
         is a Random. The result must follow from these alone.
         """
         raise NotImplementedError
@@ -123,10 +125,16 @@ class Model:
                     "run() must return {quantity: estimate}, such a dictionary and one of standard "
                     f"errors, or None, and not {result!r}")
             return {"estimate": _finite(estimate), "standard_error": _finite(errors)}
-        except Exception:
-            print(f"model {self.name}: run {question['run']} ends the program; it drew {drawn}",
+        except Exception as error:
+            is_of_run = (isinstance(error, (ArithmeticError, ValueError, RuntimeError))
+                         and not isinstance(error, NotImplementedError))
+            print(f"model {self.name}: run {question['run']} "
+                  f"{'is lost' if is_of_run else 'ends the program'}; it drew {drawn}",
                   file=sys.stderr)
-            raise
+            if not is_of_run:
+                raise
+            traceback.print_exc()
+            return {"lost": True}
 
 
 def _finite(values):
@@ -148,6 +156,23 @@ def normal(mean, standard_deviation, unit="1"):
 def fixed(value, unit="1"):
     """A law of `drawn`: the same in all runs, unless a campaign has another law."""
     return {"law": "fixed", "value": value, "unit": unit}
+
+
+def discrete(values, probabilities, unit="1"):
+    """A law of `drawn`: one of these values."""
+    return {"law": "discrete", "values": list(values), "probabilities": list(probabilities),
+            "unit": unit}
+
+
+def derived(expression, unit="1"):
+    """A law of `drawn`: an expression of other drawn quantities, as the truth of quantity()."""
+    return {"law": "derived", "expression": expression, "unit": unit}
+
+
+def correlated(mean, standard_deviation, correlations, unit="1"):
+    """A law of `drawn`: normal, with correlations {name: value} with normal ones before it."""
+    return {"law": "correlated", "mean": mean, "standard_deviation": standard_deviation,
+            "with": list(correlations), "correlations": list(correlations.values()), "unit": unit}
 
 
 def quantity(truth, unit="1", objective=None, standard_error=False, symbol=None, display_unit=None,

@@ -87,6 +87,7 @@ void add_export(CLI::App& app, Command& chosen);
 void add_replay(CLI::App& app, Command& chosen);
 void add_backup(CLI::App& app, Command& chosen);
 void add_compare(CLI::App& app, Command& chosen);
+void add_import(CLI::App& app, Command& chosen);
 void add_merge(CLI::App& app, Command& chosen);
 void add_publish(CLI::App& app, Command& chosen);
 void add_list(CLI::App& app, Command& chosen);

@@ -107,12 +107,11 @@ void insert_parameters(Database& database, const Campaign& campaign) {
 }
 
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
-  // Models in C++ are tested to compute the same everywhere.
+  // Models in C++ are tested to compute the same everywhere, and imports have no reference runs.
   const Model& model = campaign.model();
-  const std::string reference_digest =
-      model.description().empty()
-          ? std::string()
-          : fmt::format("{:016x}", model.reference_digest(best_instruction_set()));
+  const std::uint64_t digest =
+      model.description().empty() ? 0 : model.reference_digest(best_instruction_set());
+  const std::string reference_digest = digest == 0 ? "" : fmt::format("{:016x}", digest);
   database
       .prepare(
           "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
