@@ -20,21 +20,6 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
 }
 
-std::size_t find_heading(const CsvReader& reader, std::string_view heading) {
-  const std::vector<std::string_view>& headings = reader.cells();
-  const auto match = std::ranges::find(headings, heading);
-  if (match == headings.end()) {
-    const std::optional<std::string> nearest =
-        nearest_name(heading, std::set<std::string>(headings.begin(), headings.end()));
-    reader.refuse(fmt::format("no column \"{}\"{}", heading,
-                              nearest ? "; nearest is \"" + *nearest + "\"" : ""));
-  }
-  if (std::ranges::count(headings, heading) > 1) {
-    reader.refuse(fmt::format("two columns \"{}\"", heading));
-  }
-  return static_cast<std::size_t>(match - headings.begin());
-}
-
 }  // namespace
 
 bool CsvReader::next_row() {
@@ -46,6 +31,20 @@ bool CsvReader::next_row() {
   ++line_;
   split(line);
   return true;
+}
+
+std::size_t CsvReader::position_of(std::string_view heading) const {
+  const auto match = std::ranges::find(cells_, heading);
+  if (match == cells_.end()) {
+    const std::optional<std::string> nearest =
+        nearest_name(heading, std::set<std::string>(cells_.begin(), cells_.end()));
+    refuse(fmt::format("no column \"{}\"{}", heading,
+                       nearest ? "; nearest is \"" + *nearest + "\"" : ""));
+  }
+  if (std::ranges::count(cells_, heading) > 1) {
+    refuse(fmt::format("two columns \"{}\"", heading));
+  }
+  return static_cast<std::size_t>(match - cells_.begin());
 }
 
 double CsvReader::number(std::size_t position, std::string_view heading) const {
@@ -83,7 +82,7 @@ std::vector<double> parse_column(std::string_view text, const std::string& name,
   CsvReader reader(text, name);
   if (!reader.next_row()) reader.refuse("the file is empty; its first line must hold the headings");
   const std::size_t num_cells = reader.cells().size();
-  const std::size_t position = find_heading(reader, heading);
+  const std::size_t position = reader.position_of(heading);
   std::vector<double> values;
   while (reader.next_row()) {
     reader.expect_cells(num_cells);

@@ -17,6 +17,9 @@ class CsvReader {
   /// Moves to the next line, false behind the last.
   bool next_row();
   [[nodiscard]] const std::vector<std::string_view>& cells() const { return cells_; }
+  /// The place of the cell that has this text, in a line of headings.
+  /// @throws DefinitionError naming file and line if there is none, or more than one.
+  [[nodiscard]] std::size_t position_of(std::string_view heading) const;
   /// The number in a cell of the line.
   /// @throws DefinitionError naming file, line, heading and rule.
   [[nodiscard]] double number(std::size_t position, std::string_view heading) const;
