@@ -254,7 +254,12 @@ void check(const wire::DescribedCampaign& campaign, const std::string& file) {
     campaign.validate();
     check_independence(campaign.law_set(), campaign);
   } catch (const ConfigError& error) {
-    throw DefinitionError(fmt::format("{}: {}", file, error.what()));
+    // All columns have the one key of the schema.
+    constexpr std::string_view key = ".independent";
+    const std::string& field = error.field();
+    const std::string text = std::string(error.what()).substr(field.size());
+    throw DefinitionError(
+        fmt::format("{}: {}{}", file, field.ends_with(key) ? "campaign.independent" : field, text));
   }
 }
 

@@ -237,11 +237,11 @@ ProgramDescription description_in(std::string_view answer) {
     const Part of(entry, path);
     description.parameters.push_back({.name = of.name(), .value = of.number("value")});
   });
-  part.each("drawn", drawn_max, [&](const Json& entry, const std::string& path) {
-    description.drawn.push_back(draw_in(Part(entry, path), !description.imported_from.empty()));
-  });
   part.each("quantities", quantities_max, [&](const Json& entry, const std::string& path) {
     description.quantities.push_back(quantity_in(Part(entry, path)));
+  });
+  part.each("drawn", drawn_max, [&](const Json& entry, const std::string& path) {
+    description.drawn.push_back(draw_in(Part(entry, path), !description.imported_from.empty()));
   });
   part.each("streams", streams_max, [&](const Json& entry, const std::string& path) {
     description.streams.push_back(Part(entry, path).name());
