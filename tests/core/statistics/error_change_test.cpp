@@ -16,15 +16,6 @@ using Values = std::vector<double>;
 constexpr std::size_t num_columns = 10;  // As many as parameters.
 constexpr double significance = 0.05;
 
-// Of errors 1, 2, 3 and −2, 0, 8 the root mean square is √(82/6), so that 8 lies beyond twice of
-// it.
-TEST(TailLimit, IsTwiceTheRootMeanSquareOfBothCampaigns) {
-  const Values first{1.0, 2.0, 3.0}, second{-2.0, 0.0, 8.0};
-  const double limit = tail_limit(first, second);
-  EXPECT_NEAR(limit, 2.0 * std::sqrt(82.0 / 6.0), 1e-14);
-  EXPECT_EQ(num_beyond(second, limit), 1u);
-}
-
 // Of 10 and 10, 3 and 0 in the tail: the 1140 ways to choose 3 of 20 have 120 with all in one
 // group, and as many in the other.
 TEST(FisherExact, CountsWaysToChoose) {
