@@ -18,21 +18,20 @@ clocks.
 Exit code 0 if all holds, 1 if not; 77 without libfaketime, but 1 if the environment has CI.
 """
 
-import argparse
 import concurrent.futures
 import contextlib
 import json
-import os
 import re
 import signal
-import sys
 import tempfile
 import threading
 import time
 from pathlib import Path
 
 import batch_system_mock as mock
-from slurm_check import Site, check, free_ports, wait_until
+import checking
+from checking import check, wait_until
+from slurm_check import Site, free_ports
 
 NUM_RUNS = 300
 INTERVAL_S = 600  # So long that no factory looks by itself.
@@ -334,14 +333,9 @@ def play(system, directory, programs, port):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
-    programs = parser.parse_args().programs.resolve()
+    programs = checking.parser_of(__doc__).parse_args().programs.resolve()
     if faketime_library() is None:
-        print("SKIPPED: needs libfaketime")
-        sys.exit(1 if "CI" in os.environ else 77)
+        checking.skip("needs libfaketime")
     with tempfile.TemporaryDirectory() as name, concurrent.futures.ThreadPoolExecutor() as pool:
         directory = Path(name)
         port = free_ports(4)
@@ -349,16 +343,11 @@ def main():
             pool.submit(play, system, directory / system.name, programs, port + 2 * index)
             for index, system in enumerate((Pbs, Condor))
         ]
-        try:
+        with checking.failure_told(lambda: directory.glob("*/site/*.log")):
             digests = [future.result() for future in played]
             queue = mock.Queue(directory / "none", "pbs", programs)
             expected = Site(queue, directory / "reference", programs, NUM_RUNS).reference()
             check(digests == [expected] * len(digests), f"{digests} (must be {expected})")
-        except AssertionError as error:
-            print(f"FAILED: {error}")
-            for log in sorted(directory.glob("*/site/*.log")):
-                print(f"{log}:", *log.read_text().splitlines()[-30:], sep="\n  ")
-            sys.exit(1)
 
 
 if __name__ == "__main__":
