@@ -50,37 +50,30 @@ def said(program, answer, *names):
     return f"{program}: exit code {code}: {text.format(*names)}"
 
 
-class Pbs:
-    """The words of a batch system."""
+class System:
+    """The words of a batch system: numbers of allocations, and how a factory quotes its errors."""
 
-    name = "pbs"
-    refused = said("qsub", mock.PBS_FULL)
+    def __init__(self, name, form, refused, down, kept):
+        self.name = name
+        self.form = form
+        self.refused = said(*refused)
+        self.down = said(*down)
+        self.answer_kept = kept
+
+    def identifier(self, number):
+        return self.form.format(number)
+
+    def kept(self, number):
+        return said(*self.answer_kept, self.identifier(number))
+
+
+SYSTEMS = (
     # The factory asks PBS by a script of sh.
-    down = said("sh", mock.PBS_DOWN, "qselect")
-
-    @staticmethod
-    def identifier(number):
-        return f"{number}.head"
-
-    @classmethod
-    def kept(cls, number):
-        return said("qdel", mock.PBS_KEPT, cls.identifier(number))
-
-
-class Condor:
-    """Likewise."""
-
-    name = "condor"
-    refused = said("condor_submit", mock.CONDOR_FULL)
-    down = said("condor_q", mock.CONDOR_DOWN)
-
-    @staticmethod
-    def identifier(number):
-        return f"{number}.0"
-
-    @classmethod
-    def kept(cls, number):
-        return said("condor_rm", mock.CONDOR_KEPT, cls.identifier(number))
+    System("pbs", "{}.head", ("qsub", mock.PBS_FULL), ("sh", mock.PBS_DOWN, "qselect"),
+           ("qdel", mock.PBS_KEPT)),
+    System("condor", "{}.0", ("condor_submit", mock.CONDOR_FULL), ("condor_q", mock.CONDOR_DOWN),
+           ("condor_rm", mock.CONDOR_KEPT)),
+)
 
 
 class Batch:
@@ -341,7 +334,7 @@ def main():
         port = free_ports(4)
         played = [
             pool.submit(play, system, directory / system.name, programs, port + 2 * index)
-            for index, system in enumerate((Pbs, Condor))
+            for index, system in enumerate(SYSTEMS)
         ]
         with checking.failure_told(lambda: directory.glob("*/site/*.log")):
             digests = [future.result() for future in played]
