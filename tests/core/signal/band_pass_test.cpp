@@ -1,11 +1,6 @@
 #include "core/signal/band_pass.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <complex>
-#include <numbers>
-#include <vector>
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,18 +1,9 @@
 #include "core/signal/noise_shape.hpp"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <complex>
-#include <cstddef>
-#include <numbers>
-#include <random>
-#include <string>
-#include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
