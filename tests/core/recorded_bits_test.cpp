@@ -10,6 +10,7 @@
 #include "core/random/normal_deviates.hpp"
 #include "core/random/stream.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/support/runs.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -111,8 +112,7 @@ TEST(LostRun, HasTheRecordedBits) {
   campaign.scenario.simulation.settling_s = 100.0;
   campaign.scenario.sensor.range_m_s2 = 1e300;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
-  const auto gain = std::ranges::find(drawn_names(), "thruster_scale_error.x");
-  campaign.dispersions.at(static_cast<std::size_t>(gain - drawn_names().begin())).law = Law::table;
+  test::law_of(campaign, "thruster_scale_error.x").law = Law::table;
   campaign.num_runs = 1;
   campaign.table_columns = {{50.0}};
   const std::vector<RunRequest> requests{{RunIndex{0}, campaign.table_values(RunIndex{0})}};
@@ -136,10 +136,8 @@ std::uint64_t hash_of_run(InstructionSet set, std::size_t num_runs) {
   campaign.seed = 20131121;
   campaign.scenario.simulation.settling_s = 100.0;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
-  std::vector<RunRequest> requests;
-  for (std::size_t run = 0; run < num_runs; ++run) requests.push_back({RunIndex{run}, {}});
   Hash hash;
-  hash.add(RunPlan(campaign).simulate_batch(requests, set)[0].estimate);
+  hash.add(RunPlan(campaign).simulate_batch(test::requests_from(0, num_runs), set)[0].estimate);
   return hash.value();
 }
 

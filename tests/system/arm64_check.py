@@ -9,37 +9,25 @@ Needs Debian's g++-aarch64-linux-gnu and qemu-user, and a mirror for the librari
 all holds, 1 if not; 77 if it cannot run, but 1 if the environment has CI.
 """
 
-import argparse
 import json
 import os
-import re
 import shutil
 import sqlite3
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parents[2]
+import checking
+from checking import SOURCE, check, skip
+
 NEEDED = ("aarch64-linux-gnu-g++", "qemu-aarch64")
 NUM_RUNS = 48
-SHORTEN = {"orbits": 1, "sample_period_s": 1, "runs": NUM_RUNS}
 # Left out, because the emulated processor takes longest for them. The reference digest passes
 # through the kernel of batches, and the worker computes it when it starts.
 LEFT_OUT = "Batch.*:ReferenceDigest.*"
 PATIENCE_S = 300
 MACHINE_ARM64 = 183  # EM_AARCH64, in the header of a program.
-
-
-def check(is_true, what):
-    if not is_true:
-        raise AssertionError(what)
-
-
-def skip(reason):
-    print(f"SKIPPED: {reason}")
-    sys.exit(1 if "CI" in os.environ else 77)
 
 
 class Stopwatch:
@@ -89,11 +77,7 @@ class Campaign:
         self.directory = directory
         self.endpoint = f"ipc://{directory}/workers"
         self.processes = {}
-        self.command("proofmass", "init", "paper.toml")
-        text = (directory / "paper.toml").read_text()
-        for key, value in SHORTEN.items():
-            text = re.sub(rf"\n{key} = .*", f"\n{key} = {value}", text)
-        (directory / "short.toml").write_text(text)
+        checking.write_short_campaign(programs, directory, NUM_RUNS, orbits=1)
 
     def command(self, program, *words):
         return subprocess.run([self.programs / program, *words], cwd=self.directory, check=True,
@@ -154,10 +138,7 @@ def check_campaign(campaign, arm64_worker):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
+    parser = checking.parser_of(__doc__)
     parser.add_argument("--build", required=True, type=Path, help="directory to build in")
     arguments = parser.parse_args()
     programs, directory = arguments.programs.resolve(), arguments.build.resolve()
@@ -185,11 +166,8 @@ def main():
     with tempfile.TemporaryDirectory(prefix="arm64_check.") as name:
         campaign = Campaign(programs, Path(name))
         try:
-            check_campaign(campaign, [*emulator, worker])
-        except AssertionError:
-            for log in sorted(Path(name).glob("*.log")):
-                print(f"{log.name}:\n{log.read_text()[-3000:]}", file=sys.stderr)
-            raise
+            with checking.failure_told(lambda: Path(name).glob("*.log")):
+                check_campaign(campaign, [*emulator, worker])
         finally:
             campaign.close()
     stopwatch.lap("computed a campaign on both processors")

@@ -18,21 +18,20 @@ clocks.
 Exit code 0 if all holds, 1 if not; 77 without libfaketime, but 1 if the environment has CI.
 """
 
-import argparse
 import concurrent.futures
 import contextlib
 import json
-import os
 import re
 import signal
-import sys
 import tempfile
 import threading
 import time
 from pathlib import Path
 
 import batch_system_mock as mock
-from slurm_check import Site, check, free_ports, wait_until
+import checking
+from checking import check, wait_until
+from slurm_check import Site, free_ports
 
 NUM_RUNS = 300
 INTERVAL_S = 600  # So long that no factory looks by itself.
@@ -51,37 +50,30 @@ def said(program, answer, *names):
     return f"{program}: exit code {code}: {text.format(*names)}"
 
 
-class Pbs:
-    """The words of a batch system."""
+class System:
+    """The words of a batch system: numbers of allocations, and how a factory quotes its errors."""
 
-    name = "pbs"
-    refused = said("qsub", mock.PBS_FULL)
+    def __init__(self, name, form, refused, down, kept):
+        self.name = name
+        self.form = form
+        self.refused = said(*refused)
+        self.down = said(*down)
+        self.answer_kept = kept
+
+    def identifier(self, number):
+        return self.form.format(number)
+
+    def kept(self, number):
+        return said(*self.answer_kept, self.identifier(number))
+
+
+SYSTEMS = (
     # The factory asks PBS by a script of sh.
-    down = said("sh", mock.PBS_DOWN, "qselect")
-
-    @staticmethod
-    def identifier(number):
-        return f"{number}.head"
-
-    @classmethod
-    def kept(cls, number):
-        return said("qdel", mock.PBS_KEPT, cls.identifier(number))
-
-
-class Condor:
-    """Likewise."""
-
-    name = "condor"
-    refused = said("condor_submit", mock.CONDOR_FULL)
-    down = said("condor_q", mock.CONDOR_DOWN)
-
-    @staticmethod
-    def identifier(number):
-        return f"{number}.0"
-
-    @classmethod
-    def kept(cls, number):
-        return said("condor_rm", mock.CONDOR_KEPT, cls.identifier(number))
+    System("pbs", "{}.head", ("qsub", mock.PBS_FULL), ("sh", mock.PBS_DOWN, "qselect"),
+           ("qdel", mock.PBS_KEPT)),
+    System("condor", "{}.0", ("condor_submit", mock.CONDOR_FULL), ("condor_q", mock.CONDOR_DOWN),
+           ("condor_rm", mock.CONDOR_KEPT)),
+)
 
 
 class Batch:
@@ -334,31 +326,21 @@ def play(system, directory, programs, port):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
-    programs = parser.parse_args().programs.resolve()
+    programs = checking.parser_of(__doc__).parse_args().programs.resolve()
     if faketime_library() is None:
-        print("SKIPPED: needs libfaketime")
-        sys.exit(1 if "CI" in os.environ else 77)
+        checking.skip("needs libfaketime")
     with tempfile.TemporaryDirectory() as name, concurrent.futures.ThreadPoolExecutor() as pool:
         directory = Path(name)
         port = free_ports(4)
         played = [
             pool.submit(play, system, directory / system.name, programs, port + 2 * index)
-            for index, system in enumerate((Pbs, Condor))
+            for index, system in enumerate(SYSTEMS)
         ]
-        try:
+        with checking.failure_told(lambda: directory.glob("*/site/*.log")):
             digests = [future.result() for future in played]
             queue = mock.Queue(directory / "none", "pbs", programs)
             expected = Site(queue, directory / "reference", programs, NUM_RUNS).reference()
             check(digests == [expected] * len(digests), f"{digests} (must be {expected})")
-        except AssertionError as error:
-            print(f"FAILED: {error}")
-            for log in sorted(directory.glob("*/site/*.log")):
-                print(f"{log}:", *log.read_text().splitlines()[-30:], sep="\n  ")
-            sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -9,32 +9,23 @@ Needs Debian's python3-distributed. Exit code 0 if all holds, 1 if not; 77 if it
 the environment has CI.
 """
 
-import argparse
 import json
 import os
 import re
 import socket
 import sqlite3
 import subprocess
-import sys
 import tempfile
 import threading
-import time
 from pathlib import Path
 
-DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
+import checking
+from checking import wait_until
+
+DEPLOY = checking.SOURCE / "deploy"
 PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are.
 NUM_RUNS = 64
-SHORTEN = {"orbits": 1, "sample_period_s": 1, "runs": NUM_RUNS}
 PATIENCE_S = 120
-
-
-def wait_until(what, holds):
-    end = time.monotonic() + PATIENCE_S
-    while not holds():
-        if time.monotonic() > end:
-            raise AssertionError(f"{what} did not come in {PATIENCE_S} s")
-        time.sleep(0.05)
 
 
 class Forwarder:
@@ -81,11 +72,7 @@ class Campaign:
         self.environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
         self.processes = []
         self.command("proofmass", "keygen", "keys")
-        self.command("proofmass", "init", "paper.toml")
-        text = (directory / "paper.toml").read_text()
-        for key, value in SHORTEN.items():
-            text = re.sub(rf"\n{key} = .*", f"\n{key} = {value}", text)
-        (directory / "short.toml").write_text(text)
+        checking.write_short_campaign(programs, directory, NUM_RUNS, orbits=1)
         self.start("coordinator", "proofmass-coordinator", "--directory", "served", "--keys", "keys",
                    "--bind", "tcp://127.0.0.1:*", "--bind-clients", "tcp://127.0.0.1:*")
         log = directory / "coordinator.log"
@@ -168,31 +155,24 @@ def check_dask(campaign):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--programs", type=Path, required=True, help="directory of the programs")
-    programs = parser.parse_args().programs.resolve()
+    programs = checking.parser_of(__doc__).parse_args().programs.resolve()
     if subprocess.run([PYTHON, "-c", "import distributed"], capture_output=True,
                       check=False).returncode != 0:
-        print("no python3-distributed (deploy/install-deps.sh installs it)", file=sys.stderr)
-        return 1 if "CI" in os.environ else 77
+        checking.skip("no python3-distributed (deploy/install-deps.sh installs it)")
     with tempfile.TemporaryDirectory(prefix="cluster_check.") as directory:
         campaign = Campaign(programs, Path(directory))
         try:
-            check_tunnel(campaign)
-            check_dask(campaign)
-            campaign.command("proofmass", "run", "short.toml", "--db", "alone.db")
-            alone = campaign.digest("alone.db")
-            for name in ("tunnel", "dask"):
-                assert campaign.digest(f"served/{name}.db") == alone, f"the digest of {name}"
-        except AssertionError:
-            for log in sorted(Path(directory).glob("*.log")):
-                print(f"{log.name}:\n{log.read_text()[-3000:]}", file=sys.stderr)
-            raise
+            with checking.failure_told(lambda: Path(directory).glob("*.log")):
+                check_tunnel(campaign)
+                check_dask(campaign)
+                campaign.command("proofmass", "run", "short.toml", "--db", "alone.db")
+                alone = campaign.digest("alone.db")
+                for name in ("tunnel", "dask"):
+                    assert campaign.digest(f"served/{name}.db") == alone, f"the digest of {name}"
         finally:
             campaign.close()
     print("tunnel and Dask: the digest of `proofmass run`")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -19,53 +19,32 @@ Needs root, Debian 12 and systemd-nspawn. Exit code 0 if all holds, 1 if not; 77
 without these programs, but 1 if the environment has CI.
 """
 
-import argparse
 import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parents[2]
+import checking
+from checking import check, output_of, wait_until
+
 NEEDED = ("systemd-nspawn", "systemd-analyze", "dpkg-shlibdeps", "nsenter")
 PACKAGES = ("proofmass-worker", "proofmass")
 UNITS = ("proofmass-coordinator.service", "proofmass-worker@.service")
 EXPOSURE_MAX = 2.5  # Of 10, as `systemd-analyze security` counts.
 WORKER_SIZE_MAX = 4_000_000  # Bytes of its package.
-SHORTEN = ";".join(
-    f"s/^{key} = .*/{key} = {value}/"
-    for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 40))
-)
+NUM_RUNS = 40
 # What changes while a Debian runs, whatever is installed.
 VOLATILE = re.compile(r"/(dev|proc|run|sys|tmp|root|var/(cache|log|tmp|lib/(dpkg|systemd)))(/|$)")
 KEPT = re.compile(r"/etc/proofmass(/|$)|/var/lib/(private/)?proofmass(/|$)|/var/lib/private$")
 
 
-def check(is_true, what):
-    if not is_true:
-        raise AssertionError(what)
-
-
-def output_of(*command, **more):
-    process = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, **more)
-    check(process.returncode == 0, f"{command} gives {process.returncode}\n{process.stdout}")
-    return process.stdout
-
-
-def wait_until(what, holds, limit_s=60):
-    end = time.monotonic() + limit_s
-    while not holds():
-        check(time.monotonic() < end, f"{what} did not come in {limit_s} s")
-        time.sleep(0.1)
-
-
 def make_packages(build, directory):
     directory.mkdir()
-    script = SOURCE / "deploy/debian-packages.sh"
+    script = checking.SOURCE / "deploy/debian-packages.sh"
     output_of(script, "--build", build, "--output", directory)
     files = {path.name.split("_")[0]: path for path in directory.iterdir()}
     check(sorted(files) == sorted(PACKAGES), f"packages = {sorted(files)} (must be {PACKAGES})")
@@ -251,13 +230,13 @@ def run_campaign(machine, expected):
         "systemctl enable --now proofmass-coordinator\n"
         "systemctl enable --now proofmass-worker@1\n"
         "proofmass init paper.toml\n"
-        f"sed -E '{SHORTEN}' paper.toml > short.toml\n"
+        f"sed -E '{checking.shortening(NUM_RUNS)}' paper.toml > short.toml\n"
         "export PROOFMASS_CLIENT_CONNECT=tcp://127.0.0.1:5556 PROOFMASS_KEYS=/etc/proofmass/keys\n"
         "proofmass submit short.toml\n"
         "timeout 60 proofmass watch hardy2013"
     )
     report = machine.run("proofmass report /var/lib/proofmass/hardy2013.db")
-    digest = re.search(r"^Digest +(\w+)", report, re.MULTILINE)[1]
+    digest = checking.digest_of(report)
     check(digest == expected, f"digest = {digest} (must be {expected})")
 
 
@@ -319,28 +298,13 @@ def check_in_machine(machine, packages, expected):
         scenario(machine)
 
 
-def reference(programs, directory):
-    """The digest of the same campaign by the programs that were built."""
-    directory.mkdir()
-    lines = f"""cd {directory}
-{programs}/proofmass init paper.toml
-sed -E '{SHORTEN}' paper.toml > short.toml
-{programs}/proofmass run short.toml --db run.db --quiet > run.txt
-{programs}/proofmass report run.db"""
-    return re.search(r"^Digest +(\w+)", output_of("sh", "-e", "-c", lines), re.MULTILINE)[1]
-
-
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--build", required=True, type=Path, help="build tree")
+    parser = checking.parser_of(__doc__, "build")
     parser.add_argument("--mmdebstrap", action="store_true", help="make a fresh Debian")
     arguments = parser.parse_args()
     build = arguments.build.resolve()
     if os.geteuid() != 0 or not all(shutil.which(name) for name in NEEDED):
-        print(f"SKIPPED: needs root and {', '.join(NEEDED)}")
-        sys.exit(1 if "CI" in os.environ else 77)
+        checking.skip(f"needs root and {', '.join(NEEDED)}")
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         machine = None
@@ -360,7 +324,7 @@ def main():
                 is_same = package.read_bytes() == again[name].read_bytes()
                 check(is_same, f"{name}: the same programs make other bytes")
             check_contents(build, packages, directory / "installed")
-            expected = reference(build / "bin", directory / "reference")
+            expected = checking.reference(build / "bin", directory, NUM_RUNS)
             machine = Machine(root)
             check_in_machine(machine, packages, expected)
         except AssertionError as error:

@@ -27,6 +27,7 @@ import threading
 import time
 import traceback
 
+import checking
 import fault_kinds
 import fault_world
 from fault_world import Failure
@@ -431,7 +432,7 @@ def main():
             print(f"--seeds = {options.seeds} (no schedule has {' '.join(lacking)})")
             return 2
         if os.geteuid() != 0:
-            return fault_world.want_of("root, for file systems of its own")
+            checking.skip("needs root, for file systems of its own")
         return run_all(options)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # So that all programs are ended.
     # A shell's background jobs ignore SIGINT, and so would the programs until they catch it.

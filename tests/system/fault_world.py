@@ -6,16 +6,16 @@ import errno
 import json
 import mmap
 import os
-import pathlib
 import random
 import re
 import shutil
 import signal
-import socket
 import sqlite3
 import struct
 import subprocess
 import time
+
+from checking import free_port
 
 TIME_SCALE = 0.05  # A worker counts as lost after 3 s.
 CLIENT_TIMEOUT_S = 5
@@ -123,18 +123,6 @@ def mount_disk(folder, size=DISK_SIZE):
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.mount(b"tmpfs", str(folder).encode(), b"tmpfs", 0, f"size={size}".encode()) != 0:
         raise OSError(ctypes.get_errno(), "cannot mount a file system (root is needed)")
-
-
-def want_of(what):
-    """Exit code of a script on a machine that lacks something: skipped, but failed in CI."""
-    print(f"needs {what}")
-    return 1 if "CI" in os.environ else 77
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Setting:

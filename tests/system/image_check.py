@@ -11,22 +11,19 @@ Needs root, buildah, mmdebstrap, a Debian mirror and a few minutes, so it is not
 0 if all holds, 1 if not.
 """
 
-import argparse
 import json
 import os
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parents[2]
+import checking
+from checking import check, output_of
+
 BASE = "localhost/debian:bookworm-slim"
-SHORTEN = ";".join(
-    f"s/^{key} = .*/{key} = {value}/"
-    for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 40))
-)
+NUM_RUNS = 40
 # As Kubernetes does it: a root file system that cannot be written, and volumes in it.
 ENTER = """set -e
 mount --bind "$0" "$0"
@@ -41,18 +38,6 @@ exec chroot --userspec="$1" "$root" sh -e -c "$2"
 """
 
 
-def check(is_true, what):
-    if not is_true:
-        print(f"FAILED: {what}")
-        sys.exit(1)
-
-
-def output_of(*command):
-    process = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
-    check(process.returncode == 0, f"{command} gives {process.returncode}\n{process.stdout}")
-    return process.stdout.strip()
-
-
 class Builder:
     """buildah with all that it stores in one directory."""
 
@@ -61,7 +46,7 @@ class Builder:
         self.command = ["buildah", *stores, "--storage-driver", "overlay"]
 
     def run(self, *arguments):
-        return output_of(*self.command, *arguments)
+        return output_of(*self.command, *arguments).strip()
 
     def make_base(self, tarball):
         container = self.run("from", "scratch")
@@ -69,10 +54,10 @@ class Builder:
         self.run("commit", "--rm", container, BASE)
 
     def build(self, image, *options):
-        file = SOURCE / "deploy/container/Containerfile"
+        file = checking.SOURCE / "deploy/container/Containerfile"
         self.run(
             *("build", "--pull-never", "--build-arg", f"BASE={BASE}", "--file", file),
-            *("--tag", f"localhost/{image}", *options, SOURCE),
+            *("--tag", f"localhost/{image}", *options, checking.SOURCE),
         )
         text = self.run("inspect", "--type", "image", f"localhost/{image}")
         return json.loads(text)["OCIv1"]["config"]
@@ -100,7 +85,7 @@ def run_campaign(builder, user, directory):
         f"""cd /campaigns
 ! touch /usr/written 2> /dev/null
 proofmass init paper.toml
-sed -E '{SHORTEN}' paper.toml > short.toml
+sed -E '{checking.shortening(NUM_RUNS)}' paper.toml > short.toml
 proofmass-coordinator --directory /campaigns --bind ipc:///campaigns/workers \
   --exit-when-done short.toml 2> coordinator.log
 proofmass report hardy2013.db""",
@@ -116,22 +101,12 @@ proofmass report hardy2013.db""",
     report = coordinator.communicate()[0]
     check(worker.wait() == 0, f"exit code of the worker = {worker.returncode} (must be 0)")
     check(coordinator.returncode == 0, f"exit code = {coordinator.returncode} (must be 0)")
-    return re.search(r"^Digest +(\w+)", report, re.MULTILINE)[1]
-
-
-def reference(programs, directory):
-    """The digest of the same campaign by the programs that were built."""
-    lines = f"""cd {directory}
-{programs}/proofmass init paper.toml
-sed -E '{SHORTEN}' paper.toml > short.toml
-{programs}/proofmass run short.toml --db run.db --quiet > run.txt
-{programs}/proofmass report run.db"""
-    return re.search(r"^Digest +(\w+)", output_of("sh", "-e", "-c", lines), re.MULTILINE)[1]
+    return checking.digest_of(report)
 
 
 def check_definition(tarball, packages, directory):
     """What Apptainer would do with the definition, but for Apptainer."""
-    text = (SOURCE / "deploy/container/proofmass.def").read_text()
+    text = (checking.SOURCE / "deploy/container/proofmass.def").read_text()
     sections = dict(re.findall(r"(?ms)^%(\w+)\n(.*?)(?=^%|\Z)", text))
     root = directory / "definition"
     root.mkdir()
@@ -143,19 +118,16 @@ def check_definition(tarball, packages, directory):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--build", required=True, type=Path, help="build tree")
+    parser = checking.parser_of(__doc__, "build")
     parser.add_argument("--compile", action="store_true", help="build all stages")
     arguments = parser.parse_args()
     build = arguments.build.resolve()
     os.environ["BUILDAH_ISOLATION"] = "chroot"
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, checking.failure_told():
         directory = Path(name)
         packages = directory / "context/packages"
         packages.mkdir(parents=True)
-        script = SOURCE / "deploy/debian-packages.sh"
+        script = checking.SOURCE / "deploy/debian-packages.sh"
         output_of(script, "--build", build, "--output", packages)
         tarball = directory / "base.tar"
         output_of("mmdebstrap", "--quiet", "--variant=minbase", "bookworm", tarball)
@@ -175,7 +147,7 @@ def main():
         finally:
             builder.run("umount", "--all")
             builder.run("rm", "--all")
-        expected = reference(build / "bin", directory)
+        expected = checking.reference(build / "bin", directory, NUM_RUNS)
         check(digest == expected, f"digest = {digest} (must be {expected})")
         print(f"digest = {digest}")
         check_definition(tarball, packages, directory)

@@ -8,6 +8,7 @@ and connections that come and go. Memory and descriptors of the coordinator must
 Prints a line of JSON a phase; exit code 1 if a limit is missed, 2 if the load cannot be brought about.
 """
 import argparse
+import functools
 import json
 import os
 import re
@@ -19,20 +20,13 @@ import tempfile
 import time
 from pathlib import Path
 
+import checking
+
 PATIENCE_S = 600
 IDLE_PER_PROCESS = 2500  # Each needs two descriptors where it is made.
 
 
-class NotReached(Exception):
-    """A condition did not come about in time."""
-
-
-def wait_until(what, condition, patience_s=PATIENCE_S):
-    deadline = time.monotonic() + patience_s
-    while not condition():
-        if time.monotonic() > deadline:
-            raise NotReached(what)
-        time.sleep(0.05)
+wait_until = functools.partial(checking.wait_until, limit_s=PATIENCE_S)
 
 
 class Load:
@@ -93,7 +87,7 @@ class Load:
             if done.returncode == 0:
                 break
         else:
-            raise NotReached("submission: " + done.stderr)
+            raise AssertionError("submission: " + done.stderr)
         begin = time.monotonic()
         wait_until("runs", lambda: self.num_finished() > before)
         return time.monotonic() - begin
@@ -110,8 +104,8 @@ class Load:
         """Once connections that were closed are gone."""
         try:
             wait_until("descriptors", lambda: self.figures()["descriptors"] <= descriptors_max,
-                       patience_s)
-        except NotReached:
+                       limit_s=patience_s)
+        except AssertionError:
             pass  # The figures show it.
         return self.figures()
 
@@ -129,7 +123,7 @@ class Load:
         """Ends the coordinator in order and checks the campaign database, but for what null results are
         not: simulated."""
         if self.end(self.coordinator, signal.SIGTERM) != 0:
-            raise NotReached("an end in order: " + self.log()[-2000:])
+            raise AssertionError("an end in order: " + self.log()[-2000:])
         done = subprocess.run(
             [self.programs / "proofmass", "verify", "served/load.db", "--fraction", "0"],
             cwd=self.directory, capture_output=True, text=True)
@@ -219,7 +213,7 @@ def main():
         load = Load(options.programs, directory)
         try:
             failures = run(load, options)
-        except NotReached as error:
+        except AssertionError as error:
             print(f"keyed_load: never: {error}\n{load.log()[-3000:]}", file=sys.stderr)
             return 2
         finally:

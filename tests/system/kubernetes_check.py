@@ -17,7 +17,6 @@ and its registry. Without it, needs root and PyYAML. Exit code 0 if all holds, 1
 cannot run, but 1 if the environment has CI.
 """
 
-import argparse
 import os
 import re
 import shutil
@@ -25,7 +24,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 try:
@@ -35,29 +33,16 @@ except ImportError:  # Debian's package is for Debian's Python.
         raise
     os.execv("/usr/bin/python3", ["/usr/bin/python3", *sys.argv])
 
-SOURCE = Path(__file__).resolve().parents[2]
-MANIFESTS = SOURCE / "deploy/kubernetes"
+import checking
+from checking import check, wait_until
+
+MANIFESTS = checking.SOURCE / "deploy/kubernetes"
 USER = 65532
-SHORTEN = ";".join(
-    f"s/^{key} = .*/{key} = {value}/"
-    for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 400))
-)
+NUM_RUNS = 400
 SECRETS = {
     "proofmass-coordinator-keys": ("coordinator.key", "authorized_workers", "authorized_clients"),
     "proofmass-worker-keys": ("worker.key", "coordinator.pub"),
 }
-
-
-def check(is_true, what):
-    if not is_true:
-        raise AssertionError(what)
-
-
-def wait_until(what, holds, limit_s=60):
-    end = time.monotonic() + limit_s
-    while not holds():
-        check(time.monotonic() < end, f"{what} did not come in {limit_s} s")
-        time.sleep(0.05)
 
 
 class StrictLoader(yaml.SafeLoader):
@@ -152,8 +137,7 @@ class Cluster:
             text=True,
         )
         if self.holder.stdout.readline() != "\n":
-            print("SKIPPED: a network namespace cannot be made")
-            sys.exit(1 if "CI" in os.environ else 77)
+            checking.skip("a network namespace cannot be made")
 
     def start(self, command, environment=(), **more):
         enter = ["nsenter", "--target", str(self.holder.pid), "--net", "--mount"]
@@ -240,12 +224,7 @@ def run_pods(cluster, every, directory):
         processes.append(worker)
         wait_for("worker", "registered")
         client = [f"PROOFMASS_KEYS={keys}", "PROOFMASS_CLIENT_CONNECT=tcp://localhost:5556"]
-        cluster.run("proofmass", "init", directory / "paper.toml")
-        subprocess.run(
-            f"sed -E '{SHORTEN}' {directory}/paper.toml > {directory}/short.toml",
-            shell=True,
-            check=True,
-        )
+        checking.write_short_campaign(cluster.programs, directory, NUM_RUNS)
         cluster.run("proofmass", "submit", directory / "short.toml", environment=client)
         stop_coordinator(processes[0])
         processes[0] = start("coordinator", coordinator_pod)
@@ -255,10 +234,6 @@ def run_pods(cluster, every, directory):
         grace = worker_pod["terminationGracePeriodSeconds"]
         check(worker.wait(grace) == 0, f"exit code of the worker = {worker.returncode} (must be 0)")
         stop_coordinator(processes[0])
-    except AssertionError:
-        for log in logs.values():
-            print(f"{log}:", *log.read_text().splitlines()[-20:], sep="\n  ")
-        raise
     finally:
         for process in processes:
             process.kill()
@@ -267,12 +242,12 @@ def run_pods(cluster, every, directory):
     cluster.run(*run)
     databases = [places["coordinator"]["/campaigns"] / "hardy2013.db", directory / "run.db"]
     reports = [cluster.run("proofmass", "report", database) for database in databases]
-    return [re.search(r"^Digest +(\w+)", text, re.MULTILINE)[1] for text in reports]
+    return [checking.digest_of(text) for text in reports]
 
 
 def stop_coordinator(process):
     """With the signal of its image."""
-    text = (SOURCE / "deploy/container/Containerfile").read_text()
+    text = (checking.SOURCE / "deploy/container/Containerfile").read_text()
     process.send_signal(signal.Signals[re.search(r"^STOPSIGNAL (\w+)$", text, re.MULTILINE)[1]])
     code = process.wait(60)
     check(code == 0, f"exit code of the coordinator = {code} (must be 0)")
@@ -299,16 +274,12 @@ def check_schema():
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
+    parser = checking.parser_of(__doc__)
     parser.add_argument("--schema", action="store_true", help="check types and fields, too")
     arguments = parser.parse_args()
     if os.geteuid() != 0:
-        print("SKIPPED: needs root")
-        sys.exit(1 if "CI" in os.environ else 77)
-    try:
+        checking.skip("needs root")
+    with tempfile.TemporaryDirectory() as name, checking.failure_told(lambda: Path(name).glob("*.log")):
         every = manifests()
         check_pod("coordinator", pod_of(every, "StatefulSet", "proofmass-coordinator"))
         check_pod("worker", pod_of(every, "Deployment", "proofmass-worker"))
@@ -317,17 +288,13 @@ def main():
         check_times(every)
         if arguments.schema:
             check_schema()
-        with tempfile.TemporaryDirectory() as name:
-            cluster = Cluster(arguments.programs.resolve(), Path(name))
-            try:
-                digests = run_pods(cluster, every, Path(name))
-            finally:
-                cluster.stop()
+        cluster = Cluster(arguments.programs.resolve(), Path(name))
+        try:
+            digests = run_pods(cluster, every, Path(name))
+        finally:
+            cluster.stop()
         check(digests[0] == digests[1], f"digests = {digests} (must be equal)")
         print(f"{len(every)} manifests, digest = {digests[0]}")
-    except AssertionError as error:
-        print(f"FAILED: {error}")
-        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -9,23 +9,20 @@ Needs root and /bin/busybox. Exit code 0 if all holds, 1 if not; 77 without root
 the environment has CI.
 """
 
-import argparse
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
-SHORTEN = ";".join(
-    f"s/^{key} = .*/{key} = {value}/"
-    for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 40))
-)
+import checking
+from checking import check
+
 # Shell that writes the digests of a campaign by `run`, which starts the worker itself, of the same
 # campaign by a coordinator and a worker, and again as a coordinator answers, which starts `report`.
 CAMPAIGN = f"""set -e
 proofmass init paper.toml
-sed -E '{SHORTEN}' paper.toml > short.toml
+sed -E '{checking.shortening(runs=40)}' paper.toml > short.toml
 proofmass run short.toml --db run.db --quiet > run.txt
 proofmass-coordinator --directory served --bind ipc://$PWD/socket \\
   --exit-when-done short.toml 2> coordinator.log &
@@ -38,12 +35,6 @@ proofmass report hardy2013 --connect ipc://$PWD/served/clients | grep Digest
 kill $!
 wait
 """
-
-
-def check(is_true, what):
-    if not is_true:
-        print(f"FAILED: {what}")
-        sys.exit(1)
 
 
 def make_package(script, build, directory):
@@ -70,17 +61,13 @@ def digests(command, programs, directory):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--build", required=True, type=Path, help="build tree")
+    parser = checking.parser_of(__doc__, "build")
     parser.add_argument("--root", type=Path, help="root directory of another Linux")
     arguments = parser.parse_args()
-    script = Path(__file__).resolve().parents[2] / "deploy/package.sh"
+    script = checking.SOURCE / "deploy/package.sh"
     if os.geteuid() != 0 or not Path("/bin/busybox").exists():
-        print("SKIPPED: needs root and /bin/busybox")
-        sys.exit(1 if "CI" in os.environ else 77)
-    with tempfile.TemporaryDirectory() as name:
+        checking.skip("needs root and /bin/busybox")
+    with tempfile.TemporaryDirectory() as name, checking.failure_told():
         directory = Path(name)
         tarball = make_package(script, arguments.build, directory / "first")
         again = make_package(script, arguments.build, directory / "second")

@@ -16,48 +16,28 @@ and its registry, chromium and prometheus. Exit code 0 if all holds, 1 if not; 7
 lacking, but then 1 if the environment has CI; 77 if the registry cannot be reached.
 """
 
-import argparse
 import json
-import os
 import re
 import shutil
 import signal
-import socket
 import sqlite3
 import subprocess
 import sys
 import tempfile
-import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from pathlib import Path
 
+import checking
+from checking import check, free_port, wait_until
+
 NUM_RUNS = 64
-SHORTEN = {"orbits": "2", "sample_period_s": "1", "runs": str(NUM_RUNS)}
 TOKEN = "a-token-for-this-test-only"
 HOSTILE = "<script>alert(1)</script> \x1b[31m \"quoted\""
 HOSTILE_SHOWN = "<script>alert(1)</script> \\u001b[31m \"quoted\""
 SCALES = {"nm": 1e-9, "10⁻⁴ rad": 1e-4, "10⁻⁶": 1e-6, "10⁻⁶ rad": 1e-6, "s²/m": 1.0}
 PACKAGES = ("playwright-core@1", "axe-core@4")
-
-
-def check(is_true, what):
-    if not is_true:
-        raise AssertionError(what)
-
-
-def wait_until(what, holds, limit_s=120):
-    end = time.monotonic() + limit_s
-    while not holds():
-        check(time.monotonic() < end, f"{what} did not come in {limit_s} s")
-        time.sleep(0.1)
-
-
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 def get(url, **headers):
@@ -98,14 +78,6 @@ class Coordinator:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
             self.process.wait(timeout=60)
-
-
-def write_campaign(programs, file):
-    subprocess.run([programs / "proofmass", "init", file], check=True, capture_output=True)
-    text = file.read_text()
-    for key, value in SHORTEN.items():
-        text = re.sub(rf"(?m)^{key} = .*", f"{key} = {value}", text)
-    file.write_text(text)
 
 
 def add_hostile_event(database):
@@ -247,7 +219,7 @@ def check_all(arguments, directory, chromium):
     programs = arguments.programs.resolve()
     screenshots = arguments.screenshots or directory / "screenshots"
     screenshots.mkdir(exist_ok=True)
-    write_campaign(programs, directory / "short.toml")
+    checking.write_short_campaign(programs, directory, NUM_RUNS)
     coordinator = Coordinator(programs, directory / "open", directory / "short.toml")
     worker = None
     try:
@@ -273,9 +245,7 @@ def check_all(arguments, directory, chromium):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--programs", required=True, type=Path, help="where the programs are")
+    parser = checking.parser_of(__doc__)
     parser.add_argument("--html", type=Path, action="append", default=[],
                         help="a further file to be looked at")
     parser.add_argument("--screenshots", type=Path, help="where they are kept")
@@ -286,16 +256,12 @@ def main():
     with tempfile.TemporaryDirectory(prefix="page_check.") as name:
         directory = Path(name)
         if lacking:
-            print("SKIPPED: needs " + ", ".join(lacking))
-            sys.exit(1 if "CI" in os.environ else 77)
+            checking.skip("needs " + ", ".join(lacking))
         if not install(directory):
             print("SKIPPED: the registry of npm cannot be reached")
             sys.exit(77)
-        try:
+        with checking.failure_told():
             check_all(arguments, directory, chromium)
-        except AssertionError as error:
-            print(f"FAILED: {error}")
-            sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -8,11 +8,9 @@ Needs Debian's python3-numpy, -pandas, -matplotlib and -h5py. Exit code 0 if all
 if it cannot run, but 1 if the environment has CI.
 """
 
-import argparse
 import hashlib
 import json
 import os
-import re
 import shutil
 import sqlite3
 import subprocess
@@ -20,11 +18,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-DEPLOY = Path(__file__).resolve().parents[2] / "deploy" / "python"
+import checking
+
+DEPLOY = checking.SOURCE / "deploy" / "python"
 PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are.
 PACKAGES = ("numpy", "pandas", "matplotlib", "h5py")
 NUM_RUNS = 48
-SHORTEN = {"orbits": 2, "sample_period_s": 1, "runs": NUM_RUNS}
 
 
 class Programs:
@@ -51,11 +50,7 @@ class Programs:
 def microscope(programs, directory):
     """A campaign of which some runs are lost: those whose largest acceleration is in the upper half."""
     machine = Programs(programs, directory)
-    machine.run("init", "paper.toml")
-    text = machine.path("paper.toml").read_text()
-    for key, value in SHORTEN.items():
-        text = re.sub(rf"\n{key} = .*", f"\n{key} = {value}", text)
-    machine.path("short.toml").write_text(text)
+    checking.write_short_campaign(programs, directory, NUM_RUNS)
     machine.run("run", "short.toml", "--db", "whole.db")
     with sqlite3.connect(machine.path("whole.db")) as database:
         limit, = database.execute("SELECT health_acceleration_m_s2 FROM run_result "
@@ -264,16 +259,14 @@ def in_own_process(check, *arguments):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--programs", type=Path, required=True, help="directory of the programs")
+    parser = checking.parser_of(__doc__)
     parser.add_argument("--oscillator", type=Path, required=True,
                         help="directory of the programs with another model")
     arguments = parser.parse_args()
     if subprocess.run([PYTHON, "-c", f"import {', '.join(PACKAGES)}"], capture_output=True,
                       check=False).returncode != 0:
-        print(f"no {' '.join(f'python3-{name}' for name in PACKAGES)} "
-              "(deploy/install-deps.sh installs them)", file=sys.stderr)
-        return 1 if "CI" in os.environ else 77
+        checking.skip(f"no {' '.join(f'python3-{name}' for name in PACKAGES)} "
+                      "(deploy/install-deps.sh installs them)")
     if os.path.realpath(sys.executable) != os.path.realpath(PYTHON):
         os.execv(PYTHON, [PYTHON, *sys.argv])
     sys.dont_write_bytecode = True

@@ -9,10 +9,8 @@ or, being a label of a limit, over a bar; each sentence at the top leads to a se
 numbers have one spelling. Ends with 77 if chromium is not installed, unless CI is set.
 """
 
-import argparse
 import html
 import json
-import os
 import pathlib
 import re
 import shutil
@@ -20,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 
-SHORTEN = {"orbits": "2", "sample_period_s": "1", "runs": "64"}
+import checking
 
 MEASURE = """
 const problems = [];
@@ -79,12 +77,7 @@ document.body.append(pre);
 
 
 def write_report(programs, folder):
-    subprocess.run([programs / "proofmass", "init", folder / "paper.toml"], check=True,
-                   stdout=subprocess.DEVNULL)
-    text = (folder / "paper.toml").read_text()
-    for key, value in SHORTEN.items():
-        text = re.sub(rf"(?m)^{key} = .*", f"{key} = {value}", text)
-    (folder / "short.toml").write_text(text)
+    checking.write_short_campaign(programs, folder, runs=64)
     subprocess.run([programs / "proofmass", "run", folder / "short.toml", "--quiet", "--db",
                     folder / "short.db"], check=True, stdout=subprocess.DEVNULL)
     return subprocess.run([programs / "proofmass", "report", folder / "short.db", "--html", "-"],
@@ -120,15 +113,12 @@ def layout_problems(report, folder, chromium):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--programs", required=True, type=pathlib.Path)
+    parser = checking.parser_of(__doc__)
     parser.add_argument("--report", type=pathlib.Path, help="look at this one instead")
     arguments = parser.parse_args()
     chromium = shutil.which("chromium")
     if not chromium:
-        print("SKIPPED: needs chromium")
-        sys.exit(1 if "CI" in os.environ else 77)
+        checking.skip("needs chromium")
     with tempfile.TemporaryDirectory(prefix="report_layout_check.") as name:
         folder = pathlib.Path(name)
         report = (arguments.report.read_text() if arguments.report

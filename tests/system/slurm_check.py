@@ -16,7 +16,6 @@ Each database must have the digest of `proofmass run`. Needs root, slurmctld, sl
 Exit code 0 if all holds, 1 if not; 77 without these, but 1 if the environment has CI.
 """
 
-import argparse
 import contextlib
 import json
 import os
@@ -25,10 +24,12 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
+
+import checking
+from checking import check, wait_until
 
 NUM_NODES = 3
 CONFIGURATION = """ClusterName=proofmass
@@ -60,18 +61,6 @@ NodeName=n[1-{nodes}] NodeHostname={host} NodeAddr=127.0.0.1 \
 Port=[{first}-{last}] CPUs=1 RealMemory=500
 PartitionName=all Nodes=n[1-{nodes}] Default=YES MaxTime=INFINITE State=UP OverTimeLimit=0
 """
-
-
-def check(is_true, what):
-    if not is_true:
-        raise AssertionError(what)
-
-
-def wait_until(what, holds, limit_s=120):
-    end = time.monotonic() + limit_s
-    while not holds():
-        check(time.monotonic() < end, f"{what} did not come in {limit_s} s")
-        time.sleep(0.1)
 
 
 def free_ports(count):
@@ -216,11 +205,7 @@ class Site:
             "TMPDIR": str(directory / "scratch"),
             "PROOFMASS_THREADS": "1",
         }
-        self.proofmass("init", "paper.toml")
-        text = (directory / "paper.toml").read_text()
-        for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", num_runs)):
-            text = re.sub(rf"^{key} = .*", f"{key} = {value}", text, flags=re.MULTILINE)
-        (directory / "short.toml").write_text(text)
+        checking.write_short_campaign(programs, directory, num_runs)
 
     def answer(self, *command, **more):
         return subprocess.run(
@@ -238,7 +223,7 @@ class Site:
         return process.stdout
 
     def digest(self, database):
-        return re.search(r"^Digest +(\w+)", self.proofmass("report", database), re.MULTILINE)[1]
+        return checking.digest_of(self.proofmass("report", database))
 
     def reference(self):
         self.proofmass("run", "short.toml", "--db", "reference.db", "--workers", "2", "--quiet")
@@ -414,30 +399,22 @@ def refuse(site, _):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
-    arguments = parser.parse_args()
+    arguments = checking.parser_of(__doc__).parse_args()
     needed = ("slurmctld", "slurmd", "munged", "sbatch")
     if os.geteuid() != 0 or not all(shutil.which(name) for name in needed):
-        print(f"SKIPPED: needs root and {', '.join(needed)}")
-        sys.exit(1 if "CI" in os.environ else 77)
+        checking.skip(f"needs root and {', '.join(needed)}")
     with tempfile.TemporaryDirectory() as name:
         cluster = Cluster(Path(name) / "cluster")
         try:
-            cluster.start()
-            site = Site(cluster, Path(name) / "site", arguments.programs.resolve())
-            expected = site.reference()
-            for scenario in (run_undisturbed, run_with_failures, run_in_three_jobs, run_by_factory, refuse):
-                begin = time.monotonic()
-                scenario(site, expected)
-                print(f"{scenario.__name__}: {time.monotonic() - begin:.1f} s", flush=True)
-        except AssertionError as error:
-            print(f"FAILED: {error}")
-            for log in sorted(Path(name).glob("site/*/*.log")):
-                print(f"{log}:", *log.read_text().splitlines()[-30:], sep="\n  ")
-            sys.exit(1)
+            with checking.failure_told(lambda: Path(name).glob("site/*/*.log")):
+                cluster.start()
+                site = Site(cluster, Path(name) / "site", arguments.programs.resolve())
+                expected = site.reference()
+                scenarios = (run_undisturbed, run_with_failures, run_in_three_jobs, run_by_factory, refuse)
+                for scenario in scenarios:
+                    begin = time.monotonic()
+                    scenario(site, expected)
+                    print(f"{scenario.__name__}: {time.monotonic() - begin:.1f} s", flush=True)
         finally:
             cluster.stop()
 

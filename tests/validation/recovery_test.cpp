@@ -6,6 +6,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "core/random/stream.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/runs.hpp"
 #include "tests/support/spin_sessions.hpp"
 #include "tests/support/statistics_of.hpp"
 #include "tests/test.hpp"
@@ -17,36 +18,16 @@ namespace {
 
 constexpr double part_of_objective = 1.0 / 50.0;
 
-Dispersion fixed(double value) {
-  Dispersion dispersion;
-  dispersion.law = Law::fixed;
-  dispersion.value = value;
-  return dispersion;
-}
-
 /// The paper's campaign without noise, with second-order corrections and every drawn quantity at 0.
 MicroscopeCampaign silent_campaign() {
   MicroscopeCampaign campaign;
   campaign.scenario.noise.scale = 0.0;
-  for (Dispersion& dispersion : campaign.dispersions) dispersion = fixed(0.0);
+  campaign.dispersions = test::perfect_laws();
   return campaign;
 }
 
-void set(MicroscopeCampaign& campaign, std::string_view name, double value) {
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    if (drawn_names()[i] != name) continue;
-    campaign.dispersions[i] = fixed(value);
-    return;
-  }
-  FAIL() << "no drawn quantity " << name;
-}
-
-double fixed_value(const MicroscopeCampaign& campaign, std::string_view name) {
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    if (drawn_names()[i] == name) return campaign.dispersions[i].value;
-  }
-  ADD_FAILURE() << "no drawn quantity " << name;
-  return 0.0;
+double fixed_value(MicroscopeCampaign campaign, std::string_view name) {
+  return test::law_of(campaign, name).value;
 }
 
 /// What each estimate may be off, SI: 1/50 of its objective; a_c12 |η_c| more and a_c13 half of
@@ -135,32 +116,32 @@ class RecoveryOfOneParameter : public testing::TestWithParam<Parameter> {};
 void excite(MicroscopeCampaign& campaign, Parameter parameter) {
   switch (parameter) {
     case Parameter::a_c11_delta_x:
-      return set(campaign, "offcentring_m.x", 20e-6);
+      return test::fix(campaign, "offcentring_m.x", 20e-6);
     case Parameter::a_c11_delta_y:
-      return set(campaign, "offcentring_m.y", -20e-6);
+      return test::fix(campaign, "offcentring_m.y", -20e-6);
     case Parameter::a_c11_delta_z:
-      return set(campaign, "offcentring_m.z", 20e-6);
+      return test::fix(campaign, "offcentring_m.z", 20e-6);
     case Parameter::a_c12:
-      set(campaign, "misalignment_rad.sensor_1_z", 2.5e-3);
-      return set(campaign, "misalignment_rad.sensor_2_z", 2.5e-3);
+      test::fix(campaign, "misalignment_rad.sensor_1_z", 2.5e-3);
+      return test::fix(campaign, "misalignment_rad.sensor_2_z", 2.5e-3);
     case Parameter::a_c13:
-      set(campaign, "misalignment_rad.sensor_1_y", -2.5e-3);
-      return set(campaign, "misalignment_rad.sensor_2_y", -2.5e-3);
+      test::fix(campaign, "misalignment_rad.sensor_1_y", -2.5e-3);
+      return test::fix(campaign, "misalignment_rad.sensor_2_y", -2.5e-3);
     case Parameter::a_d11_prime:
-      set(campaign, "scale_factor_error.sensor_1_x", 1e-2);
-      return set(campaign, "scale_factor_error.sensor_2_x", -0.99e-2);
+      test::fix(campaign, "scale_factor_error.sensor_1_x", 1e-2);
+      return test::fix(campaign, "scale_factor_error.sensor_2_x", -0.99e-2);
     case Parameter::a_d12:
-      set(campaign, "misalignment_rad.sensor_1_z", 1.6e-3);
-      return set(campaign, "misalignment_rad.sensor_2_z", -1.6e-3);
+      test::fix(campaign, "misalignment_rad.sensor_1_z", 1.6e-3);
+      return test::fix(campaign, "misalignment_rad.sensor_2_z", -1.6e-3);
     case Parameter::a_d13:
-      set(campaign, "misalignment_rad.sensor_1_y", 1.6e-3);
-      return set(campaign, "misalignment_rad.sensor_2_y", -1.6e-3);
+      test::fix(campaign, "misalignment_rad.sensor_1_y", 1.6e-3);
+      return test::fix(campaign, "misalignment_rad.sensor_2_y", -1.6e-3);
     case Parameter::k2d:
-      set(campaign, "quadratic_factor_s2_m.sensor_1_x", 14000.0);
-      return set(campaign, "quadratic_factor_s2_m.sensor_2_x", -14000.0);
+      test::fix(campaign, "quadratic_factor_s2_m.sensor_1_x", 14000.0);
+      return test::fix(campaign, "quadratic_factor_s2_m.sensor_2_x", -14000.0);
     case Parameter::k2c:
-      set(campaign, "quadratic_factor_s2_m.sensor_1_x", 14000.0);
-      return set(campaign, "quadratic_factor_s2_m.sensor_2_x", 14000.0);
+      test::fix(campaign, "quadratic_factor_s2_m.sensor_1_x", 14000.0);
+      return test::fix(campaign, "quadratic_factor_s2_m.sensor_2_x", 14000.0);
   }
 }
 
@@ -199,7 +180,7 @@ MicroscopeCampaign corner(std::uint32_t number, Biases biases) {
     const bool is_bias =
         name.starts_with("parasitic_acceleration") || name.starts_with("star_tracker_bias");
     if (is_bias && biases == Biases::absent) size = 0.0;
-    campaign.dispersions[i] = fixed(sign * size);
+    campaign.dispersions[i] = test::fixed_law(sign * size);
   }
   return campaign;
 }
@@ -232,7 +213,7 @@ std::pair<MicroscopeCampaign, ParameterArray> silent_draw(std::uint64_t run) {
   const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
   const DrawnValues values =
       draw_values(campaign.dispersions, campaign.seed, RunIndex{run}, draw.num_draws - 1, {});
-  for (std::size_t i = 0; i < num_drawn; ++i) campaign.dispersions[i] = fixed(values[i]);
+  for (std::size_t i = 0; i < num_drawn; ++i) campaign.dispersions[i] = test::fixed_law(values[i]);
   ParameterArray allowance = allowance_without_biases(campaign);
   const ParameterArray extra = allowance_for_biases(campaign);
   for (const Parameter parameter : {Parameter::a_c12, Parameter::a_c13}) {
@@ -326,7 +307,7 @@ TEST(RecoveryInAFrameThatSpins, FindsTheCentrifugalAccelerationInADPrime) {
   const auto error_with = [&](double offcentring_S_m) {
     MicroscopeCampaign campaign = silent_campaign();
     excite(campaign, Parameter::k2c);
-    set(campaign, "offcentring_m.x", offcentring_S_m);
+    test::fix(campaign, "offcentring_m.x", offcentring_S_m);
     test::spin_sessions(campaign, 4.5);
     return RunPlan(campaign).simulate(RunIndex{0}, {}).error(index(Parameter::a_d11_prime));
   };
@@ -348,15 +329,7 @@ CampaignStatistics statistics_of(Correction correction) {
   MicroscopeCampaign campaign;
   campaign.seed = 20130501;
   campaign.scenario.estimation.correction = correction;
-  const RunPlan plan(campaign);
-  std::vector<RunResult> results;
-  for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
-    std::vector<RunRequest> requests;
-    for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
-    const std::vector<RunResult> batch = plan.simulate_batch(requests, best_instruction_set());
-    results.insert(results.end(), batch.begin(), batch.end());
-  }
-  return test::statistics_of(campaign.objectives(), results);
+  return test::statistics_of(campaign.objectives(), test::simulated(RunPlan(campaign), num_runs));
 }
 
 TEST(Accuracy, FirstOrderMeansAreThePapersWhereItSaysWhatItDid) {
@@ -390,28 +363,17 @@ MicroscopeCampaign silent_campaign(Correction correction) {
 TEST(PaperCorrection, LeavesThreeTenthsOfAnObjectiveAtMostIn100Draws) {
   MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.scenario.noise.scale = 0.0;
-  const RunPlan plan(campaign);
   const std::vector<double> objectives = campaign.objectives();
-  for (std::uint64_t first = 0; first < 100; first += batch_lanes) {
-    std::vector<RunRequest> requests;
-    for (std::uint64_t run = first; run < std::min<std::uint64_t>(first + batch_lanes, 100);
-         ++run) {
-      requests.push_back({RunIndex{run}, {}});
-    }
-    for (const RunResult& result : plan.simulate_batch(requests, best_instruction_set())) {
-      ASSERT_EQ(result.status, RunStatus::completed);
-      for (std::size_t i = 0; i < objectives.size(); ++i) {
-        EXPECT_LT(std::abs(result.error(i)), 0.3 * objectives[i]) << result.run.value << ", " << i;
-      }
+  for (const RunResult& result : test::simulated(RunPlan(campaign), 100)) {
+    ASSERT_EQ(result.status, RunStatus::completed);
+    for (std::size_t i = 0; i < objectives.size(); ++i) {
+      EXPECT_LT(std::abs(result.error(i)), 0.3 * objectives[i]) << result.run.value << ", " << i;
     }
   }
 }
 
 std::vector<RunRecord> silent_records() {
-  std::vector<RunRequest> requests;
-  for (std::uint64_t run = 0; run < 4; ++run) requests.push_back({RunIndex{run}, {}});
-  return RunPlan(silent_campaign(Correction::hardy2013))
-      .record_batch(requests, best_instruction_set());
+  return test::recorded(RunPlan(silent_campaign(Correction::hardy2013)), 4);
 }
 
 RunResult estimate(const RunRecord& record, Correction correction) {

@@ -1,16 +1,11 @@
 // Loops from well inside to well beyond their limits of stability, and noise from nominal to far
 // beyond it: a run is completed with errors that its noise explains, or its status says why not.
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/runs.hpp"
 #include "tests/support/spin_sessions.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -27,17 +22,13 @@ MicroscopeCampaign short_campaign() {
 
 std::vector<RunResult> simulate(const MicroscopeCampaign& campaign) {
   campaign.validate();
-  std::vector<RunRequest> requests;
-  for (std::uint64_t run = 0; run < num_runs; ++run) requests.push_back({RunIndex{run}, {}});
-  return RunPlan(campaign).simulate_batch(requests, best_instruction_set());
+  return test::simulated(RunPlan(campaign), num_runs);
 }
 
 /// Multiplies the gain of every thruster axis.
 void set_thrust_gain(MicroscopeCampaign& campaign, double gain) {
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    if (!drawn_names()[i].starts_with("thruster_scale_error")) continue;
-    campaign.dispersions[i].law = Law::fixed;
-    campaign.dispersions[i].value = gain - 1.0;
+  for (const char* const axis : {"x", "y", "z"}) {
+    test::fix(campaign, std::string("thruster_scale_error.") + axis, gain - 1.0);
   }
 }
 
@@ -149,11 +140,7 @@ TEST_F(Stability, OfLowThrustGainIsKeptOrReported) {
 TEST_F(Stability, OfThrustAlongOneAxisIsKeptOrReported) {
   expect_explained_sweep("thrust gain along Y", {22.0}, {24.0, 25.0}, {26.0, 40.0},
                          [](MicroscopeCampaign& campaign, double gain) {
-                           for (std::size_t i = 0; i < num_drawn; ++i) {
-                             if (drawn_names()[i] != "thruster_scale_error.y") continue;
-                             campaign.dispersions[i].law = Law::fixed;
-                             campaign.dispersions[i].value = gain - 1.0;
-                           }
+                           test::fix(campaign, "thruster_scale_error.y", gain - 1.0);
                          });
 }
 

@@ -11,8 +11,7 @@ class AuditTest : public DispatchFixture {
  protected:
   void SetUp() override {
     add_campaign(one, 1, 0, 1.0);
-    add_worker(first);
-    outbox.forget();
+    add_busy_worker(first);
   }
 };
 
@@ -40,8 +39,7 @@ TEST(Audit, ChoosesOtherRunsUnderAnotherSeed) {
 }
 
 TEST_F(AuditTest, GoesToAnotherWorker) {
-  add_worker(second);
-  outbox.forget();
+  add_busy_worker(second);
   deliver(first, one, {0});
   commit(one);
   (void)outbox.take_sent<proto::ResultAck>(first);
@@ -129,8 +127,7 @@ TEST_F(AuditTest, ThatCrashesEveryWorkerIsGivenUp) {
     crash(id);
     events = outbox.take_events();
     outbox.forget();
-    add_worker(id);
-    outbox.forget();
+    add_busy_worker(id);
   }
   EXPECT_TRUE(campaign(one).suspects.empty());
   EXPECT_TRUE(is_finished(campaign(one)));
@@ -168,34 +165,17 @@ enum class Step : std::uint8_t {
   late_result,    ///< The first worker delivers.
   second_result,  ///< The second worker delivers, if it has been lent the run by then.
 };
-constexpr std::array steps{Step::expire, Step::reassign, Step::late_result, Step::second_result};
-
-using Order = std::array<Step, 4>;
-
-std::vector<std::pair<Order, bool>> all_orders() {
-  std::vector<std::pair<Order, bool>> orders;
-  Order order = steps;
-  do {
-    orders.emplace_back(order, false);
-    orders.emplace_back(order, true);
-  } while (std::next_permutation(order.begin(), order.end()));
-  return orders;
-}
-
-std::string name_of(const testing::TestParamInfo<std::pair<Order, bool>>& info) {
-  constexpr std::array names{"Expire", "Reassign", "LateResult", "SecondResult"};
-  std::string name;
-  for (const Step step : info.param.first) name += names.at(static_cast<std::size_t>(step));
-  return name + (info.param.second ? "CommitAtOnce" : "CommitAtTheEnd");
-}
-
-class LateResult : public DispatchFixture,
-                   public testing::WithParamInterface<std::pair<Order, bool>> {
+class LateResult : public DispatchFixture {
  protected:
-  void SetUp() override {
-    add_campaign(one, 3);
-    add_worker(first);
+  /// Another order: the first worker has been lent run 0.
+  void begin_order() {
     outbox.forget();
+    begin();
+    waiting.clear();
+    num_stores = 0;
+    num_compared = 0;
+    add_campaign(one, 3);
+    add_busy_worker(first);
   }
 
   void happen(Step step) {
@@ -226,7 +206,7 @@ class LateResult : public DispatchFixture,
     waiting.insert(waiting.end(), stored.begin(), stored.end());
     num_stores += std::count(stored.begin(), stored.end(), RunIndex{0});
     num_compared += outbox.take_compared().size();
-    if (GetParam().second) commit_all();
+    if (is_committed_at_once) commit_all();
   }
 
   void commit_all() {
@@ -252,14 +232,17 @@ class LateResult : public DispatchFixture,
     on_heartbeat(state, id, make_heartbeat(4096, all), ++sequence, now, outbox);
   }
 
+  /// A worker that has been given up says Hello again, and repeats what was not acknowledged. Then
+  /// both are lent work, and finish it.
+  void go_on();
+
+  bool is_committed_at_once = false;
   Runs waiting;  ///< On their way to the store.
   std::int64_t num_stores = 0;
   std::uint64_t num_compared = 0;
 };
 
-TEST_P(LateResult, IsStoredOnceAndBothWorkersGoOn) {
-  for (const Step step : GetParam().first) happen(step);
-  // A worker that has been given up says Hello again, and repeats what was not acknowledged.
+void LateResult::go_on() {
   for (const WorkerId id : {first, second}) {
     say_hello(id, hello());
     heartbeat_of(id, {});
@@ -271,7 +254,6 @@ TEST_P(LateResult, IsStoredOnceAndBothWorkersGoOn) {
   EXPECT_TRUE(campaign(one).committed.contains({0}));
   EXPECT_EQ(campaign(one).num_duplicates, num_compared);
 
-  // Both are lent work, and finish it.
   for (int round = 0; round < 4; ++round) {
     for (const WorkerId id : {first, second}) {
       const auto leases = state.workers.at(id).leases;
@@ -293,7 +275,19 @@ TEST_P(LateResult, IsStoredOnceAndBothWorkersGoOn) {
   outbox.forget();
 }
 
-INSTANTIATE_TEST_SUITE_P(InEveryOrder, LateResult, testing::ValuesIn(all_orders()), name_of);
+TEST_F(LateResult, IsStoredOnceAndBothWorkersGoOnInEveryOrder) {
+  std::array order{Step::expire, Step::reassign, Step::late_result, Step::second_result};
+  do {
+    for (const bool at_once : {false, true}) {
+      SCOPED_TRACE(testing::Message()
+                   << "order " << testing::PrintToString(order) << ", " << at_once);
+      is_committed_at_once = at_once;
+      begin_order();
+      for (const Step step : order) happen(step);
+      go_on();
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+}
 
 }  // namespace
 }  // namespace proofmass::test

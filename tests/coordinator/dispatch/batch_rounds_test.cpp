@@ -354,15 +354,6 @@ TEST(BatchTimes, LeaveSomeWorkersIdleIfItIsNotKnownThatTheyCome) {
   EXPECT_EQ(PlayedFleet({100, 16, 1}).play(avx2_time), 1.0);
 }
 
-// All batches but the last ones are full, so that the last runs cost little more than the others.
-TEST(BatchTimes, AreThoseOfFullBatchesUntilTheLastRound) {
-  for (const Plan& plan : {Plan{1000, 2, 1}, Plan{1000, 4, 4}, Plan{5000, 64, 1}}) {
-    PlayedFleet fleet(plan);
-    const double time = fleet.play(avx512_time);
-    EXPECT_EQ(fleet.num_partial_batches_before(time - 1.01), 0) << plan;
-  }
-}
-
 /// Seconds of a batch, as long as the speed of a card has them.
 double batch_s(std::size_t num_runs) { return 2.4 * avx512_time(num_runs); }
 

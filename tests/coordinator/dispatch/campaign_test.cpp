@@ -27,19 +27,13 @@ TEST_F(CampaignTest, TheOlderOfEqualPriorityIsLentFirst) {
   EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
 }
 
-TEST_F(CampaignTest, WorkersThatWaitAreLentItsRunsAtOnce) {
-  add_worker(first);
-  add_campaign(one, 1);
-  (void)outbox.take_sent<proto::RunLease>(first);
-}
-
 TEST_F(CampaignTest, OnlyWhatIsNotFinishedIsLent) {
   StoredCampaign stored = stored_campaign(10);
   stored.finished = {{{0}, 4}, {{5}, 4}};
   stored.given_up = {{{9}, 1}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{4}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{4}, 1}));
 }
 
 TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
@@ -49,7 +43,7 @@ TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
   stored.blamed = {{.run = {7}, .num_crashes = 1, .attempt = {1}}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{4}, 2}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{4}, 2}));
   deliver(first, one, {4, 5});
   commit(one);
   EXPECT_EQ(campaign(one).phase, Phase::finished);
@@ -78,15 +72,6 @@ TEST_F(CampaignTest, AResultOfARunThatIsComputedElsewhereIsTaken) {
   outbox.forget();
 }
 
-TEST_F(CampaignTest, ThatIsDoneIsFinishedAtOnce) {
-  StoredCampaign stored = stored_campaign(2);
-  stored.finished = {{{0}, 1}};
-  stored.given_up = {{{1}, 1}};
-  on_campaign(state, one, stored, now, outbox);
-  EXPECT_EQ(campaign(one).phase, Phase::finished);
-  (void)outbox.take_events();
-}
-
 // They may crash again, so they are lent last and alone.
 TEST_F(CampaignTest, ThatIsRetriedLendsTheRunsThatWereGivenUpAsSuspects) {
   StoredCampaign stored = stored_campaign(3);
@@ -108,18 +93,16 @@ TEST_F(CampaignTest, ThatIsRetriedLendsTheRunsThatWereGivenUpAsSuspects) {
 
 TEST_F(CampaignTest, ThatIsPausedIsNotLentAndAskedBack) {
   add_campaign(one, 10);
-  add_worker(first, 2);
-  outbox.forget();
+  add_busy_worker(first, 2);
   on_pause(state, one, outbox);
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{0}, 2}}));
+  EXPECT_EQ(taken_back(first), (Ranges{{{0}, 2}}));
   on_pause(state, one, outbox);
   outbox.expect_nothing_more();
 
   // The one that is computed is not asked back again.
   heartbeat(first, {held(one, {{0}, 2})}, {make_computed_batch(one, {{{0}, 1}})});
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{1}, 1}}));
-  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{1}, 1})}), now,
-               outbox);
+  EXPECT_EQ(taken_back(first), (Ranges{{{1}, 1}}));
+  give_back(first, held(one, {{1}, 1}));
   EXPECT_EQ(outbox.num_sent(), 0U);
   deliver(first, one, {0});
   EXPECT_EQ(outbox.take_stored(), Runs{{0}});
@@ -127,7 +110,7 @@ TEST_F(CampaignTest, ThatIsPausedIsNotLentAndAskedBack) {
 
   outbox.forget();
   on_resume(state, one, now, outbox);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 1}));
   outbox.forget();
 }
 
@@ -136,7 +119,7 @@ TEST_F(CampaignTest, ThatIsPausedIsAskedBackFromAWorkerThatOutlivedTheCoordinato
   on_pause(state, one, outbox);
   add_worker(first);
   heartbeat(first, {held(one, {{0}, 2})});
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{0}, 2}}));
+  EXPECT_EQ(taken_back(first), (Ranges{{{0}, 2}}));
   EXPECT_EQ(state.workers.at(first).num_lent, 2U);
 }
 
@@ -155,8 +138,7 @@ TEST_F(CampaignTest, ThatIsPausedLetsOthersGoOn) {
   add_worker(first);
   on_pause(state, one, outbox);
   outbox.forget();
-  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}));
   EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
   outbox.forget();
 }
@@ -174,8 +156,7 @@ TEST_F(CampaignTest, ThatIsPausedIsFinishedByItsLastResults) {
 
 TEST_F(CampaignTest, ThatIsCancelledIsForgotten) {
   add_campaign(one, 10);
-  add_worker(first, 2);
-  outbox.forget();
+  add_busy_worker(first, 2);
   on_cancel(state, one, outbox);
   EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
   EXPECT_TRUE(state.leases.empty());
@@ -189,8 +170,7 @@ TEST_F(CampaignTest, ThatIsCancelledIsForgotten) {
 
 TEST_F(CampaignTest, ThatIsCancelledKeepsWhatWasDelivered) {
   add_campaign(one, 10);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   deliver(first, one, {0});
   on_cancel(state, one, outbox);
   EXPECT_FALSE(is_quiet(state));
@@ -217,7 +197,7 @@ TEST_F(CampaignTest, ThatIsExtendedGoesOn) {
   ASSERT_EQ(campaign(one).phase, Phase::finished);
   on_extended(state, one, stored_campaign(3).definition, now, outbox);
   EXPECT_EQ(campaign(one).phase, Phase::active);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 1}));
 }
 
 TEST_F(CampaignTest, ThatIsRemovedIsForgottenIfItHasEnded) {
@@ -237,8 +217,7 @@ TEST_F(CampaignTest, ThatIsRemovedIsForgottenIfItHasEnded) {
 
 TEST_F(CampaignTest, ThatIsRemovedBeforeItsEndLeavesOnlyResultsOfWorkers) {
   add_campaign(one, 10);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   on_removed(state, one, outbox);
   EXPECT_EQ(outbox.take_sent<proto::NotServed>(first).campaign(), one.value);
   EXPECT_TRUE(state.campaigns.empty());
@@ -333,8 +312,7 @@ TEST_F(HostileTest, RunsAreGivenBackThatAreNotLent) {
 
 TEST_F(HostileTest, AResultIsInItsBatchTwice) {
   add_campaign(one, 10);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   deliver(first, one, {0, 0, 1, 0, 99, 99});
   EXPECT_EQ(outbox.take_stored(), (Runs{{0}, {1}}));
   deliver(first, one, {0, 0});
@@ -420,8 +398,7 @@ TEST_F(HostileTest, AnAuditIsHeldForEver) {
 
 TEST_F(HostileTest, ATruthIsMadeUpOfARunThatWasNotLent) {
   add_campaign(one, 10);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   wire::ComputedRun made_up = computed(7);
   made_up.result.truth[3] += 1e-9;
   on_results(state, first, one, {1}, {made_up}, now, outbox);

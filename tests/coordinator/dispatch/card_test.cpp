@@ -45,10 +45,7 @@ TEST_F(CardTest, AsksForAllThatIsForCardsOnceProcessorsHaveComputedSome) {
   outbox.forget();
   EXPECT_FALSE(state.workers.at(first).card_work.at(one).can_compute);
   const RunRange others{{for_cards.first_run() + 1}, for_cards.num_runs() - 1};
-  proto::GiveBack give_back;
-  give_back.set_reason(proto::LOSS_REASON_RETRACTED);
-  *give_back.add_runs() = held(one, others);
-  on_give_back(state, first, give_back, now, outbox);
+  give_back(first, held(one, others));
   outbox.forget();
   EXPECT_EQ(state.workers.at(first).num_lent_to_cards, 0U);
   EXPECT_LE(state.workers.at(first).num_lent, 32U) << "two rounds of its processors";
@@ -90,8 +87,7 @@ TEST_F(CardTest, CopiesWhatACardHasForTwiceAsLongAsItShould) {
   state.workers.at(first).card_work.at(one).rate = static_cast<double>(worker.num_lent) / 10.0;
   heartbeat(first, {held(one, {{for_processors.num_runs()}, worker.num_lent})},
             {make_computed_batch(one, {{RunIndex{for_processors.num_runs()}, worker.num_lent}})});
-  add_worker(second, 16, "other");
-  outbox.forget();
+  add_busy_worker(second, 16, "other");
   const auto has_copies_after = [&](int wait_s) {
     now += std::chrono::seconds(wait_s);
     for (const WorkerId id : {first, second}) state.workers.at(id).heard_at = now;

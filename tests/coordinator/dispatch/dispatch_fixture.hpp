@@ -77,10 +77,19 @@ class DispatchFixture : public testing::Test {
 
   /// A worker that is registered and takes what it is lent.
   void add_worker(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
-    say_hello(id, hello(num_slots, host));
+    add_worker(id, hello(num_slots, host));
+  }
+  void add_worker(WorkerId id, const proto::Hello& said) {
+    say_hello(id, said);
     outbox.drop_sent<proto::Welcome>(id);
     (void)outbox.take_events();
     heartbeat(id);
+  }
+
+  /// A worker that is lent what there is; nobody looks.
+  void add_busy_worker(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
+    add_worker(id, num_slots, host);
+    outbox.forget();
   }
 
   /// Its acknowledgement is taken; what else follows is not.
@@ -89,6 +98,14 @@ class DispatchFixture : public testing::Test {
                  std::uint32_t num_runs_max = 4096) {
     on_heartbeat(state, id, make_heartbeat(num_runs_max, held, computing), ++sequence, now, outbox);
     outbox.drop_sent<proto::HeartbeatAck>(id);
+  }
+
+  /// The runs of the oldest message to the worker, which must be a lease.
+  RunRange taken_lease(WorkerId id) { return wire::runs_of(outbox.take_sent<proto::RunLease>(id)); }
+
+  /// Likewise of one that takes runs back.
+  std::vector<RunRange> taken_back(WorkerId id) {
+    return wire::ranges_of(outbox.take_sent<proto::Retract>(id).ranges());
   }
 
   static proto::HeldRuns held(CampaignId id, RunRange runs, std::uint32_t attempt = 1) {
@@ -114,6 +131,11 @@ class DispatchFixture : public testing::Test {
     std::vector<wire::ComputedRun> results;
     for (const std::uint64_t run : runs) results.push_back(computed(run));
     on_results(state, id, campaign, {attempt}, std::move(results), now, outbox);
+  }
+
+  void give_back(WorkerId id, const proto::HeldRuns& runs,
+                 LossReason reason = LossReason::retracted) {
+    on_give_back(state, id, make_give_back(reason, {runs}), now, outbox);
   }
 
   /// All runs that were handed to the store become durable.

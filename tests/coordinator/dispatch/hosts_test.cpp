@@ -49,23 +49,17 @@ TEST_F(HostsTest, ACrashIsBelievedFromTheSameKeyOnTheSameHost) {
   succeed(second, first, some_key);
   EXPECT_FALSE(state.workers.contains(first));
   EXPECT_EQ(num_crashes(some_key), 1U);
+  EXPECT_TRUE(campaign(one).suspects.contains({0}));
 }
 
-TEST_F(HostsTest, ACrashIsNotBelievedFromAnotherKey) {
+TEST_F(HostsTest, ACrashIsNotBelievedFromAnotherKeyOrHost) {
   add_campaign(one, 10);
   join_and_take_runs(first, some_key);
   succeed(second, first, other_key);
+  succeed(third, first, some_key, "elsewhere");
   EXPECT_TRUE(state.workers.contains(first));
   EXPECT_EQ(num_crashes(some_key), 0U);
   EXPECT_TRUE(campaign(one).suspects.empty());
-}
-
-TEST_F(HostsTest, ACrashIsNotBelievedFromAnotherHost) {
-  add_campaign(one, 10);
-  join_and_take_runs(first, some_key);
-  succeed(second, first, some_key, "elsewhere");
-  EXPECT_TRUE(state.workers.contains(first));
-  EXPECT_EQ(num_crashes(some_key), 0U);
 }
 
 // Five messages were once enough to lock out a host with all its honest workers.
@@ -175,8 +169,7 @@ class HeartbeatTest : public DispatchFixture {
   /// The first worker has been lent run 0 of three.
   void lend_one() {
     add_campaign(one, 3);
-    add_worker(first);
-    outbox.forget();
+    add_busy_worker(first);
   }
 };
 
@@ -234,34 +227,28 @@ TEST_F(HeartbeatTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) 
   heartbeat(first, {held(one, {{0}, 1}, 1)}, {}, 1);
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).attempt, Attempt{2});
 
-  on_give_back(state, first, make_give_back(LossReason::walltime, {held(one, {{0}, 1}, 2)}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}, 2), LossReason::walltime);
   outbox.expect_nothing_more();
-  on_give_back(state, first, make_give_back(LossReason::walltime, {held(one, {{0}, 1}, 1)}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}, 1), LossReason::walltime);
   EXPECT_EQ(outbox.take_losses().at(0).attempt, Attempt{2});
   outbox.forget();
 }
 
 TEST_F(HeartbeatTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
   add_campaign(one, 1'000'000);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   heartbeat(first, {held(one, {{0}, 1'000'000})});
   EXPECT_EQ(state.workers.at(first).num_lent, 1U);
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()),
-            (Ranges{{{1}, 999'999}}));
+  EXPECT_EQ(taken_back(first), (Ranges{{{1}, 999'999}}));
 }
 
 TEST_F(HeartbeatTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
   lend_one();
-  add_worker(second);
-  outbox.forget();
+  add_busy_worker(second);
   heartbeat(second, {held(one, {{0}, 2})});
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(second).ranges()), (Ranges{{{0}, 1}}));
+  EXPECT_EQ(taken_back(second), (Ranges{{{0}, 1}}));
   EXPECT_TRUE(state.workers.at(second).unleased.at(one).contains({0}));
-  on_give_back(state, second, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
-               outbox);
+  give_back(second, held(one, {{0}, 1}));
   EXPECT_TRUE(state.workers.at(second).unleased.empty());
 }
 
@@ -269,7 +256,7 @@ TEST_F(HeartbeatTest, AStoredRunThatStillWaitsIsAskedBack) {
   lend_one();
   complete(first, one, {0});
   heartbeat(first, {held(one, {{0}, 3})});
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{0}, 1}}));
+  EXPECT_EQ(taken_back(first), (Ranges{{{0}, 1}}));
 }
 
 TEST_F(HeartbeatTest, ADeliveredRunNeedsNothing) {
@@ -299,8 +286,7 @@ TEST_F(HeartbeatTest, ACampaignThatHasEndedIsForgotten) {
 
 TEST_F(HeartbeatTest, RunsThatAreGivenBackAreLentAgain) {
   lend_one();
-  on_give_back(state, first, make_give_back(LossReason::preempted, {held(one, {{0}, 1})}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}), LossReason::preempted);
   EXPECT_EQ(outbox.take_events(), Strings{"runs_lost worker=1 runs=0 attempt=1 reason=preempted"});
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::preempted);
   EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).attempt(), 2U);
@@ -309,11 +295,9 @@ TEST_F(HeartbeatTest, RunsThatAreGivenBackAreLentAgain) {
 // A message that was long under way must not take back what has been lent anew since.
 TEST_F(HeartbeatTest, AGiveBackOfAnOlderAttemptIsIgnored) {
   lend_one();
-  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}));
   outbox.forget();
-  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}));
   EXPECT_TRUE(campaign(one).lent.find({0}).has_value());
 }
 
@@ -327,8 +311,8 @@ TEST_F(HeartbeatTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
   outbox.forget();
   heartbeat(second, {held(one, {{0}, 1})});
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).worker, second);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 1}));
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(third)), (RunRange{{2}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 1}));
+  EXPECT_EQ(taken_lease(third), (RunRange{{2}, 1}));
 }
 
 TEST_F(HeartbeatTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {

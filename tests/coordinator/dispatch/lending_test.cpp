@@ -15,8 +15,7 @@ class LendingTest : public DispatchFixture {
     state.config.uncommitted_max = uncommitted_max;
     add_campaign(one, num_runs);
     add_worker(first);
-    EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 1}))
-        << "how long a run takes is not known yet";
+    EXPECT_EQ(taken_lease(first), (RunRange{{0}, 1})) << "how long a run takes is not known yet";
     heartbeat(first, {held(one, {{0}, 1})}, {}, num_runs_max);
     wire::ComputedRun result = computed(0);
     result.elapsed_s = run_time_s;
@@ -48,7 +47,7 @@ TEST_F(LendingTest, GivesManySlotsSeveralLeases) {
   (void)outbox.take_events();
   heartbeat(first, {}, {}, 20'000);
   for (const RunRange& runs : {RunRange{{0}, 4096}, {{4096}, 4096}, {{8192}, 1808}}) {
-    EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), runs);
+    EXPECT_EQ(taken_lease(first), runs);
   }
   check_invariants(state);
 }
@@ -57,13 +56,12 @@ TEST_F(LendingTest, GivesNothingWhileTooManyResultsWaitForTheStore) {
   state.config.uncommitted_max = 4;
   add_campaign(one, 100);
   add_worker(first, 2);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 2}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 2}));
   deliver(first, one, {0, 1});
   EXPECT_EQ(runs_held_text(state, first), "none");
   commit(one);
   outbox.drop_sent<proto::ResultAck>(first);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{2}, 4}))
-      << "two rounds, however small the room";
+  EXPECT_EQ(taken_lease(first), (RunRange{{2}, 4})) << "two rounds, however small the room";
 }
 
 TEST_F(LendingTest, GivesLessThanARoundIfResultsWouldComeFasterThanTheyCanBeTaken) {
@@ -72,23 +70,21 @@ TEST_F(LendingTest, GivesLessThanARoundIfResultsWouldComeFasterThanTheyCanBeTake
   state.config.run_time_s_expected = 0.5;
   add_campaign(one, 1'000'000);
   add_worker(first, 64);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 10}))
-      << "two rounds' time";
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 10})) << "two rounds' time";
   wire::ComputedRun result = computed(0);
   result.elapsed_s = 2.0;
   on_results(state, first, one, {1}, {result}, now, outbox);
   (void)outbox.take_stored();
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{10}, 31}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{10}, 31}));
   EXPECT_EQ(runs_held_text(state, first), "1..40");
   add_worker(second, 64);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{41}, 20}))
-      << "half of it";
+  EXPECT_EQ(taken_lease(second), (RunRange{{41}, 20})) << "half of it";
 }
 
 TEST_F(LendingTest, TakesNothingFromOthersForAWorkerThatWaitsForTheStore) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
   add_worker(second);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{151}, 150}));
+  EXPECT_EQ(taken_lease(second), (RunRange{{151}, 150}));
   state.config.uncommitted_max = 2;
   for (std::uint64_t run = 151; run <= 300; ++run) deliver(second, one, {run});
   (void)outbox.take_stored();
@@ -103,20 +99,14 @@ TEST_F(LendingTest, GivesNothingMoreWhenCreditIsRepeated) {
   heartbeat(first, {held(one, {{0}, 1})});
 }
 
-TEST_F(LendingTest, FillsAllSlotsOfAWorker) {
-  add_campaign(one, 10);
-  add_worker(first, 4);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 4}));
-}
-
 TEST_F(LendingTest, SharesTheLastRunsAmongAllWorkers) {
   for (const WorkerId id : {first, second, third}) add_worker(id, 32);
   add_campaign(one, 40);
   const auto lease = outbox.take_sent<proto::RunLease>(first);
   EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 14}));
   EXPECT_EQ(lease.batch_runs_max(), 7U) << "as there are two threads";
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{14}, 13}));
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(third)), (RunRange{{27}, 13}));
+  EXPECT_EQ(taken_lease(second), (RunRange{{14}, 13}));
+  EXPECT_EQ(taken_lease(third), (RunRange{{27}, 13}));
 }
 
 TEST_F(LendingTest, SharesNoRunsThatFillMoreThanHalfOfTheSlots) {
@@ -125,22 +115,22 @@ TEST_F(LendingTest, SharesNoRunsThatFillMoreThanHalfOfTheSlots) {
   const auto lease = outbox.take_sent<proto::RunLease>(first);
   EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 16}));
   EXPECT_EQ(lease.batch_runs_max(), 0U);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{16}, 5}));
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(third)), (RunRange{{21}, 4}));
+  EXPECT_EQ(taken_lease(second), (RunRange{{16}, 5}));
+  EXPECT_EQ(taken_lease(third), (RunRange{{21}, 4}));
 }
 
 TEST_F(LendingTest, GivesAnEighthOfARoundOfTheLastRunsAtLeast) {
   for (const WorkerId id : {first, second, third}) add_worker(id, 16);
   add_campaign(one, 3);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 2}));
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{2}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 2}));
+  EXPECT_EQ(taken_lease(second), (RunRange{{2}, 1}));
 }
 
 TEST_F(LendingTest, LeavesTheLastRunsToWorkersThatAreStillToCome) {
   state.num_slots_expected = 64;
   add_campaign(one, 20);
   add_worker(first, 16);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 5}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 5}));
 }
 
 // One wants nothing, one is silent, and one is on a host where workers crash.
@@ -174,7 +164,7 @@ TEST_F(LendingTest, ExpectsNoMoreSlotsOnceAWorkerIsLost) {
   outbox.forget();
   EXPECT_EQ(state.num_slots_expected, 0U);
   add_campaign(one, 20);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 16}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 16}));
 }
 
 TEST_F(LendingTest, SharesNothingWhileAnotherCampaignHasRuns) {
@@ -184,12 +174,12 @@ TEST_F(LendingTest, SharesNothingWhileAnotherCampaignHasRuns) {
   add_campaign(two, 100);
   state.is_lending = true;
   heartbeat(first);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 8}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 8}));
   const auto lease = outbox.take_sent<proto::RunLease>(first);
   EXPECT_EQ(lease.campaign(), two.value);
   EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 8}));
   heartbeat(second);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{8}, 16}));
+  EXPECT_EQ(taken_lease(second), (RunRange{{8}, 16}));
 }
 
 // The other thread of the worker computes eight runs and has no room for more.
@@ -284,9 +274,9 @@ TEST_F(LendingTest, GivesSeveralRangesAtATime) {
   stored.finished = {{{1}, 1}, {{3}, 1}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 1}));
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{2}, 1}));
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{4}, 2}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{2}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{4}, 2}));
   EXPECT_EQ(state.leases.size(), 1U);
 }
 
@@ -336,9 +326,8 @@ class TailTest : public DispatchFixture {
 TEST_F(TailTest, AnIdleWorkerGetsWhatWaitsAtOthers) {
   begin_tail();
   on_tick(state, now, outbox);
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{3}, 2}}));
-  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{3}, 2})}), now,
-               outbox);
+  EXPECT_EQ(taken_back(first), (Ranges{{{3}, 2}}));
+  give_back(first, held(one, {{3}, 2}));
   const auto lease = outbox.take_sent<proto::RunLease>(second);
   EXPECT_EQ(wire::runs_of(lease), (RunRange{{3}, 2}));
   EXPECT_EQ(lease.attempt(), 2U);
@@ -445,7 +434,7 @@ TEST_F(TailTest, TheFirstResultCountsAndTheOtherWorkerIsAskedBack) {
   begin_copies();
   deliver(second, one, {1}, 2);
   EXPECT_EQ(outbox.take_stored(), Runs{{1}});
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(first).ranges()), (Ranges{{{1}, 1}}));
+  EXPECT_EQ(taken_back(first), (Ranges{{{1}, 1}}));
   deliver(first, one, {1});
   EXPECT_EQ(outbox.take_compared(), Runs{{1}});
   EXPECT_EQ(campaign(one).num_duplicates, 1U);

@@ -26,10 +26,7 @@ class ModelsTest : public DispatchFixture {
   }
 
   void add_worker_with_other(WorkerId id, std::uint32_t num_slots) {
-    say_hello(id, hello_with_other(num_slots, other_digest));
-    outbox.drop_sent<proto::Welcome>(id);
-    (void)outbox.take_events();
-    heartbeat(id);
+    add_worker(id, hello_with_other(num_slots, other_digest));
   }
 };
 
@@ -56,8 +53,7 @@ TEST_F(ModelsTest, AreNotCopiedToWorkersWithoutThem) {
   add_campaign_of_other_model(one, 100);
   campaign(one).run_time_s = 1.0;
   add_worker_with_other(second, 4);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(second)), (RunRange{{0}, 8}))
-      << "one round to compute, one to wait";
+  EXPECT_EQ(taken_lease(second), (RunRange{{0}, 8})) << "one round to compute, one to wait";
   add_worker(first, 4);
   for (int i = 0; i < 10; ++i) {
     now += std::chrono::seconds(4);
@@ -94,19 +90,14 @@ TEST_F(ModelsTest, TakeSeveralSlotsARunWhereOthersTakeOne) {
   add_campaign(one, 100'000);
   proto::Hello said = hello(8 * batch_size);
   said.set_slots_per_thread(4 * batch_size);
-  say_hello(first, said);
-  outbox.drop_sent<proto::Welcome>(first);
-  (void)outbox.take_events();
-  heartbeat(first);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)),
-            (RunRange{{0}, 2 * batch_size}))
+  add_worker(first, said);
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 2 * batch_size}))
       << "a batch for each of two threads";
   EXPECT_EQ(state.num_idle_slots, 0U);
   deliver(first, one, {0});
   commit(one);
   outbox.drop_sent<proto::ResultAck>(first);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)),
-            (RunRange{{2 * batch_size}, 2 * batch_size + 1}))
+  EXPECT_EQ(taken_lease(first), (RunRange{{2 * batch_size}, 2 * batch_size + 1}))
       << "and another to wait";
 }
 

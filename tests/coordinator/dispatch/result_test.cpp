@@ -9,8 +9,7 @@ class ResultTest : public DispatchFixture {
  protected:
   void SetUp() override {
     add_campaign(one, 10);
-    add_worker(first);
-    outbox.forget();
+    add_busy_worker(first);
   }
 };
 
@@ -20,7 +19,7 @@ TEST_F(ResultTest, IsAcknowledgedAfterTheCommitAndNotBefore) {
   EXPECT_EQ(outbox.stored()[0].campaign, one);
   EXPECT_EQ(outbox.stored()[0].worker, first);
   EXPECT_EQ(outbox.stored()[0].attempt, Attempt{1});
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 2}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 2}));
   EXPECT_EQ(outbox.num_sent(), 0U);
 
   commit(one);
@@ -77,8 +76,7 @@ TEST_F(ResultTest, IsNotComparedWhileTooManyWaitForThat) {
 }
 
 TEST_F(ResultTest, OfAnotherWorkerWaitsForTheSameCommitAndIsCompared) {
-  add_worker(second);
-  outbox.forget();
+  add_busy_worker(second);
   deliver(first, one, {0});
   outbox.forget();
   deliver(second, one, {0});
@@ -90,12 +88,10 @@ TEST_F(ResultTest, OfAnotherWorkerWaitsForTheSameCommitAndIsCompared) {
 }
 
 TEST_F(ResultTest, OfARunThatIsLentToAnotherIsTakenAndTheOtherOneAskedBack) {
-  add_worker(second);
-  outbox.forget();
+  add_busy_worker(second);
   deliver(first, one, {1});  // Lent to the second.
   EXPECT_EQ(outbox.take_stored(), Runs{{1}});
-  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(second).ranges()),
-            (std::vector<RunRange>{{{1}, 1}}));
+  EXPECT_EQ(taken_back(second), (std::vector<RunRange>{{{1}, 1}}));
   EXPECT_EQ(state.workers.at(second).num_lent, 0U);
   outbox.forget();
 }
@@ -180,7 +176,7 @@ TEST_F(ResultTest, ThatCannotBeStoredStopsTheLendingUntilItIs) {
   on_committed(state, one, Runs{{0}}, now, outbox);
   (void)outbox.take_sent<proto::ResultAck>(first);
   on_store_recovered(state, one, now, outbox);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{1}, 2}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 2}));
   EXPECT_EQ(outbox.take_events(), Strings{"storage_recovered delivered=0"});
 }
 

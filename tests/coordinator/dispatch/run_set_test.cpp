@@ -25,14 +25,6 @@ TEST(RunSet, HoldsABillionRunsAsOneRange) {
   EXPECT_EQ(runs.ranges().size(), 1U);
 }
 
-TEST(RunSet, SplitsARangeAtARunThatIsRemoved) {
-  RunSet runs(range(0, 3));
-  EXPECT_TRUE(runs.remove(RunIndex{1}));
-  EXPECT_FALSE(runs.remove(RunIndex{1}));
-  EXPECT_EQ(runs.ranges(), (std::vector{range(0, 1), range(2, 1)}));
-  EXPECT_EQ(runs.take_first(5), range(0, 1));
-}
-
 TEST(RunSet, IsWrittenAsItsFirstRanges) {
   RunSet runs;
   EXPECT_EQ(to_text(runs), "none");
@@ -93,16 +85,6 @@ TEST(RunSet, AgreesWithASetOfNumbers) {
     const std::uint64_t probe = random() % 70;
     ASSERT_EQ(runs.contains({probe}), expected.contains(probe));
   }
-}
-
-TEST(LeaseIndex, FindsTheLeaseOfARun) {
-  LeaseIndex index;
-  index.add({{0}, 5}, LeaseId{1});
-  index.add({{5}, 5}, LeaseId{2});
-  EXPECT_EQ(index.find({4}), LeaseId{1});
-  EXPECT_EQ(index.find({5}), LeaseId{2});
-  EXPECT_EQ(index.find({10}), std::nullopt);
-  EXPECT_EQ(index.size(), 10U);
 }
 
 TEST(LeaseIndex, RemovesARangeAcrossLeases) {

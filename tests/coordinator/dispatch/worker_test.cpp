@@ -85,8 +85,7 @@ TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
   expect_reject();
   deliver(first, one, {0});
   expect_reject();
-  on_give_back(state, first, make_give_back(LossReason::retracted, {held(one, {{0}, 1})}), now,
-               outbox);
+  give_back(first, held(one, {{0}, 1}));
   expect_reject();
   on_campaign_request(state, first, one, 0, now, outbox);
   expect_reject();
@@ -98,8 +97,7 @@ TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
 
 TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
   add_campaign(one, 1);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   on_campaign_request(state, first, one, 7, now, outbox);
   const auto sent = outbox.take_definition();
   EXPECT_EQ(sent.worker, first);
@@ -125,13 +123,12 @@ TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
   on_tick(state, now, outbox);
   outbox.expect_nothing_more();
   heartbeat(first);
-  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::RunLease>(first)), (RunRange{{0}, 1}));
+  EXPECT_EQ(taken_lease(first), (RunRange{{0}, 1}));
 }
 
 TEST_F(WorkerTest, AnOlderHeartbeatChangesNothing) {
   add_campaign(one, 1);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   now += 1h;
   on_heartbeat(state, first, make_heartbeat(0), sequence, now, outbox);
   (void)outbox.take_sent<proto::HeartbeatAck>(first);
@@ -150,7 +147,17 @@ TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt)
   now += 1s;
   on_tick(state, now, outbox);
   EXPECT_FALSE(state.workers.contains(first));
-  outbox.forget();
+  EXPECT_EQ(outbox.take_events(), (Strings{"worker_gone worker=1 name=w reason=silent steps=0",
+                                           "runs_lost worker=1 runs=0 attempt=1 reason=silent"}));
+  const auto losses = outbox.take_losses();
+  ASSERT_EQ(losses.size(), 1U);
+  EXPECT_EQ(losses[0].campaign, one);
+  EXPECT_EQ(losses[0].runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(losses[0].attempt, Attempt{1});
+  EXPECT_EQ(losses[0].by, first);
+  EXPECT_EQ(losses[0].worker, session_of(first));
+  EXPECT_EQ(losses[0].reason, LossReason::silent);
+  EXPECT_FALSE(losses[0].is_blamed);
   add_worker(second);
   const auto lease = outbox.take_sent<proto::RunLease>(second);
   EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
@@ -169,43 +176,19 @@ TEST_F(WorkerTest, ThatSeemsSilentMayWaitToBeHeard) {
   on_tick(state, now, outbox);
   EXPECT_FALSE(state.workers.contains(first)) << "others that never stop talking change nothing";
   outbox.forget();
-}
-
-TEST_F(WorkerTest, ThatSeemsSilentIsLostOnceAllIsHeard) {
-  add_worker(first);
-  state.is_behind = true;
+  add_worker(second);
   now += 60s;
   on_tick(state, now, outbox);
-  EXPECT_TRUE(state.workers.contains(first));
+  EXPECT_TRUE(state.workers.contains(second));
   state.is_behind = false;
   on_tick(state, now, outbox);
-  EXPECT_FALSE(state.workers.contains(first));
+  EXPECT_FALSE(state.workers.contains(second)) << "all is heard";
   outbox.forget();
-}
-
-TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
-  add_campaign(one, 1);
-  add_worker(first);
-  outbox.forget();
-  now += 60s;
-  on_tick(state, now, outbox);
-  EXPECT_EQ(outbox.take_events(), (Strings{"worker_gone worker=1 name=w reason=silent steps=0",
-                                           "runs_lost worker=1 runs=0 attempt=1 reason=silent"}));
-  const auto losses = outbox.take_losses();
-  ASSERT_EQ(losses.size(), 1U);
-  EXPECT_EQ(losses[0].campaign, one);
-  EXPECT_EQ(losses[0].runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(losses[0].attempt, Attempt{1});
-  EXPECT_EQ(losses[0].by, first);
-  EXPECT_EQ(losses[0].worker, session_of(first));
-  EXPECT_EQ(losses[0].reason, LossReason::silent);
-  EXPECT_FALSE(losses[0].is_blamed);
 }
 
 TEST_F(WorkerTest, AnyMessageIsASignOfLife) {
   add_campaign(one, 1);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   for (int i = 0; i < 3; ++i) {
     now += 50s;
     on_campaign_request(state, first, one, 0, now, outbox);
@@ -226,8 +209,7 @@ TEST_F(WorkerTest, ThatIsSuspectIsLentNothing) {
 
 TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
   add_campaign(one, 1);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   add_worker(second);
   on_bye(state, first, LossReason::walltime, now, outbox);
   EXPECT_EQ(outbox.take_sent<proto::RunLease>(second).attempt(), 2U);
@@ -238,8 +220,7 @@ TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
 
 TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
   add_campaign(one, 3);
-  add_worker(first, 2);
-  outbox.forget();
+  add_busy_worker(first, 2);
   EXPECT_EQ(runs_held_text(state, first), "0..1");
   EXPECT_EQ(runs_held_text(state, second), "none");
   add_campaign(two, 1);
@@ -251,8 +232,7 @@ TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
 
 TEST_F(WorkerTest, DrainsUntilWhatItHoldsIsStored) {
   add_campaign(one, 5);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   on_drain(state, outbox);
   (void)outbox.take_sent<proto::Drain>(first);
   heartbeat(first, {held(one, {{0}, 1})});
@@ -279,8 +259,7 @@ TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
 
 TEST_F(WorkerTest, IsToldToStopAgainAndAgain) {
   add_campaign(one, 5);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   on_stop(state, outbox);
   (void)outbox.take_sent<proto::Stop>(first);
   heartbeat(first);
@@ -309,8 +288,7 @@ class NotServedTest : public DispatchFixture {
 // An older copy of the file was restored, from before an extension: no fault of the worker.
 TEST_F(NotServedTest, ResultsBeyondTheCampaignAreKeptAndTheOthersTaken) {
   add_campaign(one, 10);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   deliver(first, one, {8, 10, 9, 12, 11, 20});
   const auto not_served = outbox.take_sent<proto::NotServed>(first);
   EXPECT_EQ(not_served.campaign(), one.value);
@@ -322,8 +300,7 @@ TEST_F(NotServedTest, ResultsBeyondTheCampaignAreKeptAndTheOthersTaken) {
 
 TEST_F(NotServedTest, RunsBeyondTheCampaignAreNotLentToTheirHolder) {
   add_campaign(one, 3);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   heartbeat(first, {held(one, {{0}, 5}), held(one, {{3}, 1}, 2)});
   const auto not_served = outbox.take_sent<proto::NotServed>(first);
   EXPECT_EQ(wire::ranges_of(not_served.ranges()), (Ranges{{{3}, 2}}));
@@ -345,8 +322,7 @@ TEST_F(NotServedTest, RunsBeyondAFinishedCampaignAreKept) {
 
 TEST_F(NotServedTest, WhatIsSetAsideIsLentToItsHolderOnceTheCampaignIsServed) {
   add_worker(first);
-  add_worker(second);
-  outbox.forget();
+  add_busy_worker(second);
   heartbeat_with_set_aside(first, {held(one, {{0}, 2}), held(one, {{5}, 1}, 7)});
   EXPECT_EQ(outbox.num_sent(), 0U) << "the worker knows";
   add_campaign(one, 6);
@@ -428,8 +404,7 @@ TEST_F(NotServedTest, ALateResultOfARunThatWasGivenUpReopensAFinishedCampaign) {
   stored.compared = {{{1}, 1}};
   stored.control.phase = Phase::finished;
   on_campaign(state, one, stored, now, outbox);
-  add_worker(first);
-  outbox.forget();
+  add_busy_worker(first);
   ASSERT_EQ(campaign(one).phase, Phase::finished);
   deliver(first, one, {0});
   EXPECT_EQ(campaign(one).phase, Phase::active);

@@ -1,19 +1,8 @@
 #include "core/campaign/allocation.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <functional>
-#include <numeric>
-#include <span>
-#include <string>
-#include <vector>
-
 #include "core/campaign/dispersion.hpp"
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -155,23 +144,17 @@ TEST(Allocation, IsTheBestOfAllThereAreInMostProblemsWhereTheyShare) {
 double first(Steps n) { return n[0]; }
 
 TEST(Allocation, RefusesFewerStepsThanTheMinimumNeeds) {
-  try {
-    (void)allocate(3, {.num_steps = 11, .minimum = 4}, first);
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_EQ(std::string(error.what()), "11 steps are fewer than 4 for each of 3 sessions");
-  }
+  EXPECT_EQ(test::message_of<InvalidArgument>(
+                [] { (void)allocate(3, {.num_steps = 11, .minimum = 4}, first); }),
+            "11 steps are fewer than 4 for each of 3 sessions");
 }
 
 TEST(Allocation, RefusesMoreStepsThanTheMaximumHolds) {
   EXPECT_EQ(allocate(3, {.num_steps = 12, .maximum = 4}, first), (std::vector<int>{4, 4, 4}));
   EXPECT_EQ(allocate(3, {.num_steps = 11, .maximum = 5}, first), (std::vector<int>{5, 3, 3}));
-  try {
-    (void)allocate(3, {.num_steps = 13, .maximum = 4}, first);
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_EQ(std::string(error.what()), "13 steps are more than 4 for each of 3 sessions");
-  }
+  EXPECT_EQ(test::message_of<InvalidArgument>(
+                [] { (void)allocate(3, {.num_steps = 13, .maximum = 4}, first); }),
+            "13 steps are more than 4 for each of 3 sessions");
 }
 
 // Every exchange is a gain, so that an earlier end costs value and never the rule.

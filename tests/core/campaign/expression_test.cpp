@@ -15,12 +15,7 @@ double value_of(std::string_view text) {
 }
 
 std::string refusal_of(std::string_view text) {
-  try {
-    (void)value_of(text);
-  } catch (const InvalidArgument& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of<InvalidArgument>([&] { (void)value_of(text); });
 }
 
 TEST(EvaluateExpression, HasThePrecedenceOfArithmetic) {

@@ -284,32 +284,5 @@ TEST(SamplingDesign, HasHonestIntervalsFromReplicates) {
   }
 }
 
-double variance_of(const SamplingDesign& design, const KnownFunction& function) {
-  return std::pow(moments(replicate_means(design, function, 8000)).standard_deviation, 2);
-}
-
-// With one number in each of n strata, the mean of n values of w x has the variance w²/(12 n³)
-// instead of w²/(12 n). The relative standard error of a variance is √(2/8,000) = 1.6 %.
-TEST(SamplingDesign, LeavesOfALinearLawTheScatterWithinTheStrata) {
-  constexpr double sum_of_squares = 91.0, n = 32.0;
-  const KnownFunction function{"", 0.0, linear_law};
-  const double independent = sum_of_squares / (12.0 * n);
-  EXPECT_NEAR(variance_of(random_draws, function) / independent, 1.0, 0.07);
-  EXPECT_NEAR(variance_of(latin, function) / independent * n * n, 1.0, 0.07);
-  EXPECT_NEAR(variance_of(net, function) / independent * n * n, 1.0, 0.07);
-}
-
-// A Latin hypercube leaves the variance of the interaction of x₁ and x₃, 8b²π⁸/225, over n
-// [Stein1987], and what is of order n⁻² of the rest. A net evens out pairs, too.
-TEST(SamplingDesign, EvensOutPairsOfQuantitiesByANetAlone) {
-  const KnownFunction function{"", 0.0, ishigami};
-  const double pi_4 = std::pow(std::numbers::pi, 4);
-  const double interaction = 8.0 * 0.01 * pi_4 * pi_4 / 225.0;
-  const double total = 0.5 + 49.0 / 8.0 + 0.1 * pi_4 / 5.0 + 0.01 * pi_4 * pi_4 / 18.0;
-  EXPECT_NEAR(32.0 * variance_of(random_draws, function) / total, 1.0, 0.07);
-  EXPECT_NEAR(32.0 * variance_of(latin, function) / interaction, 1.05, 0.09);
-  EXPECT_LT(32.0 * variance_of(net, function) / interaction, 0.5);
-}
-
 }  // namespace
 }  // namespace proofmass

@@ -15,12 +15,9 @@ TEST(EditDistance, CountsInsertionsDeletionsReplacementsAndSwaps) {
   EXPECT_EQ(edit_distance("scale", "scale"), 0u);
 }
 
-TEST(NearestName, IsTheCandidateWithTheFewestEdits) {
+TEST(NearestName, IsTheCandidateWithTheFewestEditsIfOneIsNear) {
   EXPECT_EQ(nearest_name("noise.scal", {"noise.preset", "noise.scale", "orbit.period_s"}),
             "noise.scale");
-}
-
-TEST(NearestName, IsNothingIfNoCandidateIsNear) {
   EXPECT_EQ(nearest_name("weather", {"noise.preset", "noise.scale"}), std::nullopt);
   EXPECT_EQ(nearest_name("weather", {}), std::nullopt);
 }

@@ -308,17 +308,6 @@ TEST(RotationBy, HasTheSineOfHalfTheAngleAlongItsAxis) {
   EXPECT_EQ(rotation_error(0.0, {1.0, 0.0, 0.0}).vector, 0.0);
 }
 
-TEST(RotationBy, StepsOfAConstantRateAddUpToTheWholeAngle) {
-  const Vector3<double> axis{2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0};
-  constexpr int num_steps = 1000;
-  constexpr double step = 2e-3;
-  Quaternion<double> q;
-  for (int i = 0; i < num_steps; ++i) q = q * rotation_by(step * axis);
-  const double half = 0.5 * step * num_steps;
-  // A thousand products of four roundings each, in random directions: 1e-14 is generous.
-  EXPECT_LT(distance(q, {std::cos(half), std::sin(half) * axis}), 1e-14);
-}
-
 TEST(ErrorAngles, AreInvertedByFromErrorAngles) {
   RandomNumbers random;
   for (int i = 0; i < 1000; ++i) {

@@ -53,14 +53,6 @@ TEST(InverseNormal, IsWithin1e15OfTheInverseOfTheLaw) {
   EXPECT_EQ(inverse_normal(0.5), 0.0);
 }
 
-// Quantiles of any table: 97.5 % and one, three and six standard deviations.
-TEST(InverseNormal, GivesKnownQuantiles) {
-  EXPECT_NEAR(inverse_normal(0.975), 1.959963984540054, 2e-15);
-  EXPECT_NEAR(inverse_normal(0.15865525393145705), -1.0, 2e-15);
-  EXPECT_NEAR(inverse_normal(1.3498980316300946e-3), -3.0, 4e-15);
-  EXPECT_NEAR(inverse_normal(9.865876450376981e-10), -6.0, 8e-15);
-}
-
 TEST(InverseNormal, IsOddAboutOneHalf) {
   std::mt19937_64 bits(242);
   for (int i = 0; i < 100'000; ++i) {
@@ -81,16 +73,6 @@ TEST(InverseNormal, IsMonotoneOnTheGridOfUniform) {
       previous = next;
     }
   }
-}
-
-TEST(InverseNormal, IncreasesOverTheWholeRange) {
-  double previous = inverse_normal(0x1p-53);
-  for (int i = 1; i < 1'000'000; ++i) {
-    const double next = inverse_normal(i * 1e-6);
-    ASSERT_GT(next, previous) << i;
-    previous = next;
-  }
-  EXPECT_GT(inverse_normal(1.0 - 0x1p-53), previous);
 }
 
 TEST(InverseNormalDeathTest, RefusesWhatIsNoProbability) {

@@ -44,32 +44,5 @@ TEST(Uniform, LiesOnCentresOf52BitCells) {
   EXPECT_EQ(uniform({0xffffffff, 0xffffffff, 0, 0}), 1.0 - 0x1p-53);
 }
 
-// Odd multiples of 2⁻⁵³, strictly inside (0, 1).
-TEST(Uniform, NeverReachesAnEndNorLeavesItsGrid) {
-  const RandomStream stream(3, RunIndex{0}, stream_id("grid"));
-  for (std::uint32_t i = 0; i < 100'000; ++i) {
-    const double u = uniform(stream.block(i));
-    ASSERT_GT(u, 0.0);
-    ASSERT_LT(u, 1.0);
-    const double multiple = u * 0x1p53;
-    ASSERT_EQ(std::fmod(multiple, 2.0), 1.0) << u;
-  }
-}
-
-// n = 10⁶: the mean's standard error is 1/√(12n), the second moment's √(4/45n). Five of each.
-TEST(Uniform, HasTheMomentsOfAUniform) {
-  constexpr std::uint32_t n = 1'000'000;
-  const RandomStream stream(3, RunIndex{0}, stream_id("moments"));
-  double first = 0.0;
-  double second = 0.0;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const double u = uniform(stream.block(i));
-    first += u;
-    second += u * u;
-  }
-  EXPECT_NEAR(first / n, 0.5, 5.0 / std::sqrt(12.0 * n));
-  EXPECT_NEAR(second / n, 1.0 / 3.0, 5.0 * std::sqrt(4.0 / (45.0 * n)));
-}
-
 }  // namespace
 }  // namespace proofmass

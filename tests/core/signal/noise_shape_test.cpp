@@ -1,18 +1,9 @@
 #include "core/signal/noise_shape.hpp"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <complex>
-#include <cstddef>
-#include <numbers>
-#include <random>
-#include <string>
-#include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -112,16 +103,6 @@ TEST(NoiseShape, OfWhiteNoiseIsOneGain) {
   EXPECT_NEAR(shape.psd(0.1, sample_period_s), 9.0, 1e-14);
 }
 
-TEST(NoiseShape, HasAllPolesInsideTheUnitCircle) {
-  for (const auto& [name, noise] : preset_channels()) {
-    const NoiseShape shape = shape_noise(noise, sample_period_s);
-    EXPECT_GT(shape.num_states(), 0U) << name;
-    for (std::size_t i = 0; i < shape.num_real; ++i)
-      EXPECT_LT(std::abs(shape.pole[i]), 1.0) << name;
-    EXPECT_LT(norm(shape.pair_pole), 1.0) << name;
-  }
-}
-
 /// The parallel form as s ← A s + u w, y = g w + c s.
 struct StateSpace {
   Eigen::MatrixXd transition;
@@ -162,32 +143,6 @@ TEST(NoiseShape, StartIsStationary) {
     const Eigen::MatrixXd next = system.transition * start * system.transition.transpose() +
                                  system.input * system.input.transpose();
     EXPECT_LT((next - start).cwiseAbs().maxCoeff(), 1e-9) << name;
-  }
-}
-
-/// ∫ psd df over [0, Nyquist]: Simpson's rule in ln f above 1e-9 Hz, below which the psd is
-/// constant.
-double integrated_psd(const NoiseShape& shape) {
-  constexpr double lowest_hz = 1e-9;
-  const double nyquist_hz = 0.5 / sample_period_s;
-  constexpr int num_steps = 40'000;
-  const double step = std::log(nyquist_hz / lowest_hz) / num_steps;
-  double sum = 0.0;
-  for (int i = 0; i <= num_steps; ++i) {
-    const double f = lowest_hz * std::exp(step * i);
-    const double weight = (i == 0 || i == num_steps) ? 1.0 : (i % 2 == 1 ? 4.0 : 2.0);
-    sum += weight * f * shape.psd(f, sample_period_s);
-  }
-  return sum * step / 3.0 + lowest_hz * shape.psd(lowest_hz, sample_period_s);
-}
-
-// The variance of the first output, from the start's covariance, is the integral of the spectrum.
-TEST(NoiseShape, FirstOutputHasTheVarianceOfTheSpectrum) {
-  for (const auto& [name, noise] : preset_channels()) {
-    const NoiseShape shape = shape_noise(noise, sample_period_s);
-    const Eigen::VectorXd output = state_space(shape).output;
-    const double variance = shape.gain * shape.gain + output.dot(start_covariance(shape) * output);
-    EXPECT_NEAR(variance / integrated_psd(shape), 1.0, 1e-8) << name;
   }
 }
 

@@ -1,17 +1,8 @@
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <numbers>
-#include <string>
-#include <vector>
-
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/simulation/sample_noise.hpp"
 #include "core/signal/noise_shape.hpp"
 #include "tests/support/averaged_spectrum.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,11 +1,6 @@
 #include "core/signal/periodogram.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <vector>
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -30,14 +30,6 @@ test::Selection selection(std::uint64_t repetition, std::uint32_t column = 0) {
   return {.seed = 95, .repetition = repetition, .column = column};
 }
 
-TEST(IntervalCoverage, OfTheMean) {
-  for (const std::size_t n : {20u, 100u, 1000u}) {
-    expect_nominal(coverage(0.0, [&](std::uint64_t i) {
-      return mean_interval(moments(test::normal_column(n, selection(i))), 0.95);
-    }));
-  }
-}
-
 // √(2/π) is the mean of |x|.
 TEST(IntervalCoverage, OfTheMeanOfMagnitudes) {
   for (const std::size_t n : {20u, 100u, 1000u}) {
@@ -142,31 +134,12 @@ TEST(IntervalCoverage, OfAProbability) {
   }));
 }
 
-/// Normal columns with linear correlation ½.
-struct Pair {
-  std::vector<double> x, y;
-};
-
-Pair correlated_pair(std::size_t n, std::uint64_t repetition) {
-  Pair pair{test::normal_column(n, selection(repetition, 0)),
-            test::normal_column(n, selection(repetition, 1))};
-  for (std::size_t i = 0; i < n; ++i) pair.y[i] = 0.5 * pair.x[i] + std::sqrt(0.75) * pair.y[i];
-  return pair;
-}
-
 // Welch's case: unequal counts, unequal deviations.
 TEST(IntervalCoverage, OfTheDifferenceOfCampaigns) {
   expect_nominal(coverage(0.0, [](std::uint64_t i) {
     std::vector<double> second = test::normal_column(25, selection(i, 1));
     for (double& value : second) value *= 3.0;
     return compare_unpaired(test::normal_column(60, selection(i, 0)), second, 0.95).interval;
-  }));
-}
-
-TEST(IntervalCoverage, OfTheDifferenceOfPairedCampaigns) {
-  expect_nominal(coverage(0.0, [](std::uint64_t i) {
-    const Pair pair = correlated_pair(30, i);
-    return mean_interval(moments(test::differences_of(pair.x, pair.y)), 0.95);
   }));
 }
 

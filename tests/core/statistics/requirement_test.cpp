@@ -274,11 +274,6 @@ TEST(WilksUpper, IsEmptyOnceUnknownValuesReachItsOrder) {
   EXPECT_FALSE(wilks_upper(std::span(values).first(121), {0.95, 0.95}, 3).has_value());
 }
 
-TEST(WilksUpper, IsEmptyWithTooFewValues) {
-  EXPECT_FALSE(wilks_upper(std::vector<double>(58, 1.0), {0.95, 0.95}).has_value());
-  EXPECT_TRUE(wilks_upper(std::vector<double>(59, 1.0), {0.95, 0.95}).has_value());
-}
-
 TEST(Tolerance, RefusesFractionsOutsideTheirRange) {
   EXPECT_EQ(test::message_of<InvalidArgument>([] {
               (void)wilks_order({1.0, 0.95}, 10);

@@ -1,5 +1,4 @@
 #include "core/error.hpp"
-#include "core/statistics/distribution.hpp"
 #include "core/statistics/requirement.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "tests/test.hpp"
@@ -253,38 +252,6 @@ Report report_after(std::optional<std::uint64_t> num_fixed) {
   };
 }
 
-/// The first number of runs, from `num_runs` on, of which the value of this order is a bound.
-std::uint64_t num_runs_for(std::uint64_t order, std::uint64_t num_runs) {
-  const auto is_bound = [&](std::uint64_t count) {
-    return tolerance_99_95.is_shown(binomial_at_most(static_cast<double>(order) - 1.0,
-                                                     static_cast<double>(count),
-                                                     1.0 - tolerance_99_95.coverage));
-  };
-  if (is_bound(num_runs)) return num_runs;
-  std::uint64_t too_few = num_runs, enough = 2 * num_runs;
-  for (; !is_bound(enough); enough *= 2) too_few = enough;
-  while (enough - too_few > 1) {
-    const std::uint64_t middle = too_few + (enough - too_few) / 2;
-    (is_bound(middle) ? enough : too_few) = middle;
-  }
-  return enough;
-}
-
-/// What a verdict of a fixed number at each look says.
-Said said_of_fixed_count(const ExceedanceCount& count) {
-  return {.is_met = fixed_count(count) == RequirementVerdict::met,
-          .num_runs_next = num_runs_for(count.num_exceedances + 1, count.num_runs)};
-}
-
-/// A verdict of a fixed number at the first look, and then the sequential one with all of the 5 %.
-Report report_of_both() {
-  return [then = report_after(std::nullopt)](const ExceedanceCount& count) {
-    Said said = then(count);
-    if (count.num_runs == 299) said.is_met = fixed_count(count) == RequirementVerdict::met;
-    return said;
-  };
-}
-
 // Just as often as allowed, where every "met" is an error, of which 5 % are allowed in all.
 TEST(Decide, KeepsTheConsumersRiskOfThoseWhoGoOnAsTheReportSays) {
   for (const std::uint64_t num_first : {100U, 299U}) {
@@ -296,16 +263,6 @@ TEST(Decide, KeepsTheConsumersRiskOfThoseWhoGoOnAsTheReportSays) {
     }
   }
   EXPECT_LE(ever_met(report_after(std::nullopt), 299, 30, 0.01)[30], 0.05);
-}
-
-// What was said before: a fixed number at each look. And why a fixed number at first and the
-// sequential rule from then on, each with 5 %, are no remedy: two chances are more than one.
-TEST(Decide, WouldNotKeepItWithOtherRules) {
-  const std::vector<double> fixed = ever_met(said_of_fixed_count, 299, 30, 0.01);
-  EXPECT_GT(fixed[1], 0.06);
-  EXPECT_GT(fixed[2], 0.09);
-  EXPECT_GT(fixed[30], 0.25);
-  EXPECT_GT(ever_met(report_of_both(), 299, 30, 0.01)[30], 0.06);
 }
 
 // It is no empty promise: a requirement that holds is met.

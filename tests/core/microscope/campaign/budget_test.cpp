@@ -90,29 +90,6 @@ TEST(BudgetAfterCalibration, OfThePapersMeanErrorsIsThePapersMeanColumn) {
   expect_printed_budget(errors, half_units, printed_mean);
 }
 
-TEST(BudgetAfterCalibration, OfThePapersWorstErrorsHasThePapersTotalAsPrinted) {
-  ParameterArray errors{};
-  for (const test::ParameterInfo& info : test::parameter_infos()) {
-    errors[index(info.parameter)] = info.published->worst;
-  }
-  EXPECT_NEAR(budget_after(Scenario{}, errors).total, 1.1e-15, 0.05e-15);
-}
-
-// Scaling every error by two doubles every entry exactly: a power of two rounds nothing.
-TEST(BudgetAfterCalibration, IsLinearInTheErrors) {
-  ParameterArray errors{}, doubled{};
-  for (const test::ParameterInfo& info : test::parameter_infos()) {
-    errors[index(info.parameter)] = info.published->mean;
-    doubled[index(info.parameter)] = 2.0 * info.published->mean;
-  }
-  const Budget once = budget_after(Scenario{}, errors);
-  const Budget twice = budget_after(Scenario{}, doubled);
-  for (std::size_t i = 0; i < num_budget_entries; ++i) {
-    EXPECT_EQ(twice.entries[i], 2.0 * once.entries[i]);
-  }
-  EXPECT_EQ(twice.total, 2.0 * once.total);
-}
-
 TEST(BudgetBeforeCalibration, IsThePapersTable) {
   // [Hardy2013] tab:Budget, m/s², with the digits it prints.
   constexpr std::array<double, num_budget_entries> printed{
@@ -186,10 +163,6 @@ TEST(TestGradientLevels, AreNotZeroWhereTheTestTurnsAgainstTheOrbit) {
   EXPECT_NEAR(levels.xz, 5.25 * e_n2, 1e-3 * levels.xz);
   EXPECT_NEAR(levels.yy, 3.0 * e_n2, 1e-3 * levels.yy);
   EXPECT_NEAR(levels.zz, 3.75 * e_n2, 1e-3 * levels.zz);
-  EXPECT_NEAR(levels.xx, 3.76e-8, 0.005e-8);
-  EXPECT_NEAR(levels.xz, 2.93e-8, 0.005e-8);
-  EXPECT_NEAR(levels.yy, 1.67e-8, 0.005e-8);
-  EXPECT_NEAR(levels.zz, 2.09e-8, 0.005e-8);
 }
 
 // An error of one metre makes an entry as large as the gradient's element, wherever the calibration
@@ -251,13 +224,6 @@ TEST(Budget, IsOfInstrumentsThatTheLawsMake) {
   const Budget nominal = budget_before(Scenario{});
   EXPECT_NEAR(budget.entries[3] / nominal.entries[3], 5.1e-3 / 2.6e-3, 1e-12);
   EXPECT_NEAR(budget.entries[4] / nominal.entries[4], 1.1e-3 / 2.6e-3, 1e-12);
-}
-
-TEST(Budget, TotalIsThePlainSumOfItsEntries) {
-  const Budget budget = budget_before(Scenario{});
-  double sum = 0.0;
-  for (const double entry : budget.entries) sum += entry;
-  EXPECT_EQ(budget.total, sum);
 }
 
 TEST(BudgetEntryInfos, CarryThePapersFiguresAndItsTotals) {

@@ -1,16 +1,10 @@
 #include "core/microscope/campaign/scenario.hpp"
 
-#include <gtest/gtest.h>
-
-#include <functional>
-#include <limits>
-#include <numbers>
-#include <set>
-#include <string>
 #include <type_traits>
 
 #include "core/error.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -18,12 +12,7 @@ namespace {
 std::string refusal_after(const std::function<void(Scenario&)>& change) {
   Scenario scenario;
   change(scenario);
-  try {
-    scenario.validate();
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of<ConfigError>([&] { scenario.validate(); });
 }
 
 TEST(Scenario, IsValidWithEveryPreset) {

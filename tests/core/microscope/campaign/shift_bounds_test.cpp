@@ -3,17 +3,12 @@
 
 #include "core/microscope/campaign/shift_bounds.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <numbers>
-#include <string>
-
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "tests/support/runs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -22,7 +17,7 @@ namespace {
 MicroscopeCampaign silent_campaign() {
   MicroscopeCampaign campaign;
   campaign.scenario.noise.scale = 0.0;
-  for (Dispersion& dispersion : campaign.dispersions) dispersion.law = Law::fixed;  // At 0.
+  campaign.dispersions = test::perfect_laws();
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 2;
   return campaign;
 }
@@ -70,13 +65,10 @@ TEST(RegressorLines, AreThoseOfTheSimulationInAFrameThatSpins) {
 std::string refusal_of(const std::function<void(MicroscopeCampaign&)>& change) {
   MicroscopeCampaign campaign;
   change(campaign);
-  try {
+  return test::message_of<ConfigError>([&] {
     campaign.validate();
     check_regressors(campaign.scenario);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  });
 }
 
 TEST(RegressorLines, MustBeThereWhereTheyAreFitted) {

@@ -347,27 +347,18 @@ TEST(NumberText, IsShortAndPlain) {
 
 TEST(NumberText, ReadsBackToTheSameBits) {
   using limits = std::numeric_limits<double>;
-  const std::array<double, 12> values{0.1,
-                                      1e-300,
-                                      -0.0,
-                                      0.0,
-                                      1.0 / 3.0,
-                                      limits::max(),
-                                      limits::min(),
-                                      limits::denorm_min(),
-                                      9007199254740993.0,
-                                      123456789012345680.0,
-                                      1e15,
-                                      4.84813681109536e-5};
-  for (const double value : values) {
-    EXPECT_EQ(bits_through_file(value), std::bit_cast<std::uint64_t>(value)) << value;
-  }
-}
-
-TEST(NumberText, ReadsBackToTheSameBitsForAnyFiniteNumber) {
+  std::vector<double> values{0.1,
+                             1e-300,
+                             -0.0,
+                             1.0 / 3.0,
+                             limits::max(),
+                             limits::min(),
+                             limits::denorm_min(),
+                             9007199254740993.0,
+                             123456789012345680.0};
   std::mt19937_64 bits(7);
-  for (int i = 0; i < 200; ++i) {
-    const auto value = std::bit_cast<double>(bits());
+  for (int i = 0; i < 200; ++i) values.push_back(std::bit_cast<double>(bits()));
+  for (const double value : values) {
     if (!std::isfinite(value)) continue;
     EXPECT_EQ(bits_through_file(value), std::bit_cast<std::uint64_t>(value)) << value;
   }

@@ -1,9 +1,5 @@
 #include "core/microscope/definition/made_environment.hpp"
 
-#include <array>
-#include <bit>
-#include <string>
-
 #include "core/campaign/definition.hpp"
 #include "core/definition/document.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"

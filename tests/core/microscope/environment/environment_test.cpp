@@ -39,6 +39,7 @@ TEST(HarmonicEnvironment, IsTheNominalOneByDefault) {
 // Amplitudes and phases that differ on every axis, so that none can stand in for another.
 TEST(HarmonicEnvironment, FollowsEachAxisOfItsConfiguration) {
   EnvironmentConfig config;
+  config.scale = 4.0;
   std::array<HarmonicAxis*, 6> axes{&config.linear_x,  &config.linear_y,  &config.linear_z,
                                     &config.angular_x, &config.angular_y, &config.angular_z};
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -54,23 +55,8 @@ TEST(HarmonicEnvironment, FollowsEachAxisOfItsConfiguration) {
       const double expected = axis.mean + axis.orbital * std::cos(m + axis.orbital_phase_rad) +
                               axis.twice_orbital * std::cos(2 * m + axis.twice_orbital_phase_rad);
       const double actual = i < 3 ? value.linear_m_s2[i] : value.angular_rad_s2[i - 3];
-      EXPECT_NEAR(actual, expected, 3e-13) << "axis " << i << " at " << t;
+      EXPECT_NEAR(actual, 4.0 * expected, 12e-13) << "axis " << i << " at " << t;
     }
-  }
-}
-
-TEST(HarmonicEnvironment, IsMultipliedByItsScale) {
-  EnvironmentConfig config;
-  const ExternalAcceleration one = value_at(Environment(config, no_table, period_s), 777.0);
-  config.scale = 4.0;
-  const ExternalAcceleration four = value_at(Environment(config, no_table, period_s), 777.0);
-  config.scale = 0.0;
-  const ExternalAcceleration none = value_at(Environment(config, no_table, period_s), 777.0);
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(four.linear_m_s2[i], 4.0 * one.linear_m_s2[i]);
-    EXPECT_EQ(four.angular_rad_s2[i], 4.0 * one.angular_rad_s2[i]);
-    EXPECT_EQ(none.linear_m_s2[i], 0.0);
-    EXPECT_EQ(none.angular_rad_s2[i], 0.0);
   }
 }
 
@@ -91,24 +77,11 @@ EnvironmentConfig from_file(double scale = 1.0) {
   return config;
 }
 
-TEST(TabulatedEnvironment, IsItsRowsAtTheirTimes) {
-  const EnvironmentTable rows = table(0.0, 6000.0);
-  Environment environment(from_file(), rows, period_s);
-  environment.begin_session(6000.0);
-  for (const EnvironmentRow& row : rows) {
-    const ExternalAcceleration value = value_at(environment, row.time_s);
-    for (std::size_t i = 0; i < 3; ++i) {
-      EXPECT_EQ(value.linear_m_s2[i], row.linear_m_s2[i]) << row.time_s;
-      EXPECT_EQ(value.angular_rad_s2[i], row.angular_rad_s2[i]) << row.time_s;
-    }
-  }
-}
-
 TEST(TabulatedEnvironment, IsLinearBetweenItsRows) {
   const EnvironmentTable rows = table(0.0, 6000.0);
   const Environment environment(from_file(3.0), rows, period_s);
   for (std::size_t k = 0; k + 2 < rows.size(); ++k) {
-    for (const double part : {0.125, 0.5, 0.995}) {
+    for (const double part : {0.0, 0.125, 0.5, 0.995}) {
       const ExternalAcceleration value = value_at(environment, rows[k].time_s + 50.0 * part);
       for (std::size_t i = 0; i < 3; ++i) {
         const double linear =
@@ -190,20 +163,14 @@ TEST(EnvironmentTable, IsReadWhereTheOrbitBeginsAnew) {
 EnvironmentTable valid_table() { return {{0.0, {}, {}}, {3000.0, {}, {}}, {5950.0, {}, {}}}; }
 
 std::string refusal(const EnvironmentTable& table) {
-  try {
-    validate_environment_table(table, period_s);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return test::message_of<ConfigError>([&] { validate_environment_table(table, period_s); });
 }
 
-TEST(EnvironmentTable, MayCoverJustOneOrbit) { EXPECT_EQ(refusal(valid_table()), "accepted"); }
-
-TEST(EnvironmentTable, MayStartBeforeTheSession) {
+TEST(EnvironmentTable, MayCoverJustOneOrbitAndStartBeforeTheSession) {
   EnvironmentTable table = valid_table();
+  EXPECT_EQ(refusal(table), "");
   table.front().time_s = -100.0;
-  EXPECT_EQ(refusal(table), "accepted");
+  EXPECT_EQ(refusal(table), "");
 }
 
 TEST(EnvironmentTable, HasALimitOfRows) {
@@ -211,7 +178,7 @@ TEST(EnvironmentTable, HasALimitOfRows) {
   for (std::size_t i = 0; i < table.size(); ++i) table[i].time_s = static_cast<double>(i);
   EXPECT_EQ(refusal(table), "environment.file = 200001 rows (must have 2 to 200000)");
   table.pop_back();
-  EXPECT_EQ(refusal(table), "accepted");
+  EXPECT_EQ(refusal(table), "");
 }
 
 TEST(EnvironmentTable, RefusesWhatIsNotFinite) {

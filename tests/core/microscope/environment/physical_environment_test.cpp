@@ -1,8 +1,5 @@
 #include "core/microscope/environment/physical_environment.hpp"
 
-#include <cmath>
-#include <numbers>
-
 #include "tests/test.hpp"
 
 namespace proofmass {

@@ -3,24 +3,17 @@
 
 #include "core/microscope/estimation/ep_test/ep_test.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <string>
-#include <vector>
-
 #include "core/math/instruction_set.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/support/runs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
+
+using test::fix;
 
 constexpr double orbit_s = 5950.0;
 constexpr double f_orb_rad_s = 2.0 * std::numbers::pi / orbit_s;
@@ -47,15 +40,8 @@ MicroscopeCampaign quiet_campaign(std::vector<Session> sessions) {
   MicroscopeCampaign campaign;
   campaign.scenario.sessions = std::move(sessions);
   campaign.scenario.noise.scale = 0.0;
-  for (Dispersion& law : campaign.dispersions) {
-    law = {.law = Law::fixed, .file = {}, .column = {}};
-  }
+  campaign.dispersions = test::perfect_laws();
   return campaign;
-}
-
-void fix(MicroscopeCampaign& campaign, std::string_view quantity, double value) {
-  const auto at = std::ranges::find(drawn_names(), quantity) - drawn_names().begin();
-  campaign.dispersions.at(static_cast<std::size_t>(at)).value = value;
 }
 
 TestEstimation estimate(const MicroscopeCampaign& campaign, const RunRecord& record,
@@ -117,26 +103,32 @@ constexpr std::size_t delta_x = index(TestParameter::a_c11_delta_x);
 constexpr std::size_t delta_z = index(TestParameter::a_c11_delta_z);
 constexpr std::size_t uncorrected = index(TestParameter::uncorrected);
 
-TEST(EpTest, FindsAViolationInEveryPointing) {
-  for (const double spin : {0.0, 4.5, -4.5, 17.5, -17.5}) {
-    MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
-    fix(campaign, "eotvos_parameter.masses_2_1", 1e-14);
-    const TestEstimation found = estimate(campaign);
-    EXPECT_NEAR(found.values[delta], 1e-14, 1e-17) << spin;
-    EXPECT_NEAR(found.values[delta_x], 0.0, 1e-11) << spin;
-    EXPECT_NEAR(found.values[delta_z], 0.0, 1e-11) << spin;
-  }
+/// Glitches that follow everything at once, and some telemetry; two fifths of the windows are lost.
+GapsConfig many_gaps() {
+  return {.glitch_rate_hz = 0.02,
+          .glitch_duration_s = 15.0,
+          .orbital = {.depth = 0.2, .phase_rad = 1.0},
+          .spin = {.depth = 0.3},
+          .test = {.depth = 0.5, .phase_rad = -0.7},
+          .telemetry_rate_hz = 1e-4,
+          .telemetry_duration_s = 300.0};
 }
 
-TEST(EpTest, FindsOffcentringsInEveryPointing) {
-  for (const double spin : {0.0, 4.5, -17.5}) {
-    MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
-    fix(campaign, "offcentring_m.x", 20e-6);
-    fix(campaign, "offcentring_m.z", -10e-6);
-    const TestEstimation found = estimate(campaign);
-    EXPECT_NEAR(found.values[delta], 0.0, 1e-17) << spin;
-    EXPECT_NEAR(found.values[delta_x], 20e-6, 1e-11) << spin;
-    EXPECT_NEAR(found.values[delta_z], -10e-6, 1e-11) << spin;
+// Γ_mes,dx is a sum of the regressors, a constant, and 1e-3 of δ that the averages and angles of
+// mrad leave. Whatever windows count, the fit finds the sum.
+TEST(EpTest, FindsViolationAndOffcentringsInEveryPointing) {
+  for (const GapsConfig& gaps : {GapsConfig{}, many_gaps()}) {
+    for (const double spin : {0.0, 4.5, -4.5, 17.5, -17.5}) {
+      MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
+      campaign.scenario.gaps = gaps;
+      fix(campaign, "eotvos_parameter.masses_2_1", 1e-14);
+      fix(campaign, "offcentring_m.x", 20e-6);
+      fix(campaign, "offcentring_m.z", -10e-6);
+      const TestEstimation found = estimate(campaign);
+      EXPECT_NEAR(found.values[delta], 1e-14, 2e-17) << spin;
+      EXPECT_NEAR(found.values[delta_x], 20e-6, 1e-11) << spin;
+      EXPECT_NEAR(found.values[delta_z], -10e-6, 1e-11) << spin;
+    }
   }
 }
 
@@ -149,18 +141,23 @@ TEST(EpTest, JoinsSessionsAndRemovesTheBiasOfEach) {
   EXPECT_NEAR(estimate(campaign).values[delta], -3e-14, 3e-17);
 }
 
+/// Expects that `budget` is taken for δ where the calibration knows nothing, and nothing is where
+/// it knows the truth.
+void expect_error(const MicroscopeCampaign& campaign, double budget) {
+  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  EXPECT_GT(std::abs(budget), 1e-17);
+  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
+  const TestEstimation calibrated = estimate(campaign, record, record.truth);
+  EXPECT_NEAR(calibrated.values[delta], 0.0, 1e-18);
+  EXPECT_NEAR(calibrated.values[uncorrected], budget, 0.01 * std::abs(budget));
+}
+
 // Γ_mes,dx holds a_d11 Γ_mes,cx, so that 2 a_d11 Γ_res,x is taken for δ g.
 TEST(EpTest, HasTheErrorOfAScaleFactorInItsBudget) {
   MicroscopeCampaign campaign = circular_campaign();
   fix(campaign, "scale_factor_error.sensor_1_x", 5e-3);
   fix(campaign, "scale_factor_error.sensor_2_x", -5e-3);
-  const double budget = 2.0 * 5e-3 * in_phase(campaign, common_x);
-  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
-  EXPECT_GT(std::abs(budget), 1e-16);
-  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
-  const TestEstimation calibrated = estimate(campaign, record, record.truth);
-  EXPECT_NEAR(calibrated.values[delta], 0.0, 1e-18);
-  EXPECT_NEAR(calibrated.values[uncorrected], budget, 0.01 * std::abs(budget));
+  expect_error(campaign, 2.0 * 5e-3 * in_phase(campaign, common_x));
 }
 
 // The loop of 2013 leaves 3e-10 m/s² at 3.1 mHz, so that an uncalibrated scale factor makes 1e-13
@@ -193,13 +190,7 @@ TEST(EpTest, HasTheErrorOfAMisalignmentInItsBudget) {
   campaign.scenario.environment.linear_y.orbital_phase_rad = 0.0;
   fix(campaign, "misalignment_rad.sensor_1_z", 1e-3);
   fix(campaign, "misalignment_rad.sensor_2_z", -1e-3);
-  const double budget = 2.0 * 1e-3 * in_phase(campaign, common_y);
-  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
-  EXPECT_GT(std::abs(budget), 1e-17);
-  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
-  const TestEstimation calibrated = estimate(campaign, record, record.truth);
-  EXPECT_NEAR(calibrated.values[delta], 0.0, 1e-18);
-  EXPECT_NEAR(calibrated.values[uncorrected], budget, 0.01 * std::abs(budget));
+  expect_error(campaign, 2.0 * 1e-3 * in_phase(campaign, common_y));
 }
 
 // 4 K2c Γ_d Γ_res,x, of a constant Γ_d. a_d11' takes it up.
@@ -210,13 +201,7 @@ TEST(EpTest, HasTheErrorOfAQuadraticFactorInItsBudget) {
     fix(campaign, "parasitic_acceleration_m_s2.sensor_" + std::to_string(sensor) + "_x",
         sensor == 1 ? -1.43e-8 : 1.43e-8);
   }
-  const double budget = 4.0 * 14000.0 * 1.43e-8 * in_phase(campaign, common_x);
-  const RunRecord record = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
-  EXPECT_GT(std::abs(budget), 1e-17);
-  EXPECT_NEAR(estimate(campaign, record).values[delta], budget, 0.01 * std::abs(budget));
-  const TestEstimation calibrated = estimate(campaign, record, record.truth);
-  EXPECT_NEAR(calibrated.values[delta], 0.0, 1e-18);
-  EXPECT_NEAR(calibrated.values[uncorrected], budget, 0.01 * std::abs(budget));
+  expect_error(campaign, 4.0 * 14000.0 * 1.43e-8 * in_phase(campaign, common_x));
 }
 
 // a_c12 T_yy Δy, whose gradient the orbit's eccentricity makes.
@@ -232,33 +217,6 @@ TEST(EpTest, HasTheErrorOfAnOffcentringAcrossInItsBudget) {
   const double budget = test_gradient_levels(campaign.scenario).yy * 2e-3 * 20e-6 / gravity;
   EXPECT_NEAR(std::abs(estimate(campaign, record).values[delta]), budget, 0.01 * budget);
   EXPECT_NEAR(estimate(campaign, record, record.truth).values[delta], 0.0, 1e-18);
-}
-
-/// Glitches that follow everything at once, and some telemetry; two fifths of the windows are lost.
-GapsConfig many_gaps() {
-  return {.glitch_rate_hz = 0.02,
-          .glitch_duration_s = 15.0,
-          .orbital = {.depth = 0.2, .phase_rad = 1.0},
-          .spin = {.depth = 0.3},
-          .test = {.depth = 0.5, .phase_rad = -0.7},
-          .telemetry_rate_hz = 1e-4,
-          .telemetry_duration_s = 300.0};
-}
-
-// Γ_mes,dx is a sum of the regressors, a constant, and 1e-3 of δ that the averages and angles of
-// mrad leave. Whatever windows count, the fit finds the sum.
-TEST(EpTest, FindsViolationAndOffcentringsInWhatIsLeftOfTheData) {
-  for (const double spin : {0.0, 4.5, -17.5}) {
-    MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, spin)});
-    campaign.scenario.gaps = many_gaps();
-    fix(campaign, "eotvos_parameter.masses_2_1", 1e-14);
-    fix(campaign, "offcentring_m.x", 20e-6);
-    fix(campaign, "offcentring_m.z", -10e-6);
-    const TestEstimation found = estimate(campaign);
-    EXPECT_NEAR(found.values[delta], 1e-14, 2e-17) << spin;
-    EXPECT_NEAR(found.values[delta_x], 20e-6, 1e-11) << spin;
-    EXPECT_NEAR(found.values[delta_z], -10e-6, 1e-11) << spin;
-  }
 }
 
 // White noise, from the covariance of windows that overlap by half: its density at a low frequency
@@ -290,55 +248,39 @@ struct Coverage {
   double rms = 0.0;  ///< Of error over standard error.
 };
 
-/// Of the Eötvös parameter.
-Coverage coverage(double spin, int num_orbits, const NoiseConfig& noise = {},
-                  const GapsConfig& gaps = {}) {
+/// Of the Eötvös parameter in 208 runs.
+Coverage coverage(double spin, const NoiseConfig& noise, const GapsConfig& gaps) {
   constexpr std::uint64_t num_runs = 208;
   MicroscopeCampaign campaign;
   campaign.scenario.noise = noise;
-  campaign.scenario.sessions = {test_session("ep", num_orbits, spin)};
+  campaign.scenario.sessions = {test_session("ep", 2, spin)};
   campaign.scenario.gaps = gaps;
-  const RunPlan plan(campaign, no_calibration);
   Coverage found;
-  for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
-    std::vector<RunRequest> requests;
-    for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
-    for (const RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
-      const TestEstimation test = estimate(campaign, record, record.truth);
-      constexpr std::size_t eotvos = index(TestParameter::eotvos_parameter);
-      const double ratio = (test.values[eotvos] - record.eotvos_parameter) / test.standard_error;
-      if (std::abs(ratio) < 1.959964) found.within_95 += 1.0 / num_runs;
-      found.rms += ratio * ratio / num_runs;
-    }
+  for (const RunRecord& record : test::recorded(RunPlan(campaign, no_calibration), num_runs)) {
+    const TestEstimation test = estimate(campaign, record, record.truth);
+    constexpr std::size_t eotvos = index(TestParameter::eotvos_parameter);
+    const double ratio = (test.values[eotvos] - record.eotvos_parameter) / test.standard_error;
+    if (std::abs(ratio) < 1.959964) found.within_95 += 1.0 / num_runs;
+    found.rms += ratio * ratio / num_runs;
   }
   found.rms = std::sqrt(found.rms);
   return found;
 }
 
+// Of all data and of what gaps leave, where the formula for lines would be exceeded by half in the
+// mean; and with noise of wires that differs in both sensors by a factor of ten in density. Three
+// binomial deviations; the deviation of the rms is 1/√(2·208).
 TEST(EpTest, HasAnHonestStandardError) {
-  for (const double spin : {0.0, 17.5}) {
-    const Coverage found = coverage(spin, 2);
-    // Three binomial deviations; the deviation of the rms is 1/√(2·208).
-    EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin;
-    EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin;
+  NoiseConfig of_each_sensor = noise_preset(NoisePreset::wire_suref);
+  of_each_sensor.linear_factor = {1.0, 0.5};
+  for (const GapsConfig& gaps : {GapsConfig{}, many_gaps()}) {
+    for (const auto& [spin, noise] : {std::pair(0.0, NoiseConfig{}), std::pair(17.5, NoiseConfig{}),
+                                      std::pair(17.5, of_each_sensor)}) {
+      const Coverage found = coverage(spin, noise, gaps);
+      EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin;
+      EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin;
+    }
   }
-}
-
-// Of a wire whose noise differs in both sensors by a factor of ten in density.
-TEST(EpTest, HasAnHonestStandardErrorWithNoiseOfEachSensor) {
-  NoiseConfig noise = noise_preset(NoisePreset::wire_suref);
-  noise.linear_factor = {1.0, 0.5};
-  const Coverage found = coverage(17.5, 2, noise);
-  EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208));
-  EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208));
-}
-
-TEST(EpTest, HasAnHonestStandardErrorOfWhatIsLeftWithNoiseOfEachSensor) {
-  NoiseConfig noise = noise_preset(NoisePreset::wire_suref);
-  noise.linear_factor = {1.0, 0.5};
-  const Coverage found = coverage(17.5, 2, noise, many_gaps());
-  EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208));
-  EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208));
 }
 
 /// A test whose loop nulls the outer mass, calibrated by the truth.
@@ -382,15 +324,6 @@ TEST(EpTest, FindsAViolationFarFromTheCentreOfMassOnTheOuterMass) {
   EXPECT_NEAR(estimate(campaign).values[delta_x], 35e-6, 1e-11);
 }
 
-TEST(EpTest, HasAnHonestStandardErrorOfWhatIsLeftOfTheData) {
-  for (const double spin : {0.0, 17.5}) {
-    const Coverage found = coverage(spin, 2, {}, many_gaps());
-    // As above. The formula for lines would be exceeded by half in the mean, and more at 17.5.
-    EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin;
-    EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin;
-  }
-}
-
 TEST(EpTest, HasTheSameBitsOnEveryInstructionSet) {
   MicroscopeCampaign campaign;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
@@ -413,21 +346,15 @@ TEST(EpTest, HasTheSameBitsOnEveryInstructionSet) {
     campaign.validate();
     const RunPlan plan(campaign);
     EXPECT_FALSE(plan.runs_on_devices());
-    std::vector<RunRequest> requests;
-    for (std::uint64_t i = 0; i < 3; ++i) requests.push_back({RunIndex{i}, {}});
-    const std::vector<RunResult> alone = plan.simulate_batch(requests, InstructionSet::scalar);
-    while (requests.size() < batch_lanes) {
-      requests.push_back({RunIndex{requests.size()}, {}});
-    }
+    const std::vector<RunRequest> requests = test::requests_from(0, batch_lanes);
+    const std::vector<RunResult> alone =
+        plan.simulate_batch(std::span(requests).first(3), InstructionSet::scalar);
     for (const InstructionSet set : available_instruction_sets()) {
       if (set == InstructionSet::scalar) continue;
       for (const std::size_t size : {std::size_t{3}, batch_lanes}) {
         const auto batch = plan.simulate_batch(std::span(requests).first(size), set);
         for (std::size_t i = 0; i < alone.size(); ++i) {
-          EXPECT_EQ(batch[i].status, alone[i].status);
-          EXPECT_EQ(batch[i].estimate, alone[i].estimate);
-          EXPECT_EQ(batch[i].standard_error, alone[i].standard_error);
-          EXPECT_EQ(batch[i].correlations, alone[i].correlations);
+          EXPECT_EQ(test::bits_of(batch[i]), test::bits_of(alone[i]));
         }
       }
     }

@@ -1,18 +1,12 @@
 // The joint estimation on simulated runs of the paper's sessions: what it finds without noise, and
 // whether its standard errors are honest with it.
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <bit>
-#include <cmath>
-#include <string_view>
-#include <vector>
-
 #include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/runs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -27,12 +21,8 @@ struct Outcome {
 std::vector<Outcome> simulated(const MicroscopeCampaign& campaign, std::uint64_t num_runs) {
   const RunPlan plan(campaign, joint_method);
   std::vector<Outcome> runs;
-  for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
-    std::vector<RunRequest> requests;
-    for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
-    for (const RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
-      runs.push_back({record.truth, plan.estimation(record)});
-    }
+  for (const RunRecord& record : test::recorded(plan, num_runs)) {
+    runs.push_back({record.truth, plan.estimation(record)});
   }
   return runs;
 }
@@ -150,11 +140,6 @@ Dispersion normal_law(Law law, double mean, double deviation) {
   return normal;
 }
 
-Dispersion& law_of(MicroscopeCampaign& campaign, std::string_view name) {
-  const auto found = std::ranges::find(drawn_names(), name);
-  return campaign.dispersions.at(static_cast<std::size_t>(found - drawn_names().begin()));
-}
-
 // Nuisances as large as what noise makes of the parameters, by laws that are neither uniform nor
 // normal nor independent. Of a_c12 no session tells η_cz: half the sum of two values with the
 // correlation −0.9, a twentieth of the variance of one of them; taken for independent, its error
@@ -166,19 +151,19 @@ TEST(JointCampaign, HasHonestStandardErrorsUnderEveryLaw) {
   MicroscopeCampaign campaign;
   campaign.seed = 45;
   campaign.scenario.acceptance = {.a_d11_max = 0.1, .a_d1j_max_rad = 0.1, .a_c1j_max_rad = 0.1};
-  law_of(campaign, "coupling_rad.sensor_1_z") = normal_law(Law::normal, 0.0, 3e-3);
-  Dispersion& correlated = law_of(campaign, "coupling_rad.sensor_2_z");
+  test::law_of(campaign, "coupling_rad.sensor_1_z") = normal_law(Law::normal, 0.0, 3e-3);
+  Dispersion& correlated = test::law_of(campaign, "coupling_rad.sensor_2_z");
   correlated = normal_law(Law::correlated, 2e-3, 3e-3);
   correlated.with = {"coupling_rad.sensor_1_z"};
   correlated.correlations = {-0.9};
-  Dispersion& discrete = law_of(campaign, "coupling_rad.sensor_1_y");
+  Dispersion& discrete = test::law_of(campaign, "coupling_rad.sensor_1_y");
   discrete.law = Law::discrete;
   discrete.values = {0.0, 5e-3};
   discrete.probabilities = {0.9, 0.1};
-  Dispersion& derived = law_of(campaign, "coupling_rad.sensor_2_y");
+  Dispersion& derived = test::law_of(campaign, "coupling_rad.sensor_2_y");
   derived.law = Law::derived;
   derived.expression = "coupling_rad.sensor_1_y";
-  Dispersion& truncated = law_of(campaign, "read_out_bias_m_s2.sensor_1_x");
+  Dispersion& truncated = test::law_of(campaign, "read_out_bias_m_s2.sensor_1_x");
   truncated = normal_law(Law::truncated, 0.0, 1e-8);
   truncated.minimum = 3e-8;
   truncated.maximum = 6e-8;
@@ -240,8 +225,7 @@ TEST(JointCampaign, HasTheBitsOfARunAloneInABatch) {
   for (const InstructionSet set : available_instruction_sets()) {
     if (set == InstructionSet::scalar) continue;
     for (const std::uint64_t size : {2U, 16U}) {
-      std::vector<RunRequest> requests;
-      for (std::uint64_t i = 0; i < size; ++i) requests.push_back({RunIndex{i}, {}});
+      const auto requests = test::requests_from(0, size);
       const Estimation found = plan.estimation(plan.record_batch(requests, set)[1]);
       for (std::size_t i = 0; i < num_parameters; ++i) {
         EXPECT_EQ(std::bit_cast<std::uint64_t>(found.values[i]),

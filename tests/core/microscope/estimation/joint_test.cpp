@@ -3,15 +3,8 @@
 
 #include "core/microscope/estimation/joint/joint.hpp"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <complex>
-#include <numbers>
-#include <vector>
 
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
@@ -20,6 +13,7 @@
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/random/stream.hpp"
 #include "core/signal/line_weights.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -333,12 +327,7 @@ TEST(JointModel, HasTheDerivativesOfItsValue) {
 }
 
 std::string refusal(const std::vector<Session>& sessions) {
-  try {
-    check_joint(sessions);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of<ConfigError>([&] { check_joint(sessions); });
 }
 
 TEST(Joint, RefusesSessionsThatCannotTellEveryParameter) {

@@ -3,14 +3,10 @@
 
 #include "core/microscope/estimation/ep_test/window_weights.hpp"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <cmath>
-#include <numbers>
-#include <vector>
 
 #include "core/microscope/instrument/noise_config.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -18,12 +18,7 @@ Dispersion law(Law kind, double minimum = 0.0, double maximum = 0.0, double mean
 }
 
 std::string refusal_of(const Dispersion& dispersion) {
-  try {
-    dispersion.validate("d");
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of<ConfigError>([&] { dispersion.validate("d"); });
 }
 
 TEST(DrawGroups, CoverAllDrawnQuantitiesOnce) {

@@ -1,12 +1,8 @@
 #include "core/microscope/instrument/noise_config.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "core/microscope/simulation/sample_noise.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -31,7 +31,7 @@ Anomalies anomalies(const OrbitPoint& point, double eccentricity) {
 TEST(KeplerOrbit, SolvesKeplersEquation) {
   for (const double e : eccentricities()) {
     const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = e});
-    for (int k = 0; k < 6000; ++k) {
+    for (int k = -3000; k < 6000; ++k) {
       const OrbitPoint point = orbit.at(0.99991 * k);
       const auto [eccentric, radius_ratio] = anomalies(point, e);
       const long double mean = 2.0L * std::numbers::pi_v<long double> * (0.99991 * k) / 5950.0L;
@@ -63,72 +63,12 @@ TEST(KeplerOrbit, TakesBatchesOfTimesUpToAnEccentricityOf0p008) {
   EXPECT_FALSE(eccentric.at_lanes(500.0).has_value());
 }
 
-TEST(KeplerOrbit, DirectionIsAUnitVector) {
-  for (const double e : eccentricities()) {
-    const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = e});
-    for (int k = 0; k < 1000; ++k) {
-      const OrbitPoint p = orbit.at(5.951 * k);
-      ASSERT_NEAR(p.radial_I_x * p.radial_I_x + p.radial_I_z * p.radial_I_z, 1.0,
-                  2e-15 / (1.0 - e));
-    }
-  }
-}
-
-TEST(KeplerOrbit, StartsAtPerigeeAndMovesTowardsZ) {
-  const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = 0.1});
-  const OrbitPoint start = orbit.at(0.0);
-  EXPECT_EQ(start.radial_I_x, 1.0);
-  EXPECT_EQ(start.radial_I_z, 0.0);
-  const double n = two_pi / 5950.0;
-  EXPECT_NEAR(start.gradient_s2 / (n * n / (0.9 * 0.9 * 0.9)), 1.0, 1e-15);
-  EXPECT_GT(orbit.at(1.0).radial_I_z, 0.0);
-  EXPECT_NEAR(orbit.at(2975.0).radial_I_x, -1.0, 1e-15);  // Apogee.
-}
-
-// From t to −t the orbit mirrors; a period on it repeats, within the rounding of t/period.
-TEST(KeplerOrbit, IsSymmetricAboutPerigeeAndPeriodic) {
-  const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = 5e-3});
-  for (const double t : {0.25, 100.0, 1234.5, 4000.0}) {
-    const OrbitPoint after = orbit.at(t);
-    const OrbitPoint before = orbit.at(-t);
-    EXPECT_NEAR(before.radial_I_x, after.radial_I_x, 1e-15);
-    EXPECT_NEAR(before.radial_I_z, -after.radial_I_z, 1e-15);
-    EXPECT_NEAR(before.gradient_s2 / after.gradient_s2, 1.0, 1e-15);
-    const OrbitPoint later = orbit.at(t + 40 * 5950.0);
-    EXPECT_NEAR(later.radial_I_x, after.radial_I_x, 1e-13);
-    EXPECT_NEAR(later.radial_I_z, after.radial_I_z, 1e-13);
-  }
-}
-
 TEST(KeplerOrbit, GivesSineAndCosineOfTheMeanAnomaly) {
   const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = 0.3});
   for (int k = -50; k < 50; ++k) {
     const double t = 131.7 * k;
     EXPECT_NEAR(orbit.at(t).mean_anomaly.sine, std::sin(two_pi * t / 5950.0), 1e-14);
     EXPECT_NEAR(orbit.at(t).mean_anomaly.cosine, std::cos(two_pi * t / 5950.0), 1e-14);
-  }
-}
-
-// r² dν/dt = n a² √(1 − e²). The derivative comes from a step h of 10 s: its error is h²/6 times
-// the third derivative, which is below 30 n² of the first for e ≤ 0.3: 6e-4. Halving the step and
-// extrapolating leaves the fourth order, below 1e-6.
-TEST(KeplerOrbit, SweepsEqualAreasInEqualTimes) {
-  for (const double e : {5e-3, 0.05, 0.3}) {
-    const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = e});
-    const double n = orbit.mean_motion_rad_s();
-    const auto rate = [&](double t, double half_step) {
-      const OrbitPoint a = orbit.at(t - half_step);
-      const OrbitPoint b = orbit.at(t + half_step);
-      const double sine = a.radial_I_x * b.radial_I_z - a.radial_I_z * b.radial_I_x;
-      return std::asin(sine) / (2.0 * half_step);
-    };
-    for (int k = 0; k < 200; ++k) {
-      const double t = 29.75 * k;
-      const double angular_rate = (4.0 * rate(t, 5.0) - rate(t, 10.0)) / 3.0;
-      const double radius_ratio = std::cbrt(n * n / orbit.at(t).gradient_s2);
-      EXPECT_NEAR(radius_ratio * radius_ratio * angular_rate / n, std::sqrt(1.0 - e * e), 1e-6)
-          << t;
-    }
   }
 }
 
@@ -159,22 +99,9 @@ double amplitude(const KeplerOrbit& orbit, double Gradient::*component, int mult
 }
 
 // With (a/r)³ = 1 + 3e²/2 + (3e + 27e³/8) cos M + …, and (a/r)³ cos 2ν and (a/r)³ sin 2ν whose
-// Hansen coefficients are −e/2 + e³/16, 1 − 5e²/2 and e³/48 at 1, 2 and −1 [Kaula1966] table 2. The
-// order that the leading terms leave is at most 2.42 e².
-TEST(KeplerOrbit, HasTheGradientAmplitudesOfFirstOrder) {
-  const double e = 5e-3;
-  const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = e});
-  const double tolerance = 2.5 * e * e;
-  EXPECT_NEAR(amplitude(orbit, &Gradient::xx, 1) / (0.75 * e), 1.0, tolerance);
-  EXPECT_NEAR(amplitude(orbit, &Gradient::xz, 1) / (0.75 * e), 1.0, tolerance);
-  EXPECT_NEAR(amplitude(orbit, &Gradient::yy, 1) / (3.0 * e), 1.0, tolerance);
-  EXPECT_NEAR(amplitude(orbit, &Gradient::zz, 1) / (2.25 * e), 1.0, tolerance);
-  EXPECT_NEAR(amplitude(orbit, &Gradient::xx, 2) / 1.5, 1.0, tolerance);
-  EXPECT_NEAR(amplitude(orbit, &Gradient::xz, 2) / 1.5, 1.0, 1.01 * tolerance);
-}
-
-// The next order of the same series: 29/12, 1/12, 9/8 and 25/36 of e² at f_orb, −1 and −5/2 at 2
-// f_orb; what it leaves is of the order e⁴.
+// Hansen coefficients are −e/2 + e³/16, 1 − 5e²/2 and e³/48 at 1, 2 and −1 [Kaula1966] table 2: to
+// the first order 3e/4, 3e/4, 3e and 9e/4 at f_orb, of which 29/12, −1/12, 9/8 and 25/36 of e² are
+// the next, and 3/2 (1 − e²) and 3/2 (1 − 5e²/2) at 2 f_orb. What is left out is of the order e⁴.
 TEST(KeplerOrbit, HasTheGradientAmplitudesOfSecondOrder) {
   const double e = 0.02;
   const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = e});
@@ -291,16 +218,6 @@ TEST(InertiaGradient, IsItsDefinitionByCrossProducts) {
   }
 }
 
-// A point at rest on a frame that spins about Y falls outwards: Ω∧(Ω∧v) = −Ω² v for v across the
-// axis.
-TEST(InertiaGradient, IsCentripetalAcrossTheAxis) {
-  const Vector3<double> result = inertia_gradient(Vector3<double>{0.0, 2.0, 0.0}, Vector3<double>{},
-                                                  Vector3<double>{3.0, 5.0, 7.0});
-  EXPECT_EQ(result.x, -12.0);
-  EXPECT_EQ(result.y, 0.0);
-  EXPECT_EQ(result.z, -28.0);
-}
-
 TEST(GradientMatrix, IsGravityMinusInertia) {
   std::mt19937_64 bits(11);
   for (int i = 0; i < 1000; ++i) {
@@ -308,20 +225,6 @@ TEST(GradientMatrix, IsGravityMinusInertia) {
     const Eigen::Matrix3d actual =
         eigen(gradient_matrix(gradient_s2, m.direction, m.rate, m.acceleration));
     EXPECT_LT((actual - (gravity_matrix(m) - inertia_matrix(m))).norm(), tolerance);
-  }
-}
-
-// Trace [T] = 0 outside the Earth, trace [In] = −2Ω².
-TEST(GradientMatrix, HasTheTraceOfTheRotationAlone) {
-  std::mt19937_64 bits(12);
-  for (int i = 0; i < 1000; ++i) {
-    const Motion m = random_motion(bits);
-    const Eigen::Matrix3d still = eigen(gradient_matrix(gradient_s2, m.direction, {}, {}));
-    EXPECT_NEAR(still.trace(), 0.0, tolerance);
-    EXPECT_LT((still - still.transpose()).norm(), tolerance);
-    const Eigen::Matrix3d turning =
-        eigen(gradient_matrix(gradient_s2, m.direction, m.rate, m.acceleration));
-    EXPECT_NEAR(turning.trace(), 2.0 * dot(m.rate, m.rate), tolerance);
   }
 }
 

@@ -3,26 +3,14 @@
 
 #include "core/microscope/planning/plan_study.hpp"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/Dense>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <complex>
-#include <functional>
-#include <numbers>
-#include <span>
-#include <string_view>
-#include <vector>
-
 #include "core/campaign/allocation.hpp"
-#include "core/campaign/dispersion.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/runs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -32,9 +20,7 @@ constexpr double turn_rad = 2.0 * std::numbers::pi;
 /// An instrument without errors, whose sensors have white noise.
 MicroscopeCampaign perfect_campaign() {
   MicroscopeCampaign campaign;
-  for (Dispersion& dispersion : campaign.dispersions) {
-    dispersion = {.law = Law::fixed, .file = {}, .column = {}};
-  }
+  campaign.dispersions = test::perfect_laws();
   campaign.scenario.noise.linear_x = {.white_asd = 1e-12};
   return campaign;
 }
@@ -113,13 +99,6 @@ MicroscopeCampaign simultaneous_campaign() {
   return campaign;
 }
 
-/// Fixes what makes standard errors differ from one instrument to another.
-void fix(MicroscopeCampaign& campaign, std::string_view name, double value) {
-  const auto found = std::ranges::find(drawn_names(), name);
-  campaign.dispersions[static_cast<std::size_t>(found - drawn_names().begin())] = {
-      .law = Law::fixed, .value = value, .file = {}, .column = {}};
-}
-
 /// Of the mean over the parameters of pull² in a run: two squares of normal variables with the
 /// correlation ρ have the covariance 2ρ².
 double variance_of_squares(const std::array<ParameterArray, num_parameters>& correlations) {
@@ -136,33 +115,29 @@ TEST(PlanStudy, IsWhatTheEstimatorStates) {
   constexpr std::uint64_t num_runs = 16 * batch_lanes;
   MicroscopeCampaign campaign = simultaneous_campaign();
   campaign.seed = 61;
-  fix(campaign, "offcentring_m.x", 1e-5);
-  fix(campaign, "offcentring_m.y", -1.5e-5);
-  fix(campaign, "offcentring_m.z", 0.8e-5);
-  fix(campaign, "quadratic_factor_s2_m.sensor_1_x", 8000.0);
-  fix(campaign, "quadratic_factor_s2_m.sensor_2_x", -3000.0);
+  test::fix(campaign, "offcentring_m.x", 1e-5);
+  test::fix(campaign, "offcentring_m.y", -1.5e-5);
+  test::fix(campaign, "offcentring_m.z", 0.8e-5);
+  test::fix(campaign, "quadratic_factor_s2_m.sensor_1_x", 8000.0);
+  test::fix(campaign, "quadratic_factor_s2_m.sensor_2_x", -3000.0);
   campaign.validate();
   const auto study = study_plan(campaign);
   const PlanBound bound = study->bound(study->num_steps());
   const RunPlan plan(campaign);
   std::vector<double> means(num_parameters);
   double squares = 0.0, variance = 0.0, chi_squared = 0.0, freedom = 0.0;
-  for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
-    std::vector<RunRequest> requests;
-    for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
-    for (const RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
-      const Estimation found = plan.estimation(record);
-      EXPECT_TRUE(found.converged);
-      for (std::size_t i = 0; i < num_parameters; ++i) {
-        const double pull = (found.values[i] - record.truth[i]) / found.standard_errors[i];
-        means[i] += found.standard_errors[i] / static_cast<double>(num_runs);
-        squares += pull * pull / static_cast<double>(num_runs * num_parameters);
-      }
-      variance += variance_of_squares(found.correlations) / std::pow(num_runs, 2.0);
-      for (const SessionFit& fit : found.session_fits) {
-        chi_squared += fit.chi_squared;
-        freedom += fit.degrees_of_freedom;
-      }
+  for (const RunRecord& record : test::recorded(plan, num_runs)) {
+    const Estimation found = plan.estimation(record);
+    EXPECT_TRUE(found.converged);
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      const double pull = (found.values[i] - record.truth[i]) / found.standard_errors[i];
+      means[i] += found.standard_errors[i] / static_cast<double>(num_runs);
+      squares += pull * pull / static_cast<double>(num_runs * num_parameters);
+    }
+    variance += variance_of_squares(found.correlations) / std::pow(num_runs, 2.0);
+    for (const SessionFit& fit : found.session_fits) {
+      chi_squared += fit.chi_squared;
+      freedom += fit.degrees_of_freedom;
     }
   }
   for (std::size_t i = 0; i < num_parameters; ++i) {
@@ -178,48 +153,6 @@ MicroscopeCampaign fixed_campaign() {
   MicroscopeCampaign campaign = simultaneous_campaign();
   campaign.dispersions = perfect_campaign().dispersions;
   return campaign;
-}
-
-// Correlations of the estimates can only make it more probable that all objectives hold.
-TEST(PlanStudy, BoundsTheChanceOfCorrelatedEstimates) {
-  MicroscopeCampaign campaign = fixed_campaign();
-  const std::vector<int> orbits = study_plan(campaign)->num_steps();
-  const PlanBound before = study_plan(campaign)->bound(orbits);
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    campaign.scenario.objectives[i] = before.standard_errors[i];
-  }
-  const double hold = 1.0 - study_plan(campaign)->bound(orbits).misses_any;
-  EXPECT_NEAR(hold, std::pow(std::erf(std::sqrt(0.5)), 10.0), 1e-6);
-  using Matrix = Eigen::Matrix<double, num_parameters, num_parameters>;
-  const auto chance = [](const Matrix& correlations) {
-    const Matrix root = correlations.llt().matrixL();
-    constexpr std::uint64_t num_draws = 40'000;
-    double sum = 0.0;
-    for (std::uint64_t draw = 0; draw < num_draws; ++draw) {
-      Eigen::Vector<double, num_parameters> z;
-      for (std::size_t i = 0; i < num_parameters; ++i) {
-        const std::string_view name = test::parameter_infos()[i].name;
-        z[static_cast<Eigen::Index>(i)] = draw_deviate(name, 5, RunIndex{draw}, 0);
-      }
-      if ((root * z).cwiseAbs().maxCoeff() <= 1.0) sum += 1.0;
-    }
-    return sum / num_draws;
-  };
-  const double error = std::sqrt(hold * (1.0 - hold) / 40'000);
-  const RunPlan plan(campaign);
-  const Estimation found = plan.estimation(plan.record(RunIndex{0}, {}));
-  Matrix estimated;
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    for (std::size_t j = 0; j < num_parameters; ++j) {
-      estimated(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          found.correlations[i][j];
-    }
-  }
-  EXPECT_NEAR(chance(Matrix::Identity()), hold, 4.0 * error);
-  EXPECT_GT(chance(estimated), hold - 4.0 * error);
-  Matrix strong = Matrix::Constant(0.8);
-  strong.diagonal().setOnes();
-  EXPECT_GT(chance(strong), hold + 4.0 * error);
 }
 
 /// The allocation of 18 orbits with the largest value, of all that there are.
@@ -274,11 +207,7 @@ TEST(PlanStudy, AllocatesWhereTheChanceRoundsToZeroOrOne) {
 // four: with the range in the middle of those of 16 runs, 8 of these are lost.
 TEST(PlanStudy, CountsRunsThatAreLost) {
   MicroscopeCampaign campaign = simultaneous_campaign();
-  const auto most_of = [&] {
-    std::vector<RunRequest> requests;
-    for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{i}, {}});
-    return RunPlan(campaign).simulate_batch(requests, best_instruction_set());
-  };
+  const auto most_of = [&] { return test::simulated(RunPlan(campaign), batch_lanes); };
   std::vector<double> accelerations;
   for (const RunResult& result : most_of()) accelerations.push_back(result.health[0]);
   std::ranges::sort(accelerations);

@@ -2,17 +2,8 @@
 
 #include "core/microscope/session/gaps.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <string>
-#include <vector>
-
 #include "core/error.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -106,12 +97,7 @@ TEST(Gaps, AreThoseOfSeedRunAndSession) {
 std::string refusal(const GapsConfig& gaps, int num_orbits = 20) {
   Session session = spinning_test();
   session.num_orbits = num_orbits;
-  try {
-    gaps.validate({session}, sample_s);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of<ConfigError>([&] { gaps.validate({session}, sample_s); });
 }
 
 TEST(Gaps, AreRefusedIfARateIsNegativeOrLittleIsLeft) {

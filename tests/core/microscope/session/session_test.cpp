@@ -15,12 +15,8 @@ constexpr std::size_t at_delta_y = 2, at_a_c12 = 3, at_k2_sensor_1 = 9;
 std::string refusal_after(const std::function<void(Sessions&)>& change) {
   Sessions sessions = hardy2013_sessions();
   change(sessions);
-  try {
-    validate_sessions(sessions, orbit_period_s, sample_period_s);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of<ConfigError>(
+      [&] { validate_sessions(sessions, orbit_period_s, sample_period_s); });
 }
 
 const Session& session_with(const Sessions& sessions, SessionTarget target) {

@@ -1,25 +1,22 @@
 // A batch must give each of its runs the bits that the scalar reference gives it.
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 
-#include <bit>
-#include <cstdint>
-#include <memory>
 #include <regex>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "core/campaign/device.hpp"
 #include "core/microscope/simulation/gpu/device_simulation.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/cuda_driver/test_device.hpp"
-#include "tests/support/microscope_results.hpp"
+#include "tests/support/runs.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
+
+using test::bits_of;
+using test::requests_from;
 
 /// All sessions cut to one orbit of few samples after a short settling: every line of the kernel in
 /// a fraction of the time.
@@ -30,41 +27,6 @@ MicroscopeCampaign short_campaign() {
   campaign.scenario.simulation.settling_s = 100.0;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
   return campaign;
-}
-
-std::vector<RunRequest> requests_from(std::uint64_t first, std::size_t count) {
-  std::vector<RunRequest> requests;
-  for (std::size_t i = 0; i < count; ++i) requests.push_back({RunIndex{first + i}, {}});
-  return requests;
-}
-
-void expect_same_bits(const RunResult& a, const RunResult& b, const std::string& what) {
-  EXPECT_EQ(a.run, b.run) << what;
-  EXPECT_EQ(a.status, b.status) << what;
-  EXPECT_EQ(a.num_rounds, b.num_rounds) << what;
-  EXPECT_EQ(a.num_draws, b.num_draws) << what;
-  ASSERT_EQ(a.truth.size(), b.truth.size()) << what;
-  ASSERT_EQ(a.estimate.size(), b.estimate.size()) << what;
-  for (std::size_t i = 0; i < a.truth.size(); ++i) {
-    EXPECT_EQ(std::bit_cast<std::uint64_t>(a.truth[i]), std::bit_cast<std::uint64_t>(b.truth[i]))
-        << what << ", truth " << i;
-  }
-  for (std::size_t i = 0; i < a.estimate.size(); ++i) {
-    EXPECT_EQ(std::bit_cast<std::uint64_t>(a.estimate[i]),
-              std::bit_cast<std::uint64_t>(b.estimate[i]))
-        << what << ", estimate " << i;
-  }
-  EXPECT_EQ(a.loss, b.loss) << what;
-  const auto expect_same = [&](double x, double y, const char* name) {
-    EXPECT_EQ(std::bit_cast<std::uint64_t>(x), std::bit_cast<std::uint64_t>(y)) << what << name;
-  };
-  expect_same(test::health_of(a).acceleration_m_s2, test::health_of(b).acceleration_m_s2,
-              ", acceleration");
-  expect_same(test::health_of(a).attitude_rad, test::health_of(b).attitude_rad, ", attitude");
-  expect_same(test::health_of(a).residual_m_s2, test::health_of(b).residual_m_s2, ", residual");
-  expect_same(test::health_of(a).quadratic_noise, test::health_of(b).quadratic_noise,
-              ", quadratic noise");
-  expect_same(test::health_of(a).square_noise, test::health_of(b).square_noise, ", square noise");
 }
 
 /// The requests again and again, until no narrow kernel has room for them.
@@ -109,8 +71,8 @@ void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
       const std::vector<RunResult> results = plan.simulate_batch(batch, set);
       ASSERT_EQ(results.size(), batch.size());
       for (std::size_t i = 0; i < results.size(); ++i) {
-        expect_same_bits(results[i], alone[i % alone.size()],
-                         fmt::format("{} lane {} of {}", name_of(set), i, results.size()));
+        EXPECT_EQ(bits_of(results[i]), bits_of(alone[i % alone.size()]))
+            << fmt::format("{} lane {} of {}", name_of(set), i, results.size());
       }
     }
   }
@@ -119,7 +81,7 @@ void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
   const std::vector<RunResult> results = on_device(plan, requests);
   ASSERT_EQ(results.size(), alone.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
-    expect_same_bits(results[i], alone[i], fmt::format("device, lane {}", i));
+    EXPECT_EQ(bits_of(results[i]), bits_of(alone[i])) << fmt::format("device, lane {}", i);
   }
 }
 
@@ -135,35 +97,97 @@ TEST(Batch, EqualsTheScalarReferenceForAnyNumberOfRuns) {
       const std::vector<RunResult> batch = plan.simulate_batch(requests_from(100, count), set);
       ASSERT_EQ(batch.size(), count);
       for (std::size_t i = 0; i < count; ++i) {
-        expect_same_bits(batch[i], alone[i], fmt::format("{} {} of {}", name_of(set), i, count));
+        EXPECT_EQ(bits_of(batch[i]), bits_of(alone[i]))
+            << fmt::format("{} {} of {}", name_of(set), i, count);
       }
     }
   }
 }
 
-// Sessions begin and end at different times, and no record is a multiple of four samples long:
-// lanes that wait for the next session go on idle.
-TEST(Batch, EqualsTheScalarReferenceWithSessionsOfDifferentLengths) {
-  MicroscopeCampaign campaign = short_campaign();
+/// What is special about a campaign; its first runs are computed.
+struct Special {
+  std::string name;
+  std::function<void(MicroscopeCampaign&)> make;
+  OnDevices on_devices = OnDevices::simulated;
+  std::size_t num_runs = 3;
+};
+
+/// Sessions begin and end at different times, and no record is a multiple of four samples long:
+/// lanes that wait for the next session go on idle.
+void vary_lengths(MicroscopeCampaign& campaign) {
   campaign.scenario.orbit.period_s = 5901.3;
   for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
     campaign.scenario.sessions[i].num_orbits = 1 + static_cast<int>(i * i % 4);
   }
-  expect_batch_equals_scalar(campaign, requests_from(0, 4));
 }
 
-TEST(Batch, EqualsTheScalarReferenceIfLoopsDoNotSettle) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.simulation.settling_s = 0.0;
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+void use_one_sensor(MicroscopeCampaign& campaign) {
+  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
+  for (std::size_t i = 0; i < 9; ++i) {
+    campaign.scenario.sessions[i].drag_free = DragFreeSource::sensor_2;
+  }
 }
 
-// Then sessions are not computed side by side.
-TEST(Batch, EqualsTheScalarReferenceIfLoopsSettleForAnOddNumberOfSamples) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.simulation.settling_s = 101.0;
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+void stiffen(MicroscopeCampaign& campaign) {
+  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
+  campaign.scenario.sensor.radial_stiffness_s2 = {-0.05, 0.0};
 }
+
+void shake_more(MicroscopeCampaign& campaign) {
+  std::vector<Excitation>& excitations = campaign.scenario.sessions[6].excitations;
+  excitations.push_back({ExcitationKind::test_mass, Axis::z, 1e-6, 9.88e-3});
+  excitations.push_back({ExcitationKind::attitude, Axis::y, 1e-4, 7e-4});
+  excitations.push_back({ExcitationKind::drag_free, Axis::y, 1e-8, 2.9e-3});
+}
+
+void use_environment_table(MicroscopeCampaign& campaign) {
+  campaign.scenario.environment.kind = EnvironmentKind::file;
+  campaign.environment_file = "table.csv";
+  campaign.environment_table = {{.time_s = 0.0, .linear_m_s2 = {1e-9, 0.0, 0.0}},
+                                {.time_s = 3000.0, .linear_m_s2 = {-1e-8, 3e-9, 0.0}},
+                                {.time_s = 5950.0, .linear_m_s2 = {1e-9, 0.0, 0.0}}};
+}
+
+std::vector<Special> special_campaigns() {
+  using Campaign = MicroscopeCampaign;
+  constexpr auto left_out = OnDevices::left_out;
+  const auto of_preset = [](NoisePreset preset) {
+    return [=](Campaign& c) { c.scenario.noise = noise_preset(preset); };
+  };
+  const auto with_factors = [](std::array<double, 2> factors) {
+    return [=](Campaign& c) { c.scenario.noise.linear_factor = factors; };
+  };
+  return {
+      {"SessionsOfDifferentLengths", vary_lengths, OnDevices::simulated, 4},
+      {"LoopsThatDoNotSettle", [](Campaign& c) { c.scenario.simulation.settling_s = 0.0; }},
+      // Then sessions are not computed side by side.
+      {"AnOddNumberOfSettling", [](Campaign& c) { c.scenario.simulation.settling_s = 101.0; }},
+      {"ComplexPolesInTheNoise", of_preset(NoisePreset::flight_suref)},
+      {"Wires", of_preset(NoisePreset::wire_suep), left_out},
+      {"NoiseOfEachSensor", with_factors({1.0, 2.0}), left_out},
+      {"MoreNoiseOfBothSensors", with_factors({2.0, 2.0})},
+      {"NoNoise", [](Campaign& c) { c.scenario.noise.scale = 0.0; }},
+      {"Stiffness", stiffen, left_out},
+      {"OneSensorAwayFromTheCentreOfMass", use_one_sensor},
+      {"ARotatingFrame", [](Campaign& c) { c.scenario.sessions[3].spin_rate_rad_s = 4.7e-3; }},
+      {"SeveralExcitations", shake_more},
+      // Here the orbit is computed time by time.
+      {"AnEccentricOrbit", [](Campaign& c) { c.scenario.orbit.eccentricity = 0.1; }},
+      {"AnEnvironmentTable", use_environment_table},
+  };
+}
+
+class BatchOf : public testing::TestWithParam<Special> {};
+
+TEST_P(BatchOf, EqualsTheScalarReference) {
+  MicroscopeCampaign campaign = short_campaign();
+  GetParam().make(campaign);
+  expect_batch_equals_scalar(campaign, requests_from(0, GetParam().num_runs),
+                             GetParam().on_devices);
+}
+
+INSTANTIATE_TEST_SUITE_P(ACampaignWith, BatchOf, testing::ValuesIn(special_campaigns()),
+                         [](const auto& tested) { return tested.param.name; });
 
 TEST(Batch, TakesRunsFromAnywhereInAnyOrder) {
   // Run numbers past 2³² reach the upper counter word.
@@ -172,84 +196,10 @@ TEST(Batch, TakesRunsFromAnywhereInAnyOrder) {
       {{RunIndex{900'000'000}, {}}, {RunIndex{3}, {}}, {RunIndex{(1ULL << 40) + 3}, {}}});
 }
 
-TEST(Batch, EqualsTheScalarReferenceWithComplexPolesInTheNoise) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.noise = noise_preset(NoisePreset::flight_suref);
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-TEST(Batch, EqualsTheScalarReferenceWithNoiseOfEachSensor) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.noise = noise_preset(NoisePreset::wire_suep);
-  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
-  campaign.scenario.noise = {};
-  campaign.scenario.noise.linear_factor = {1.0, 2.0};
-  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
-  campaign.scenario.noise.linear_factor = {2.0, 2.0};
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-TEST(Batch, EqualsTheScalarReferenceWithStiffness) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
-  campaign.scenario.sensor.radial_stiffness_s2 = {-0.05, 0.0};
-  expect_batch_equals_scalar(campaign, requests_from(0, 3), OnDevices::left_out);
-}
-
-TEST(Batch, EqualsTheScalarReferenceOnOneSensorAwayFromTheCentreOfMass) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.sensor.position_m = {0.01, 0.17, -0.02};
-  for (std::size_t i = 0; i < 9; ++i) {
-    campaign.scenario.sessions[i].drag_free = DragFreeSource::sensor_2;
-  }
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-TEST(Batch, EqualsTheScalarReferenceWithoutNoise) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.noise.scale = 0.0;
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-TEST(Batch, EqualsTheScalarReferenceInARotatingFrame) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.sessions[3].spin_rate_rad_s = 4.7e-3;
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-TEST(Batch, EqualsTheScalarReferenceWithSeveralExcitations) {
-  MicroscopeCampaign campaign = short_campaign();
-  std::vector<Excitation>& excitations = campaign.scenario.sessions[6].excitations;
-  excitations.push_back({ExcitationKind::test_mass, Axis::z, 1e-6, 9.88e-3});
-  excitations.push_back({ExcitationKind::attitude, Axis::y, 1e-4, 7e-4});
-  excitations.push_back({ExcitationKind::drag_free, Axis::y, 1e-8, 2.9e-3});
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-// Here the orbit is computed time by time.
-TEST(Batch, EqualsTheScalarReferenceOnAnEccentricOrbit) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.orbit.eccentricity = 0.1;
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
-TEST(Batch, EqualsTheScalarReferenceWithAnEnvironmentTable) {
-  MicroscopeCampaign campaign = short_campaign();
-  campaign.scenario.environment.kind = EnvironmentKind::file;
-  campaign.environment_file = "table.csv";
-  campaign.environment_table = {{.time_s = 0.0, .linear_m_s2 = {1e-9, 0.0, 0.0}},
-                                {.time_s = 3000.0, .linear_m_s2 = {-1e-8, 3e-9, 0.0}},
-                                {.time_s = 5950.0, .linear_m_s2 = {1e-9, 0.0, 0.0}}};
-  expect_batch_equals_scalar(campaign, requests_from(0, 3));
-}
-
 void expect_carries_a_bad_run(double range_m_s2) {
   MicroscopeCampaign campaign = short_campaign();
   campaign.scenario.sensor.range_m_s2 = range_m_s2;
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    if (drawn_names()[i] != "thruster_scale_error.x") continue;
-    campaign.dispersions[i].law = Law::table;
-  }
+  test::law_of(campaign, "thruster_scale_error.x").law = Law::table;
   campaign.num_runs = 3;
   campaign.table_columns = {{0.0, 50.0, 0.0}};  // A loop gain fifty times too high.
   std::vector<RunRequest> requests;
@@ -267,13 +217,14 @@ void expect_carries_a_bad_run(double range_m_s2) {
       const std::vector<RunResult> results = plan.simulate_batch(batch, set);
       EXPECT_EQ(results[1].status, RunStatus::lost) << name_of(set);
       for (const std::size_t i : {0U, 1U, 2U}) {
-        expect_same_bits(results[i], alone[i], std::string(name_of(set)));
+        EXPECT_EQ(bits_of(results[i]), bits_of(alone[i])) << std::string(name_of(set));
       }
     }
   }
   const std::vector<RunResult> results = on_device(plan, requests);
   EXPECT_EQ(results[1].status, RunStatus::lost);
-  for (const std::size_t i : {0U, 1U, 2U}) expect_same_bits(results[i], alone[i], "device");
+  for (const std::size_t i : {0U, 1U, 2U})
+    EXPECT_EQ(bits_of(results[i]), bits_of(alone[i])) << "device";
 }
 
 // Without a range that ends it, the run grows beyond all numbers.
@@ -308,8 +259,8 @@ TEST(Device, EqualsTheScalarReferenceForSeveralGroups) {
     for (const DeviceSimulation::Ended& ended : simulation->advance()) {
       ASSERT_EQ(ended.results.size(), 1 + ended.group);
       for (const RunResult& result : ended.results) {
-        expect_same_bits(result, plan.simulate(result.run, {}),
-                         fmt::format("group {}", ended.group));
+        EXPECT_EQ(bits_of(result), bits_of(plan.simulate(result.run, {})))
+            << fmt::format("group {}", ended.group);
       }
       ++num_ended;
     }
@@ -339,26 +290,6 @@ TEST(Device, HasAProgramThatRoundsAsProcessorsDo) {
   for (std::sregex_iterator found(program.begin(), program.end(), rounded), end; found != end;
        ++found) {
     ASSERT_EQ(found->str(2), "rn.") << found->str();
-  }
-}
-
-// The estimation of the paper reads only some of what is recorded; another one may read all.
-TEST(Batch, RecordsWhatARunAloneRecords) {
-  const RunPlan plan(short_campaign());
-  for (const InstructionSet set : available_instruction_sets()) {
-    if (set == InstructionSet::scalar) continue;
-    for (const std::size_t count : {1U, 2U, 4U, 16U}) {
-      const std::vector<RunRecord> records = plan.record_batch(requests_from(0, count), set);
-      const RunRecord alone = plan.record(records.back().run, {});
-      ASSERT_EQ(records.back().phasors.size(), alone.phasors.size());
-      for (std::size_t s = 0; s < alone.phasors.size(); ++s) {
-        const SessionPhasors& found = records.back().phasors[s];
-        const SessionPhasors& expected = alone.phasors[s];
-        EXPECT_EQ(found.num_fit_lines, expected.num_fit_lines);
-        EXPECT_EQ(found.amplitude, expected.amplitude)
-            << fmt::format("{}, {} runs, session {}", name_of(set), count, s);
-      }
-    }
   }
 }
 

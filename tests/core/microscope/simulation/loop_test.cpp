@@ -1,14 +1,9 @@
 #include "core/microscope/simulation/loop.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <complex>
-#include <numbers>
-
 #include "core/microscope/environment/environment.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/session_record.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -17,20 +12,7 @@ constexpr double period_s = 0.25;
 constexpr double two_pi = 2.0 * std::numbers::pi;
 constexpr Vector3<double> zero{};
 
-Instrument perfect_instrument() {
-  const Sensor sensor{.scale_factor = Eigen::Vector3d::Ones(),
-                      .misalignment_SK_rad = Eigen::Vector3d::Zero(),
-                      .coupling_rad = Eigen::Vector3d::Zero(),
-                      .quadratic_s2_m = Eigen::Vector3d::Zero(),
-                      .read_out_bias_K_m_s2 = Eigen::Vector3d::Zero(),
-                      .parasitic_K_m_s2 = Eigen::Vector3d::Zero()};
-  return {.sensors = {sensor, sensor},
-          .offcentring_S_m = Eigen::Vector3d::Zero(),
-          .centre_offset_S_m = Eigen::Vector3d::Zero(),
-          .angular_bias_S_rad_s2 = Eigen::Vector3d::Zero(),
-          .thrust_matrix = Eigen::Matrix3d::Identity(),
-          .star_tracker_bias_S_rad = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}};
-}
+Instrument perfect_instrument() { return make_instrument({}); }
 
 Scenario silent_scenario() {
   Scenario scenario;

@@ -1,16 +1,11 @@
 #include "core/microscope/simulation/recorded_signals.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <regex>
-#include <set>
-#include <string>
-#include <vector>
 
 #include "core/campaign/recording.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

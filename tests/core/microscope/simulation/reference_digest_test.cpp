@@ -1,6 +1,6 @@
 #include "core/microscope/simulation/reference_digest.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {

@@ -1,10 +1,6 @@
 #include "core/microscope/simulation/sample_noise.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <vector>
+#include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
@@ -38,20 +34,14 @@ std::vector<std::array<double, num_noise_channels>> samples_at(double scale) {
 // samples.
 TEST(NoiseScale, MultipliesEveryChannel) {
   const auto once = samples_at(1.0);
-  const auto thrice = samples_at(3.0);
-  for (std::size_t i = 0; i < num_samples; ++i) {
-    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      const double expected = 3.0 * once[i][channel];
-      ASSERT_NEAR(thrice[i][channel], expected, 1e-12 * std::abs(expected))
-          << noise_channel_names()[channel];
-    }
-  }
-}
-
-TEST(NoiseScale, OfZeroSilencesEveryChannel) {
-  for (const auto& sample : samples_at(0.0)) {
-    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      ASSERT_EQ(sample[channel], 0.0) << noise_channel_names()[channel];
+  for (const double scale : {3.0, 0.0}) {
+    const auto scaled = samples_at(scale);
+    for (std::size_t i = 0; i < num_samples; ++i) {
+      for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+        const double expected = scale * once[i][channel];
+        ASSERT_NEAR(scaled[i][channel], expected, 1e-12 * std::abs(expected))
+            << noise_channel_names()[channel];
+      }
     }
   }
 }
