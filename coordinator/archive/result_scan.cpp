@@ -112,7 +112,8 @@ Check check_current(const Store& store, const Campaign& campaign, const Summary&
                     const ReadResults& results) {
   Lines lines = count_differences(summary, results.statistics);
   append(lines, given_up_differences(store, summary));
-  append(lines, statistic_differences(store, campaign, results));
+  append(lines, store.statistic_differences(results.statistics, campaign.error_budget(),
+                                            results.warnings.first));
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::holds(
       fmt::format("of {} runs: every number and every budget", results.statistics.num_runs));
@@ -120,7 +121,7 @@ Check check_current(const Store& store, const Campaign& campaign, const Summary&
 
 // Without a summary nothing was ever stored but the budget before estimation.
 Check check_first(const Store& store, const Campaign& campaign) {
-  Lines lines = statistic_differences(store, campaign, ReadResults{});
+  Lines lines = store.statistic_differences({}, campaign.error_budget(), {});
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::not_checked("none are stored: a coordinator has the file, or was killed");
 }

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -34,18 +33,14 @@ std::vector<LegendEntry> legend_of_series(const BarChart& chart) {
 }
 
 AxisRange range_of_values(const BarChart& chart) {
-  std::optional<double> from, to;
+  Extent extent{.scale = chart.x.scale};
   for (const BarSeries& series : chart.series) {
     for (const std::optional<double>& value : series.values) {
-      const bool is_shown =
-          value && std::isfinite(*value) && (chart.x.scale == Scale::linear || *value > 0.0);
-      if (!is_shown) continue;
-      from = from ? std::min(*from, *value) : *value;
-      to = to ? std::max(*to, *value) : *value;
+      if (value) extent.add(*value);
     }
   }
-  if (from && chart.x.scale == Scale::linear) from = std::min(*from, 0.0);
-  return range_of(chart.x, from, to, 5);
+  if (extent.from && chart.x.scale == Scale::linear) extent.from = std::min(*extent.from, 0.0);
+  return range_of(chart.x, extent, 5);
 }
 
 double widest(std::span<const std::string> labels) {
@@ -200,7 +195,7 @@ double draw_chart(const Timeline& timeline, Point corner, double width, SvgWrite
   const Box box{corner.x + label_width, corner.y + height + 4.0, width - label_width - 12.0,
                 lane_height * static_cast<double>(timeline.lanes.size())};
   const AxisMap x{.scale = timeline.x.scale,
-                  .range = range_of(timeline.x, timeline.x.from, timeline.x.to, num_ticks_max),
+                  .range = range_of(timeline.x, {}, num_ticks_max),
                   .begin = box.left,
                   .end = box.right()};
   draw_x_axis(x, timeline.x, box, writer);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -87,8 +86,9 @@ struct ChartText {
   /// Unique in a page: elements of the picture are named after it. 1 to 200 of A-Z a-z 0-9 _ and -,
   /// a letter first.
   std::string id;
-  std::string title;        ///< Above the picture, and its name for screen readers.
-  std::string description;  ///< What the picture tells, for those who do not see it; sentences.
+  std::string title;  ///< Above the picture, and its name for screen readers.
+  /// What the picture tells, for those who do not see it; sentences.
+  std::string description = {};
 };
 
 /// Layers over two axes, drawn in their order.
@@ -103,7 +103,7 @@ struct Chart {
 /// Values of one kind, one a category. A value that is missing has no bar.
 struct BarSeries {
   std::string name = {};
-  std::vector<std::optional<double>> values;
+  std::vector<std::optional<double>> values = {};
   Ink ink = Ink::first;
 };
 
@@ -125,15 +125,14 @@ struct HeatCell {
 struct HeatMap {
   ChartText text;
   std::vector<std::string> rows;
-  std::vector<std::string> columns;
-  std::vector<HeatCell> cells;  ///< Row by row: rows times columns.
+  std::vector<std::string> columns = {};
+  std::vector<HeatCell> cells = {};  ///< Row by row: rows times columns.
 };
 
-/// Several charts as one picture.
+/// Several charts as one picture, two beside each other.
 struct ChartGrid {
   ChartText text;
-  std::size_t num_columns = 2;
-  std::vector<Chart> charts;  ///< Row by row.
+  std::vector<Chart> charts = {};  ///< Row by row.
 };
 
 /// Something that took a time: a bar of a timeline, as wide as a pixel at least.
@@ -160,7 +159,7 @@ struct TimelineLane {
 struct Timeline {
   ChartText text;
   ChartAxis x;
-  std::vector<TimelineLane> lanes;
+  std::vector<TimelineLane> lanes = {};
 };
 
 using Picture = std::variant<Chart, BarChart, HeatMap, ChartGrid, Timeline>;

@@ -3,30 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <string>
+#include <utility>
 #include <vector>
 
 namespace proofmass::coordinator {
 namespace {
-
-/// The ends of some values that have a place on an axis.
-class Extent {
- public:
-  explicit Extent(Scale scale) : scale_(scale) {}
-
-  void add(double value) {
-    if (!std::isfinite(value) || (scale_ == Scale::logarithmic && value <= 0.0)) return;
-    from = from ? std::min(*from, value) : value;
-    to = to ? std::max(*to, value) : value;
-  }
-
-  std::optional<double> from;
-  std::optional<double> to;
-
- private:
-  Scale scale_;
-};
 
 struct Extents {
   Extent x;
@@ -67,33 +48,28 @@ Extents extents_of(const Chart& chart) {
   return extents;
 }
 
-void add_entry(const Bars& bars, std::vector<LegendEntry>& entries) {
-  if (bars.name.empty()) return;
-  entries.push_back({.name = bars.name, .ink = bars.ink});
+LegendEntry entry_of(const Bars& bars) { return {.name = bars.name, .ink = bars.ink}; }
+LegendEntry entry_of(const Line& line) {
+  return {
+      .name = line.name, .sample = LegendEntry::Sample::line, .ink = line.ink, .dash = line.dash};
 }
-void add_entry(const Line& line, std::vector<LegendEntry>& entries) {
-  if (line.name.empty()) return;
-  entries.push_back(
-      {.name = line.name, .sample = LegendEntry::Sample::line, .ink = line.ink, .dash = line.dash});
+LegendEntry entry_of(const Markers& markers) {
+  return {.name = markers.name,
+          .sample = LegendEntry::Sample::marker,
+          .ink = markers.ink,
+          .shape = markers.shape};
 }
-void add_entry(const Markers& markers, std::vector<LegendEntry>& entries) {
-  if (markers.name.empty()) return;
-  entries.push_back({.name = markers.name,
-                     .sample = LegendEntry::Sample::marker,
-                     .ink = markers.ink,
-                     .shape = markers.shape});
+LegendEntry entry_of(const Band& band) {
+  return {.name = band.name, .ink = band.ink, .opacity = 0.25};
 }
-void add_entry(const Band& band, std::vector<LegendEntry>& entries) {
-  if (band.name.empty()) return;
-  entries.push_back({.name = band.name, .ink = band.ink, .opacity = 0.25});
-}
-void add_entry(const LimitLine&, std::vector<LegendEntry>&) {}  // It has its label.
+LegendEntry entry_of(const LimitLine&) { return {}; }  // It has its label.
 
 std::vector<LegendEntry> legend_of(const Chart& chart) {
   std::vector<LegendEntry> entries;
   for (const Layer& layer : chart.layers) {
-    std::visit([&](const auto& shown) { add_entry(shown, entries); }, layer);
+    std::visit([&](const auto& shown) { entries.push_back(entry_of(shown)); }, layer);
   }
+  std::erase_if(entries, [](const LegendEntry& entry) { return entry.name.empty(); });
   return entries;
 }
 
@@ -166,15 +142,13 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
   const Extents extents = extents_of(chart);
   PlotArea area;
   area.y = {.scale = chart.y.scale,
-            .range = range_of(chart.y, extents.y.from, extents.y.to,
-                              num_ticks_for(chart.plot_height, 35.0))};
+            .range = range_of(chart.y, extents.y, num_ticks_for(chart.plot_height, 35.0))};
   const double left = label_margin(area.y.range);
   area.box = {corner.x + left, 0.0, width - left - right_margin, chart.plot_height};
-  area.x = {
-      .scale = chart.x.scale,
-      .range = range_of(chart.x, extents.x.from, extents.x.to, num_ticks_for(area.box.width, 50.0)),
-      .begin = area.box.left,
-      .end = area.box.right()};
+  area.x = {.scale = chart.x.scale,
+            .range = range_of(chart.x, extents.x, num_ticks_for(area.box.width, 50.0)),
+            .begin = area.box.left,
+            .end = area.box.right()};
   const std::vector<const LimitLine*> limits = vertical_limits(chart, area.x);
   area.box.top = corner.y + draw_head(chart, corner, width, writer) +
                  limit_row_height * static_cast<double>(limits.size());
@@ -193,20 +167,13 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
 
 double draw_chart(const ChartGrid& grid, Point corner, double width, SvgWriter& writer) {
   constexpr double gap = 14.0;
-  const auto num_columns = static_cast<double>(std::max<std::size_t>(grid.num_columns, 1));
-  const double cell_width = (width - gap * (num_columns - 1.0)) / num_columns;
+  const double cell_width = (width - gap) / 2.0;
   double top = corner.y + draw_title(grid.text.title, corner, width, writer) + 4.0;
   double row_height = 0.0;
-  double column = 0.0;
-  for (const Chart& chart : grid.charts) {
-    if (column == num_columns) {
-      column = 0.0;
-      top += row_height + 8.0;
-      row_height = 0.0;
-    }
-    const Point place{corner.x + column * (cell_width + gap), top};
-    row_height = std::max(row_height, draw_chart(chart, place, cell_width, writer));
-    column += 1.0;
+  for (std::size_t i = 0; i < grid.charts.size(); ++i) {
+    if (i > 0 && i % 2 == 0) top += std::exchange(row_height, 0.0) + 8.0;
+    const Point place{corner.x + (i % 2 == 0 ? 0.0 : cell_width + gap), top};
+    row_height = std::max(row_height, draw_chart(grid.charts[i], place, cell_width, writer));
   }
   return top + row_height - corner.y;
 }

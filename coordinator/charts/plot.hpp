@@ -46,7 +46,7 @@ double draw_title(std::string_view title, Point corner, double width, SvgWriter&
 /// A line of the legend: how a layer looks, and its name.
 struct LegendEntry {
   enum class Sample : std::uint8_t { area, line, marker };
-  std::string name;
+  std::string name = {};
   Sample sample = Sample::area;
   Ink ink = Ink::first;
   Dash dash = Dash::solid;
@@ -65,9 +65,18 @@ void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer);
 
 inline constexpr double x_axis_height = 42.0;  ///< Of the ticks and label below a plot.
 
-/// The axis between two ends of the data; a range of its own if there is none.
-[[nodiscard]] AxisRange range_of(const ChartAxis& axis, std::optional<double> from,
-                                 std::optional<double> to, std::size_t num_ticks_max);
+/// The ends of those values that have a place on an axis.
+struct Extent {
+  Scale scale = Scale::linear;
+  std::optional<double> from = {};
+  std::optional<double> to = {};
+
+  void add(double value);
+};
+
+/// The axis between the ends of the data; a range of its own if there is none.
+[[nodiscard]] AxisRange range_of(const ChartAxis& axis, const Extent& data,
+                                 std::size_t num_ticks_max);
 
 /// Draws a layer into the box between the axes.
 struct PlotArea {

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -112,11 +111,16 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
   return place.y - corner.y + 8.0;
 }
 
-AxisRange range_of(const ChartAxis& axis, std::optional<double> from, std::optional<double> to,
-                   std::size_t num_ticks_max) {
+void Extent::add(double value) {
+  if (!std::isfinite(value) || (scale == Scale::logarithmic && value <= 0.0)) return;
+  from = std::min(from.value_or(value), value);
+  to = std::max(to.value_or(value), value);
+}
+
+AxisRange range_of(const ChartAxis& axis, const Extent& data, std::size_t num_ticks_max) {
   const bool is_linear = axis.scale == Scale::linear;
-  const double lower = from.value_or(is_linear ? 0.0 : 1.0);
-  const double upper = to.value_or(is_linear ? 1.0 : 10.0);
+  const double lower = data.from.value_or(is_linear ? 0.0 : 1.0);
+  const double upper = data.to.value_or(is_linear ? 1.0 : 10.0);
   return is_linear ? linear_range(axis, lower, upper, num_ticks_max)
                    : logarithmic_range(axis, lower, upper, num_ticks_max);
 }

@@ -59,27 +59,6 @@ const ChartText& text_of(const Picture& picture) {
   return std::visit([](const auto& chart) -> const ChartText& { return chart.text; }, picture);
 }
 
-std::string svg_of(const Picture& picture, SvgUse use) {
-  check_ids(picture);
-  const double width = width_of_picture(picture);
-  SvgWriter body(use);
-  const double height =
-      2.0 * margin +
-      std::visit(
-          [&](const auto& chart) {
-            return draw_chart(chart, Point{margin, margin}, width - 2.0 * margin, body);
-          },
-          picture);
-  SvgWriter svg(use);
-  svg.raw(opening(text_of(picture), use, width, height));
-  if (use == SvgUse::standalone) svg.raw(standalone_style() + "\n");
-  if (use != SvgUse::embedded) {
-    svg.rectangle({0.0, 0.0, width, height}, svg.colour("--chart-ground"));
-  }
-  svg.raw(body.markup());
-  return svg.markup() + "</svg>\n";
-}
-
 namespace {
 
 // The first inks are those of Okabe and Ito that differ from either ground by 3:1; on the light
@@ -108,11 +87,37 @@ std::string light_colours() { return declarations(&ThemeColour::light); }
 
 std::string dark_colours() { return declarations(&ThemeColour::dark); }
 
+namespace {
+
+/// Light, and dark for readers who prefer that.
 std::string standalone_style() {
   return fmt::format(
       "<style>svg{{{}}}@media (prefers-color-scheme:dark){{svg{{{}}}}}"
       "@media print{{svg{{{}}}}}</style>",
       light_colours(), dark_colours(), light_colours());
+}
+
+}  // namespace
+
+std::string svg_of(const Picture& picture, SvgUse use) {
+  check_ids(picture);
+  const double width = width_of_picture(picture);
+  SvgWriter body(use);
+  const double height =
+      2.0 * margin +
+      std::visit(
+          [&](const auto& chart) {
+            return draw_chart(chart, Point{margin, margin}, width - 2.0 * margin, body);
+          },
+          picture);
+  SvgWriter svg(use);
+  svg.raw(opening(text_of(picture), use, width, height));
+  if (use == SvgUse::standalone) svg.raw(standalone_style() + "\n");
+  if (use != SvgUse::embedded) {
+    svg.rectangle({0.0, 0.0, width, height}, svg.colour("--chart-ground"));
+  }
+  svg.raw(body.markup());
+  return svg.markup() + "</svg>\n";
 }
 
 }  // namespace proofmass::coordinator

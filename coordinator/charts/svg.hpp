@@ -44,7 +44,4 @@ struct ThemeColour {
 [[nodiscard]] std::string light_colours();
 [[nodiscard]] std::string dark_colours();
 
-/// The style of a picture that stands alone: light, and dark for readers who prefer that.
-[[nodiscard]] std::string standalone_style();
-
 }  // namespace proofmass::coordinator

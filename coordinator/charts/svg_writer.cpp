@@ -5,28 +5,15 @@
 #include <algorithm>
 #include <array>
 
-#include "coordinator/charts/svg.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-std::string_view property_of(Ink ink) {
-  switch (ink) {
-    case Ink::first:
-      return "--chart-first";
-    case Ink::second:
-      return "--chart-second";
-    case Ink::third:
-      return "--chart-third";
-    case Ink::fourth:
-      return "--chart-fourth";
-    case Ink::text:
-      return "--chart-text";
-  }
-  PROOFMASS_EXPECT(false);
-}
+/// In the order of Ink.
+constexpr std::array<std::string_view, 5> ink_properties{
+    "--chart-first", "--chart-second", "--chart-third", "--chart-fourth", "--chart-text"};
 
 std::string stroke_attributes(const Stroke& stroke) {
   const std::string_view dashes = stroke.dash == Dash::dashed   ? " stroke-dasharray=\"7 4\""
@@ -51,13 +38,9 @@ std::string marker_path(Point centre, Shape shape) {
   const auto at = [&](double x, double y) {
     return coordinate(centre.x + x) + " " + coordinate(centre.y + y);
   };
-  switch (shape) {
-    case Shape::triangle:
-      return fmt::format("M{}L{}L{}Z", at(0.0, -r), at(r, r), at(-r, r));
-    case Shape::diamond:
-      return fmt::format("M{}L{}L{}L{}Z", at(0.0, -r), at(r, 0.0), at(0.0, r), at(-r, 0.0));
-  }
-  PROOFMASS_EXPECT(false);
+  return shape == Shape::triangle
+             ? fmt::format("M{}L{}L{}Z", at(0.0, -r), at(r, r), at(-r, r))
+             : fmt::format("M{}L{}L{}L{}Z", at(0.0, -r), at(r, 0.0), at(0.0, r), at(-r, 0.0));
 }
 
 }  // namespace
@@ -81,7 +64,9 @@ std::string SvgWriter::colour(std::string_view property) const {
   return fmt::format("var({},{})", property, found->light);
 }
 
-std::string SvgWriter::colour(Ink ink) const { return colour(property_of(ink)); }
+std::string SvgWriter::colour(Ink ink) const {
+  return colour(ink_properties.at(static_cast<std::size_t>(ink)));
+}
 
 void SvgWriter::text(Point place, std::string_view text, const TextStyle& style) {
   constexpr std::array<std::string_view, 3> anchors{"", " text-anchor=\"middle\"",
@@ -97,9 +82,8 @@ void SvgWriter::text(Point place, std::string_view text, const TextStyle& style)
                   style.is_bold ? " font-weight=\"600\"" : "", rotation, wire::markup_text(text));
 }
 
-void SvgWriter::rectangle(const Box& box, std::string_view fill, double opacity) {
-  markup_ += fmt::format("<rect{} fill=\"{}\"{}/>\n", box_attributes(box), fill,
-                         opacity_attribute(opacity));
+void SvgWriter::rectangle(const Box& box, std::string_view fill) {
+  markup_ += fmt::format("<rect{} fill=\"{}\"/>\n", box_attributes(box), fill);
 }
 
 void SvgWriter::outlined_rectangle(const Box& box, std::string_view fill, double opacity,

@@ -53,7 +53,7 @@ class SvgWriter {
 
   /// @param place  Of the start, middle or end of the text's baseline.
   void text(Point place, std::string_view text, const TextStyle& style = {});
-  void rectangle(const Box& box, std::string_view fill, double opacity = 1.0);
+  void rectangle(const Box& box, std::string_view fill);
   void outlined_rectangle(const Box& box, std::string_view fill, double opacity,
                           const Stroke& stroke);
   void line(Point from, Point to, const Stroke& stroke);

@@ -150,7 +150,7 @@ std::string unit_text(std::string_view unit) {
 AxisRange linear_range(const ChartAxis& axis, double from, double to, std::size_t num_ticks_max) {
   const bool has_from = is_end(axis.from, Scale::linear);
   const bool has_to = is_end(axis.to, Scale::linear);
-  AxisRange range{.from = has_from ? *axis.from : from, .to = has_to ? *axis.to : to, .ticks = {}};
+  AxisRange range{.from = has_from ? *axis.from : from, .to = has_to ? *axis.to : to};
   // Differences that a double hardly holds are no range either.
   const double least = std::max(std::abs(range.from), std::abs(range.to)) * 1e-12;
   if (!(range.to - range.from > least)) {
@@ -172,8 +172,7 @@ AxisRange logarithmic_range(const ChartAxis& axis, double from, double to,
                             std::size_t num_ticks_max) {
   AxisRange range{
       .from = is_end(axis.from, Scale::logarithmic) ? *axis.from : round_outwards(from, false),
-      .to = is_end(axis.to, Scale::logarithmic) ? *axis.to : round_outwards(to, true),
-      .ticks = {}};
+      .to = is_end(axis.to, Scale::logarithmic) ? *axis.to : round_outwards(to, true)};
   if (!(range.to > range.from)) range.to = 10.0 * range.from;
   const int first = decade_of(range.from);
   const int last = decade_of(range.to);

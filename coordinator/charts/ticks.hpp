@@ -26,7 +26,7 @@ struct Tick {
 struct AxisRange {
   double from = 0.0;
   double to = 1.0;
-  std::vector<Tick> ticks;
+  std::vector<Tick> ticks = {};
 };
 
 /// Steps are 1, 2 or 5 times a power of ten, the smallest with `num_ticks_max` ticks at most.

@@ -19,16 +19,9 @@ double end_of(const ComputedRuns& computed) {
 }
 double begin_of(const ComputedRuns& computed) { return end_of(computed) - computed.compute_s; }
 
-std::map<std::uint64_t, const WorkerRecord*> workers_by_key(const RecentAttempts& attempts) {
-  std::map<std::uint64_t, const WorkerRecord*> workers;
-  for (const WorkerRecord& worker : attempts.workers) workers[worker.key] = &worker;
-  return workers;
-}
-
-std::string worker_name(const std::map<std::uint64_t, const WorkerRecord*>& workers,
-                        std::uint64_t key) {
-  const auto found = workers.find(key);
-  return found == workers.end() ? fmt::format("worker {}", key) : found->second->name;
+std::string worker_name(const RecentAttempts& attempts, std::uint64_t key) {
+  const auto found = std::ranges::find(attempts.workers, key, &WorkerRecord::key);
+  return found == attempts.workers.end() ? fmt::format("worker {}", key) : found->name;
 }
 
 /// `run 17`, `16 runs, 32 to 47`.
@@ -134,7 +127,6 @@ std::string attempts_chart(const RecentAttempts& attempts) {
   const ShownTime shown = shown_time(attempts);
   const std::vector<AttemptLane> lanes = shown_lanes(attempts, shown);
   const std::size_t num_shown = std::min(lanes.size(), chart_lanes_max);
-  const auto workers = workers_by_key(attempts);
   Timeline timeline{
       .text = {.id = "attempts",
                .title = "Attempts by worker",
@@ -143,13 +135,12 @@ std::string attempts_chart(const RecentAttempts& attempts) {
                                           attempts.workers.size(), shown.end_s - shown.begin_s)},
       .x = {.label = "time until the last result, s",
             .from = shown.begin_s - shown.end_s,
-            .to = 0.0},
-      .lanes = {}};
+            .to = 0.0}};
   for (const AttemptLane& lane : std::span(lanes).first(num_shown)) {
     TimelineLane& drawn = timeline.lanes.emplace_back();
     drawn.bars = bars_of(lane, shown.end_s);
     if (lane.number > 0) continue;
-    drawn.label = worker_name(workers, lane.worker_key);
+    drawn.label = worker_name(attempts, lane.worker_key);
     drawn.marks = losses_of(attempts, lane.worker_key, shown.end_s);
   }
   std::string html = fmt::format(

@@ -43,22 +43,30 @@ void append_events(const CampaignHistory& history, std::deque<StoredEvent>& even
   while (events.size() > page_events_max) events.pop_front();
 }
 
-std::shared_ptr<const CampaignEvents> read_events_of(const CampaignRecord& campaign,
-                                                     const CampaignEvents* before) {
-  auto now = before == nullptr ? std::make_shared<CampaignEvents>()
-                               : std::make_shared<CampaignEvents>(*before);
+/// What was read before, read further.
+template <typename Part, typename Read>
+std::shared_ptr<const Part> read_part(const CampaignRecord& campaign, const Part* before,
+                                      const Read& read_further) {
+  auto now = before == nullptr ? std::make_shared<Part>() : std::make_shared<Part>(*before);
   now->failure.clear();
   try {
-    const CampaignHistory history(campaign.file);
-    append_events(history, now->events);
-    now->losses = history.losses();
-    now->ends = history.ends_without_estimate();
-    now->given_up = history.given_up(page_given_up_max);
-    now->attempts = history.recent_attempts(page_attempts_max, page_losses_max);
+    read_further(*now);
   } catch (const std::exception& error) {
     now->failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
   }
   return now;
+}
+
+std::shared_ptr<const CampaignEvents> read_events_of(const CampaignRecord& campaign,
+                                                     const CampaignEvents* before) {
+  return read_part(campaign, before, [&](CampaignEvents& now) {
+    const CampaignHistory history(campaign.file);
+    append_events(history, now.events);
+    now.losses = history.losses();
+    now.ends = history.ends_without_estimate();
+    now.given_up = history.given_up(page_given_up_max);
+    now.attempts = history.recent_attempts(page_attempts_max, page_losses_max);
+  });
 }
 
 /// A range of runs that has to be looked up costs as much as so many results of one range.
@@ -82,21 +90,15 @@ bool goes_on(const ResultsReading* reading, const Store& store, const CampaignRe
 
 std::shared_ptr<const CampaignResults> read_results_of(const CampaignRecord& campaign,
                                                        const CampaignResults* before) {
-  auto now = before == nullptr ? std::make_shared<CampaignResults>()
-                               : std::make_shared<CampaignResults>(*before);
-  now->failure.clear();
-  try {
+  return read_part(campaign, before, [&](CampaignResults& now) {
     const Store store = Store::open_read_only(campaign.file);
-    const bool is_further = goes_on(now->reading.get(), store, campaign);
-    ResultsReading reading = is_further ? *now->reading : ResultsReading(store);
+    const bool is_further = goes_on(now.reading.get(), store, campaign);
+    ResultsReading reading = is_further ? *now.reading : ResultsReading(store);
     reading.read_further(store, page_results_a_reading);
-    now->html = reading.results().html();
-    now->num_runs = reading.num_read();
-    now->reading = std::make_shared<const ResultsReading>(std::move(reading));
-  } catch (const std::exception& error) {
-    now->failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
-  }
-  return now;
+    now.html = reading.results().html();
+    now.num_runs = reading.num_read();
+    now.reading = std::make_shared<const ResultsReading>(std::move(reading));
+  });
 }
 
 void become_unimportant() {

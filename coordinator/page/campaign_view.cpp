@@ -18,26 +18,16 @@ using wire::markup_text;
 /// Events that the page shows, page by page; the database and the API have more.
 constexpr std::size_t shown_events_max = 200;
 
-std::string fact(std::string_view name, std::string_view value) {
-  return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name, value);
-}
-
 std::string facts_of(const CampaignRecord& campaign) {
   const proto::CampaignStatus& status = campaign.status;
   std::string html =
       "<dl>" + fact("phase", wire::phase_name(status)) + fact("done", grouped(status.num_done())) +
-      fact("of runs", grouped(status.num_runs())) +
-      fact("runs/s", status.rate_hz() > 0.0 ? measured_figure(status.rate_hz()) : "–") +
-      fact("time left", status.has_remaining_s() ? duration_text(status.remaining_s()) : "–") +
-      fact("lent", grouped(status.num_lent())) +
+      fact("of runs", grouped(status.num_runs())) + fact("runs/s", rate_text(status)) +
+      fact("time left", time_left_text(status)) + fact("lent", grouped(status.num_lent())) +
       fact("to be stored", grouped(campaign.num_waiting)) +
       fact("priority", std::to_string(status.priority()));
   if (!status.owner().empty()) html += fact("owner", markup_text(status.owner()));
   return html + "</dl>\n";
-}
-
-std::string reading_line(TimePoint read_at, TimePoint now) {
-  return fmt::format("{} ago", duration_text(seconds(now - read_at)));
 }
 
 std::string results_of(const CampaignDetails& details, std::uint64_t num_done, TimePoint now) {
@@ -50,9 +40,9 @@ std::string results_of(const CampaignDetails& details, std::uint64_t num_done, T
   if (results.html.empty()) return notes;
   return fmt::format(
       "{}<section><h2>Results</h2>\n<p class=\"note\">{} of {} finished runs, read "
-      "{}</p>\n{}</section>\n",
+      "{} ago</p>\n{}</section>\n",
       notes, grouped(results.num_runs), grouped(std::max(num_done, results.num_runs)),
-      reading_line(details.results_at, now), results.html);
+      duration_text(seconds(now - details.results_at)), results.html);
 }
 
 /// A table under a heading; nothing without rows.
@@ -153,8 +143,7 @@ PageContent campaign_page(const CampaignRecord& campaign, const CampaignDetails&
   const proto::CampaignStatus& status = campaign.status;
   return {.title = "Campaign " + status.name(),
           .to_root = "../",
-          .live = fmt::format("<p class=\"large\">{}</p>\n",
-                              progress_bar(status.num_done(), status.num_runs(), "progress")) +
+          .live = fmt::format("<p class=\"large\">{}</p>\n", progress_bar(status, "progress")) +
                   facts_of(campaign) + notes_list(notes_about(status)) +
                   results_of(details, status.num_done(), now) +
                   history_of(details, campaign, request)};

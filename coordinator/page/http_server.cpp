@@ -51,12 +51,6 @@ struct Shared {
   std::atomic<std::uint64_t> num_refused = 0;
 };
 
-HttpAnswer plain_answer(unsigned status, std::string_view text) {
-  return {.status = status,
-          .content_type = "text/plain; charset=utf-8",
-          .body = fmt::format("{}\n", text)};
-}
-
 HttpAnswer content_refusal() { return plain_answer(413, "a request must have no content"); }
 
 /// A client of IPv6 may have many addresses: a network of 64 bits counts as one client.
@@ -299,52 +293,49 @@ class BlockedSignals {
 
 }  // namespace
 
-class HttpServer::Impl {
- public:
-  Impl(const HttpConfig& config, Handler handler) : acceptor_(context_), pause_(context_) {
-    shared_.config = config;
-    shared_.handler = std::move(handler);
+HttpAnswer plain_answer(unsigned status, std::string_view text) {
+  return {.status = status,
+          .content_type = "text/plain; charset=utf-8",
+          .body = fmt::format("{}\n", text)};
+}
+
+struct HttpServer::Impl {
+  Impl(const HttpConfig& config, Handler handler) : acceptor(context), pause(context) {
+    shared.config = config;
+    shared.handler = std::move(handler);
     listen();
     const BlockedSignals blocked;
-    thread_ = std::thread([this] { context_.run(); });
+    thread = std::thread([this] { context.run(); });
   }
   ~Impl() {
-    context_.stop();
-    thread_.join();
+    context.stop();
+    thread.join();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  [[nodiscard]] std::uint16_t port() const { return port_; }
-  [[nodiscard]] HttpCounts counts() const {
-    return {.num_connections = shared_.num_connections,
-            .num_requests = shared_.num_requests,
-            .num_refused = shared_.num_refused};
-  }
-
- private:
   void listen() {
-    const tcp::endpoint endpoint = endpoint_of(shared_.config);
+    const tcp::endpoint endpoint = endpoint_of(shared.config);
     try {
-      acceptor_.open(endpoint.protocol());
-      keep_from_children(acceptor_.native_handle());
-      acceptor_.set_option(tcp::acceptor::reuse_address(true));
-      acceptor_.bind(endpoint);
-      acceptor_.listen(backlog);
-      port_ = acceptor_.local_endpoint().port();
+      acceptor.open(endpoint.protocol());
+      keep_from_children(acceptor.native_handle());
+      acceptor.set_option(tcp::acceptor::reuse_address(true));
+      acceptor.bind(endpoint);
+      acceptor.listen(backlog);
+      port = acceptor.local_endpoint().port();
     } catch (const boost::system::system_error& error) {
-      refuse_address(shared_.config, error.code().message());
+      refuse_address(shared.config, error.code().message());
     }
     accept();
   }
 
   void accept() {
-    acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
+    acceptor.async_accept([this](ErrorCode error, tcp::socket socket) {
       if (!error) serve(std::move(socket));
       if (!error || error == asio::error::connection_aborted) return accept();
       // No descriptor is left: the next attempt would fail at once.
-      pause_.expires_after(accept_again_after);
-      pause_.async_wait([this](ErrorCode stopped) {
+      pause.expires_after(accept_again_after);
+      pause.async_wait([this](ErrorCode stopped) {
         if (!stopped) accept();
       });
     });
@@ -352,11 +343,11 @@ class HttpServer::Impl {
 
   void serve(tcp::socket socket) {
     keep_from_children(socket.native_handle());
-    const bool is_full = shared_.sessions.size() >= shared_.config.num_connections_max;
-    if (is_full) ++shared_.num_refused;
-    if (!is_full || make_room(shared_)) {
-      std::make_shared<Session>(std::move(socket), shared_)
-          ->begin(shared_.config.request_duration_max);
+    const bool is_full = shared.sessions.size() >= shared.config.num_connections_max;
+    if (is_full) ++shared.num_refused;
+    if (!is_full || make_room(shared)) {
+      std::make_shared<Session>(std::move(socket), shared)
+          ->begin(shared.config.request_duration_max);
       return;
     }
     constexpr std::string_view refusal =
@@ -367,12 +358,12 @@ class HttpServer::Impl {
     socket.write_some(asio::buffer(refusal), ignored);
   }
 
-  Shared shared_;
-  asio::io_context context_{1};  // Ends before what its connections use.
-  tcp::acceptor acceptor_;
-  asio::steady_timer pause_;
-  std::uint16_t port_ = 0;
-  std::thread thread_;
+  Shared shared;
+  asio::io_context context{1};  // Ends before what its connections use.
+  tcp::acceptor acceptor;
+  asio::steady_timer pause;
+  std::uint16_t port = 0;
+  std::thread thread;
 };
 
 HttpServer::HttpServer(const HttpConfig& config, Handler handler)
@@ -380,8 +371,13 @@ HttpServer::HttpServer(const HttpConfig& config, Handler handler)
 
 HttpServer::~HttpServer() = default;
 
-std::uint16_t HttpServer::port() const { return impl_->port(); }
+std::uint16_t HttpServer::port() const { return impl_->port; }
 
-HttpCounts HttpServer::counts() const { return impl_->counts(); }
+HttpCounts HttpServer::counts() const {
+  const Shared& shared = impl_->shared;
+  return {.num_connections = shared.num_connections,
+          .num_requests = shared.num_requests,
+          .num_refused = shared.num_refused};
+}
 
 }  // namespace proofmass::coordinator

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -27,6 +28,9 @@ struct HttpAnswer {
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< Beside those of HttpConfig.
   bool has_shown_token = false;  ///< The client has, and its connection is kept before others.
 };
+
+/// A line of plain text.
+[[nodiscard]] HttpAnswer plain_answer(unsigned status, std::string_view text);
 
 /// Bounds of a server.
 struct HttpConfig {
@@ -75,7 +79,7 @@ class HttpServer {
   [[nodiscard]] HttpCounts counts() const;  ///< From any thread.
 
  private:
-  class Impl;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

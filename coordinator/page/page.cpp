@@ -8,7 +8,6 @@
 
 #include "coordinator/page/campaign_details.hpp"
 #include "coordinator/page/http_server.hpp"
-#include "coordinator/page/page_access.hpp"
 #include "coordinator/page/page_site.hpp"
 #include "coordinator/page/snapshot_board.hpp"
 #include "core/error.hpp"

@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "core/error.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -75,12 +76,7 @@ void check_token_file(const std::filesystem::path& file, int descriptor) {
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) refuse_token_file(file, std::strerror(errno));
   if (!S_ISREG(status.st_mode)) refuse_token_file(file, "must be a regular file");
-  if (status.st_uid != ::geteuid()) {
-    refuse_token_file(file, "must be owned by the user who runs this program");
-  }
-  if ((status.st_mode & 077) == 0) return;
-  refuse_token_file(file, fmt::format("mode {:04o}; must be readable by its owner alone: chmod 600",
-                                      status.st_mode & 07777));
+  wire::check_reach("page token file", file, status, wire::Reach::private_to_owner);
 }
 
 /// The value of our cookie in a header `a=b; c=d`; empty if it is not there.
@@ -168,11 +164,9 @@ bool PageToken::is_cookie(std::string_view value) const {
 std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) const {
   if (!token_) {
     if (is_loopback_host(request.host)) return std::nullopt;
-    return HttpAnswer{.status = 403,
-                      .content_type = "text/plain; charset=utf-8",
-                      .body =
-                          "Host: must be localhost or a loopback address, unless the "
-                          "coordinator has a --page-token-file\n"};
+    return plain_answer(403,
+                        "Host: must be localhost or a loopback address, unless the coordinator "
+                        "has a --page-token-file");
   }
   if (token_->is(bearer_in(request.authorization))) return std::nullopt;
   if (token_->is_cookie(cookie_in(request.cookie))) return std::nullopt;
@@ -190,12 +184,11 @@ std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) con
 // The cookie has no path: the browser takes that of the page, also behind a proxy.
 std::optional<HttpAnswer> PageAccess::welcome(std::string_view given_token) const {
   if (!token_ || !token_->is(given_token)) return std::nullopt;
-  return HttpAnswer{.status = 303,
-                    .content_type = "text/plain; charset=utf-8",
-                    .body = "the token is right\n",
-                    .headers = {{"Location", "./"},
-                                {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict",
-                                                           cookie_name, token_->cookie_value())}}};
+  HttpAnswer answer = plain_answer(303, "the token is right");
+  answer.headers = {{"Location", "./"},
+                    {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict", cookie_name,
+                                               token_->cookie_value())}};
+  return answer;
 }
 
 bool is_loopback_host(std::string_view host) {

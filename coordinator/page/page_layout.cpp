@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "coordinator/report/status_notes.hpp"
+#include "coordinator/table/figures.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -66,11 +68,23 @@ std::string list_navigation(const PageOfList& list, std::string_view things,
                     page_link(address, list.num_pages, "last", has_after));
 }
 
-std::string progress_bar(std::uint64_t count, std::uint64_t total, std::string_view name) {
-  const std::uint64_t percent = count * 100 / std::max<std::uint64_t>(1, total);
+std::string progress_bar(const proto::CampaignStatus& campaign, std::string_view name) {
   return fmt::format(
       "<progress max=\"{}\" value=\"{}\" aria-label=\"{}\"></progress> <span>{}&nbsp;%</span>",
-      std::max<std::uint64_t>(1, total), count, markup_text(name), percent);
+      std::max<std::uint64_t>(1, campaign.num_runs()), campaign.num_done(), markup_text(name),
+      percent_done(campaign));
+}
+
+std::string rate_text(const proto::CampaignStatus& campaign) {
+  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
+}
+
+std::string time_left_text(const proto::CampaignStatus& campaign) {
+  return campaign.has_remaining_s() ? duration_text(campaign.remaining_s()) : "–";
+}
+
+std::string fact(std::string_view name, std::string_view value) {
+  return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name, value);
 }
 
 std::string grouped(std::uint64_t count) {

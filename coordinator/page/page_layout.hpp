@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
@@ -39,9 +40,17 @@ struct PageOfList {
 [[nodiscard]] std::string list_navigation(const PageOfList& list, std::string_view things,
                                           std::string_view address);
 
-/// A bar with its percentage in words.
-[[nodiscard]] std::string progress_bar(std::uint64_t count, std::uint64_t total,
+/// A bar of the finished runs with its percentage in words.
+/// @param name  Of the bar, for screen readers.
+[[nodiscard]] std::string progress_bar(const proto::CampaignStatus& campaign,
                                        std::string_view name);
+
+/// Runs a second, and the time until all are finished; dashes where they are not known.
+[[nodiscard]] std::string rate_text(const proto::CampaignStatus& campaign);
+[[nodiscard]] std::string time_left_text(const proto::CampaignStatus& campaign);
+
+/// A name with what it has, as a part of a `<dl>`.
+[[nodiscard]] std::string fact(std::string_view name, std::string_view value);
 
 /// `1,234,567`
 [[nodiscard]] std::string grouped(std::uint64_t count);

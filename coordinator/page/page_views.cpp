@@ -29,17 +29,8 @@ Cell campaign_link(const CampaignStatus& campaign) {
 
 Cell progress_cell(const CampaignStatus& campaign) {
   Cell cell("");
-  cell.markup =
-      progress_bar(campaign.num_done(), campaign.num_runs(), "progress of " + campaign.name());
+  cell.markup = progress_bar(campaign, "progress of " + campaign.name());
   return cell;
-}
-
-std::string rate_cell(const CampaignStatus& campaign) {
-  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
-}
-
-std::string time_left_cell(const CampaignStatus& campaign) {
-  return campaign.has_remaining_s() ? duration_text(campaign.remaining_s()) : "–";
 }
 
 std::string title_of(const ServiceSnapshot& snapshot) {
@@ -146,8 +137,7 @@ Row worker_row(const RegisteredWorker& worker) {
 std::string worker_counts(const ServiceSnapshot& service) {
   std::string html = "<dl>";
   for (std::size_t i = 0; i < worker_activities.size(); ++i) {
-    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name_of(worker_activities[i]),
-                        grouped(service.num_workers_by_activity[i]));
+    html += fact(name_of(worker_activities[i]), grouped(service.num_workers_by_activity[i]));
   }
   return html + "</dl>\n";
 }
@@ -222,8 +212,8 @@ PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& re
     const CampaignStatus& campaign = campaigns[i].status;
     table.rows.push_back({campaign_link(campaign), wire::phase_name(campaign),
                           progress_cell(campaign), grouped(campaign.num_done()),
-                          grouped(campaign.num_runs()), rate_cell(campaign),
-                          time_left_cell(campaign), std::to_string(campaign.priority())});
+                          grouped(campaign.num_runs()), rate_text(campaign),
+                          time_left_text(campaign), std::to_string(campaign.priority())});
   }
   return {.title = "Campaigns",
           .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +

@@ -15,25 +15,14 @@ namespace {
 
 constexpr std::size_t num_correlated_of_each = 3;
 
-/// What an error may follow from.
-struct CauseInput {
-  std::string name;
-  std::vector<double> values;
-};
-
 using Correlations = std::vector<std::optional<double>>;  // With the error of each quantity.
-
-std::optional<double> coefficient_of(std::span<const double> input,
-                                     std::span<const double> errors) {
-  const std::optional<double> correlation = linear_correlation(input, errors);
-  const double least = 4.0 / std::sqrt(static_cast<double>(errors.size()));
-  return correlation && std::abs(*correlation) >= least ? correlation : std::nullopt;
-}
 
 Correlations correlations_of(std::span<const double> input, const DrawnRuns& drawn) {
   Correlations correlations;
+  const double least = 4.0 / std::sqrt(static_cast<double>(input.size()));
   for (const std::vector<double>& errors : drawn.errors) {
-    correlations.push_back(coefficient_of(input, errors));
+    correlations.push_back(linear_correlation(input, errors));
+    if (correlations.back() && std::abs(*correlations.back()) < least) correlations.back().reset();
   }
   return correlations;
 }
@@ -57,11 +46,7 @@ void add_terms(const DrawnRuns& drawn, std::size_t quantity,
   for (const ExplanatoryTerm& term :
        explanatory_terms(inputs, drawn.errors[quantity], num_terms_max, default_confidence)) {
     const std::string name = term_name(drawn, term);
-    causes.terms.push_back({.quantity = quantity,
-                            .name = name,
-                            .slope = term.slope,
-                            .share = term.share,
-                            .p_value = term.p_value});
+    causes.terms.push_back({quantity, name, term});
     add_input(causes, name, correlations_of(values_of_term(drawn, term), drawn));
   }
 }
@@ -92,11 +77,7 @@ std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) 
     const std::string of_truth = "truth_" + quantity.column();
     std::ranges::replace(drawn.names, of_truth, fmt::format("true {}", quantity.symbol));
   }
-  Causes causes{.num_runs = drawn.runs.size(),
-                .num_with_estimate = drawn.num_with_estimate,
-                .terms = {},
-                .inputs = {},
-                .correlations = {}};
+  Causes causes{.num_runs = drawn.runs.size(), .num_with_estimate = drawn.num_with_estimate};
   const std::vector<proofmass::Column> inputs(drawn.columns.begin(), drawn.columns.end());
   std::vector<Correlations> of_columns;
   for (const proofmass::Column input : inputs) of_columns.push_back(correlations_of(input, drawn));

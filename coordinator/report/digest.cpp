@@ -5,10 +5,7 @@
 #include <array>
 #include <bit>
 #include <concepts>
-#include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <vector>
 
 namespace proofmass::coordinator {
 namespace {

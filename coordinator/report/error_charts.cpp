@@ -33,9 +33,7 @@ std::string objective_sentence(const Review& review, std::size_t index) {
   const double objective = review.objectives[index];
   if (!std::isfinite(objective)) return "It has no objective.";
   const Quantity& quantity = quantity_at(review, index);
-  const std::uint64_t beyond = review.results.statistics.num_estimated == 0
-                                   ? 0
-                                   : review.results.statistics.accuracy[index].num_beyond_objective;
+  const std::uint64_t beyond = review.results.statistics.accuracy[index].num_beyond_objective;
   return fmt::format("{} {} the objective of {}.", beyond,
                      beyond == 1 ? "run exceeds" : "runs exceed",
                      quantity_text(objective, quantity));
@@ -70,16 +68,6 @@ Markers worst_markers(const Review& review, std::size_t index, double scale) {
   return markers;
 }
 
-void add_magnitude_layers(const Review& review, std::size_t index, double scale, Chart& chart) {
-  chart.layers.emplace_back(bars_of(review.figures[index].magnitudes, scale));
-  const double objective = review.objectives[index];
-  if (std::isfinite(objective)) {
-    chart.layers.emplace_back(
-        LimitLine{.label = fmt::format("objective {}", figure_text(objective / scale)),
-                  .value = objective / scale});
-  }
-}
-
 /// The middle of an interval and its ends as lines.
 void add_interval(const std::optional<Interval>& interval, double value, double scale,
                   std::string_view label, Chart& chart) {
@@ -92,15 +80,11 @@ void add_interval(const std::optional<Interval>& interval, double value, double 
   }
 }
 
-Band band_of(std::string name, Ink ink) {
-  return {.name = std::move(name), .points = {}, .ink = ink};
-}
-
-void add_to_band(std::uint64_t num_runs, const std::optional<Interval>& interval, double scale,
+void add_to_band(double num_runs, const std::optional<Interval>& interval, double scale,
                  Band& band) {
   if (!interval) return;
-  band.points.push_back({static_cast<double>(num_runs), std::max(interval->lower, 0.0) / scale,
-                         interval->upper / scale});
+  band.points.push_back(
+      {num_runs, std::max(interval->lower, 0.0) / scale, interval->upper / scale});
 }
 
 std::string convergence_sentence(const Review& review, std::size_t index) {
@@ -137,9 +121,13 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
                            objective_sentence(review, index), worst_sentence(review, index),
                            below_sentence(histogram))},
               .x = {.label = axis_label("|error|", quantity), .scale = Scale::logarithmic},
-              .y = {.label = "runs"},
-              .layers = {}};
-  add_magnitude_layers(review, index, quantity.display_scale, chart);
+              .y = {.label = "runs"}};
+  const double objective = review.objectives[index] / quantity.display_scale;
+  chart.layers.emplace_back(bars_of(histogram, quantity.display_scale));
+  if (std::isfinite(objective)) {
+    chart.layers.emplace_back(LimitLine{
+        .label = fmt::format("objective {}", figure_text(objective)), .value = objective});
+  }
   chart.layers.emplace_back(worst_markers(review, index, quantity.display_scale));
   return chart;
 }
@@ -148,8 +136,7 @@ Chart error_chart(const Review& review, std::size_t index) {
   const Quantity& quantity = quantity_at(review, index);
   const CampaignStatistics& statistics = review.results.statistics;
   Chart chart{.text = {.id = fmt::format("error-{}", quantity.name),
-                       .title = fmt::format("Error of {}", quantity.symbol),
-                       .description = ""},
+                       .title = fmt::format("Error of {}", quantity.symbol)},
               .x = {.label = axis_label("estimate − truth", quantity)},
               .y = {.label = "runs"},
               .layers = {bars_of(review.figures[index].errors, quantity.display_scale)}};
@@ -178,16 +165,16 @@ Chart convergence_chart(const Review& review, std::size_t index) {
   Line worst{.name = "worst", .ink = Ink::second, .dash = Dash::dashed};
   Line mean{.name = "mean", .ink = Ink::first};
   Line deviation{.name = "std", .ink = Ink::third, .dash = Dash::dotted};
-  Band mean_band = band_of("", Ink::first);
-  Band deviation_band = band_of("95 % intervals", Ink::third);
+  Band mean_band;
+  Band deviation_band{.name = "95 % intervals", .ink = Ink::third};
   for (const ConvergencePoint& point : review.figures[index].convergence) {
     const auto n = static_cast<double>(point.num_runs);
     worst.points.push_back({n, point.worst / scale});
     mean.points.push_back({n, point.mean / scale});
-    add_to_band(point.num_runs, point.mean_interval, scale, mean_band);
+    add_to_band(n, point.mean_interval, scale, mean_band);
     if (point.num_runs < 2) continue;
     deviation.points.push_back({n, point.standard_deviation / scale});
-    add_to_band(point.num_runs, point.deviation_interval, scale, deviation_band);
+    add_to_band(n, point.deviation_interval, scale, deviation_band);
   }
   return {.text = {.id = fmt::format("convergence-{}", quantity.name),
                    .title = fmt::format("Convergence of {}", quantity.symbol),
@@ -199,10 +186,7 @@ Chart convergence_chart(const Review& review, std::size_t index) {
 }
 
 ChartGrid magnitude_overview(const Review& review) {
-  ChartGrid grid{
-      .text = {.id = "errors", .title = "Errors in units of their objectives", .description = ""},
-      .num_columns = 2,
-      .charts = {}};
+  ChartGrid grid{.text = {.id = "errors", .title = "Errors in units of their objectives"}};
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     const Quantity& quantity = quantity_at(review, i);
     const double objective = review.objectives[i];
@@ -212,8 +196,7 @@ ChartGrid magnitude_overview(const Review& review) {
       scale = worst[0].value;
     }
     Chart chart{.text = {.id = fmt::format("errors-{}", quantity.name),
-                         .title = std::string(quantity.symbol),
-                         .description = ""},
+                         .title = std::string(quantity.symbol)},
                 .x = {.label = std::isfinite(objective) ? "|error| / objective" : "|error| / worst",
                       .scale = Scale::logarithmic,
                       .from = 1e-4,
@@ -233,9 +216,7 @@ ChartGrid convergence_overview(const Review& review) {
       .text = {.id = "convergence",
                .title = "95 % intervals of mean and std of |error|",
                .description =
-                   "Half the width of each interval over the value, against the number of runs."},
-      .num_columns = 2,
-      .charts = {}};
+                   "Half the width of each interval over the value, against the number of runs."}};
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     Line mean{.name = i == 0 ? "mean" : ""};
     Line deviation{.name = i == 0 ? "std" : "", .ink = Ink::second, .dash = Dash::dashed};
@@ -250,8 +231,7 @@ ChartGrid convergence_overview(const Review& review) {
     }
     grid.charts.push_back(
         {.text = {.id = fmt::format("convergence-of-{}", quantity_at(review, i).name),
-                  .title = std::string(quantity_at(review, i).symbol),
-                  .description = ""},
+                  .title = std::string(quantity_at(review, i).symbol)},
          .x = {.label = "runs", .scale = Scale::logarithmic},
          .y = {.label = "± %", .from = 0.0, .to = 100.0},
          .layers = {std::move(mean), std::move(deviation)},

@@ -84,16 +84,13 @@ Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit
         "takes it for, to {:.2g} %",
         fit.size(), 100.0 * schema.fit_tolerance));
   }
-  const auto cell = [](const std::optional<double>& value) {
-    return value ? figure_cell(*value) : no_figure();
-  };
   for (const FitStatistic& of : fit) {
     Row row{of.session, figure_cell(of.chi_squared), figure_cell(of.degrees_of_freedom),
             of.ratio > 0.0 ? figure_cell(of.ratio) : no_figure()};
     if (has_p_values) {
       const bool is_by_chance = of.p_value.value_or(1.0) >= 1.0 - default_confidence;
-      row.push_back(cell(of.ratio_error));
-      row.push_back(cell(of.p_value));
+      row.push_back(figure_cell(of.ratio_error));
+      row.push_back(figure_cell(of.p_value));
       row.emplace_back(is_by_chance ? "" : "does not fit", Tone::bad);
     }
     table.rows.push_back(std::move(row));

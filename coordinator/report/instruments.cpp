@@ -8,10 +8,11 @@
 #include <string>
 #include <utility>
 
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
-#include "core/statistics/moments.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -137,17 +138,11 @@ void RunningInstruments::add_values(std::size_t i) {
 InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
   const Quantity& quantity = quantities_[i];
   InstrumentQuantity of{.error = quantity.errors.analysis(default_confidence),
-                        .magnitude_interval = {},
-                        .beyond = share_of(quantity.beyond),
-                        .standard_errors = {}};
+                        .beyond = share_of(quantity.beyond)};
   if (of.error.num_groups > 0) {
     const Moments magnitudes = quantity.magnitudes.moments();
     of.mean_magnitude = magnitudes.mean;
-    of.magnitude_interval = mean_interval(magnitudes, default_confidence);
-    // Of few instruments the symmetric interval may begin below 0, where no mean can lie.
-    if (of.magnitude_interval) {
-      of.magnitude_interval->lower = std::fmax(of.magnitude_interval->lower, 0.0);
-    }
+    of.magnitude_interval = not_negative(mean_interval(magnitudes, default_confidence));
   }
   if (!have_standard_errors_ || !quantity.position) return of;
   of.standard_errors = {.within_ratio = {},
@@ -186,20 +181,12 @@ std::string percent_text(double share) {
                                         : fmt::format("{:.1f}", percent);
 }
 
-Cell percent_cell(double share) {
-  Cell cell(percent_text(share));
-  cell.value = share;
-  return cell;
-}
+Cell percent_cell(double share) { return {percent_text(share), share}; }
 
 void add_percent_ends(const std::optional<Interval>& interval, Row& row) {
   for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
     row.push_back(interval ? percent_cell((*interval).*end) : no_figure());
   }
-}
-
-Cell optional_cell(const std::optional<double>& value, double scale) {
-  return value ? figure_cell(*value, scale) : no_figure();
 }
 
 std::string share_text(const GroupedShare& of) {
@@ -208,9 +195,9 @@ std::string share_text(const GroupedShare& of) {
 }
 
 std::string count_text(const InstrumentStatistics& statistics) {
-  std::string text = fmt::format(
-      "{} {} with {} realisations of the noise each", statistics.num_instruments,
-      statistics.num_instruments == 1 ? "instrument" : "instruments", statistics.realisations);
+  std::string text =
+      fmt::format("{} with {} realisations of the noise each",
+                  counted(statistics.num_instruments, "instrument"), statistics.realisations);
   if (statistics.num_incomplete > 0) {
     text += fmt::format("; {} more left out, as not all of their runs are finished",
                         statistics.num_incomplete);
@@ -248,7 +235,7 @@ Row variance_row(const proofmass::Quantity& quantity, const InstrumentQuantity& 
   const double scale = quantity.display_scale;
   row.push_back(figure_cell(of.mean_magnitude, scale));
   add_ends(of.magnitude_interval, scale, row);
-  row.push_back(optional_cell(of.error.between_deviation, scale));
+  row.push_back(figure_cell(of.error.between_deviation, scale));
   row.push_back(figure_cell(of.error.within_deviation, scale));
   row.push_back(of.error.within_share ? percent_cell(*of.error.within_share) : no_figure());
   add_percent_ends(of.error.within_share_interval, row);
@@ -258,9 +245,8 @@ Row variance_row(const proofmass::Quantity& quantity, const InstrumentQuantity& 
 std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) {
   std::vector<std::string> notes{count_text(statistics)};
   if (statistics.num_not_estimated > 0) {
-    notes.push_back(fmt::format("left out: {} {} with a run that has no estimate",
-                                statistics.num_not_estimated,
-                                statistics.num_not_estimated == 1 ? "instrument" : "instruments"));
+    notes.push_back(fmt::format("left out: {} with a run that has no estimate",
+                                counted(statistics.num_not_estimated, "instrument")));
   }
   notes.emplace_back(
       "from, to: 95 % interval with the instrument as the unit; each holds by itself: of 20, one "
@@ -340,7 +326,7 @@ Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& s
     add_percent_ends(of.beyond.interval, row);
     if (const auto& sigma = of.standard_errors) {
       add_percent_ends(sigma->covered.interval, row);
-      row.push_back(optional_cell(sigma->within_ratio, 1.0));
+      row.push_back(figure_cell(sigma->within_ratio));
       add_percent_ends(sigma->covered_within.interval, row);
     }
     row.resize(table.columns.size(), no_figure());
@@ -349,50 +335,35 @@ Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& s
   return table;
 }
 
-namespace {
-
-using Json = nlohmann::ordered_json;
-
-template <typename Value>
-Json or_null(const std::optional<Value>& value) {
-  return value ? Json(*value) : Json(nullptr);
+// The library finds these by their arguments, and would not in an unnamed namespace.
+static void to_json(Json& json, const GroupedShare& of) {
+  json = {{"share", of.share}, {"interval", of.interval}};
 }
 
-Json ends_of(const std::optional<Interval>& interval) {
-  if (!interval) return nullptr;
-  return Json::array({interval->lower, interval->upper});
+static void to_json(Json& json, const GroupedStandardErrors& of) {
+  json = {{"within_ratio", of.within_ratio},
+          {"covered", of.covered},
+          {"covered_within", of.covered_within}};
 }
 
-Json json_of(const GroupedShare& of) {
-  return {{"share", of.share}, {"interval", ends_of(of.interval)}};
-}
-
-Json json_of(const InstrumentQuantity& of) {
+static void to_json(Json& json, const InstrumentQuantity& of) {
   const bool is_known = of.error.num_groups > 0;
   const auto if_known = [&](double value) { return is_known ? Json(value) : Json(nullptr); };
-  Json json{{"mean", if_known(of.mean_magnitude)},
-            {"mean_interval", ends_of(of.magnitude_interval)},
-            {"bias", if_known(of.error.mean)},
-            {"bias_interval", ends_of(of.error.mean_interval)},
-            {"between_mean_square", or_null(of.error.between_mean_square)},
-            {"within_mean_square", if_known(of.error.within_mean_square)},
-            {"between_standard_deviation", or_null(of.error.between_deviation)},
-            {"within_standard_deviation", if_known(of.error.within_deviation)},
-            {"noise_share", or_null(of.error.within_share)},
-            {"noise_share_interval", ends_of(of.error.within_share_interval)},
-            {"beyond", json_of(of.beyond)},
-            {"standard_errors", nullptr}};
-  if (of.standard_errors) {
-    json["standard_errors"] = {{"within_ratio", or_null(of.standard_errors->within_ratio)},
-                               {"covered", json_of(of.standard_errors->covered)},
-                               {"covered_within", json_of(of.standard_errors->covered_within)}};
-  }
-  return json;
+  json = {{"mean", if_known(of.mean_magnitude)},
+          {"mean_interval", of.magnitude_interval},
+          {"bias", if_known(of.error.mean)},
+          {"bias_interval", of.error.mean_interval},
+          {"between_mean_square", of.error.between_mean_square},
+          {"within_mean_square", if_known(of.error.within_mean_square)},
+          {"between_standard_deviation", of.error.between_deviation},
+          {"within_standard_deviation", if_known(of.error.within_deviation)},
+          {"noise_share", of.error.within_share},
+          {"noise_share_interval", of.error.within_share_interval},
+          {"beyond", of.beyond},
+          {"standard_errors", of.standard_errors}};
 }
 
-}  // namespace
-
-nlohmann::ordered_json json_of(const ResultSchema& schema, const InstrumentStatistics& statistics) {
+Json json_of(const ResultSchema& schema, const InstrumentStatistics& statistics) {
   Json json{{"realisations", statistics.realisations},
             {"num_instruments", statistics.num_instruments},
             {"num_incomplete", statistics.num_incomplete},
@@ -400,8 +371,8 @@ nlohmann::ordered_json json_of(const ResultSchema& schema, const InstrumentStati
             {"all_objectives", nullptr},
             {"parameters", Json::array()}};
   if (statistics.num_instruments > 0) {
-    json["all_objectives"] = {{"mixed", json_of(statistics.mixed)},
-                              {"ensemble", json_of(statistics.ensemble)},
+    json["all_objectives"] = {{"mixed", statistics.mixed},
+                              {"ensemble", statistics.ensemble},
                               {"temporal",
                                {{"num_realisations", statistics.temporal},
                                 {"num_instruments", statistics.num_temporal},
@@ -409,7 +380,7 @@ nlohmann::ordered_json json_of(const ResultSchema& schema, const InstrumentStati
   }
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     Json row{{"parameter", schema.quantities[i].name}};
-    row.update(json_of(statistics.quantities[i]));
+    row.update(Json(statistics.quantities[i]));
     json["parameters"].push_back(std::move(row));
   }
   return json;

@@ -34,10 +34,10 @@ struct GroupedStandardErrors {
 struct InstrumentQuantity {
   OneWayAnalysis error;         ///< Of the instruments all of whose runs have an estimate.
   double mean_magnitude = 0.0;  ///< Of |error|, over the same ones.
-  std::optional<Interval> magnitude_interval;
+  std::optional<Interval> magnitude_interval = {};
   /// Of the runs whose |error| is above the objective, and of those without an estimate.
   GroupedShare beyond;
-  std::optional<GroupedStandardErrors> standard_errors;
+  std::optional<GroupedStandardErrors> standard_errors = {};
 };
 
 /// What several realisations of the noise for each instrument tell. Shares are over all runs of the

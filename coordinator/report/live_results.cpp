@@ -9,7 +9,6 @@
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/table/document_table.hpp"
-#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 
 namespace proofmass::coordinator {
@@ -53,12 +52,10 @@ std::string LiveResults::html() const {
   }
   StandardErrorStatistics errors = standard_errors_.statistics();
   if (!are_draws_independent_) leave_out_intervals(errors);
-  const Table of_errors = standard_error_table(schema_, errors);
-  const Table of_fit = fit_table(schema_, errors.fit);
   return "<h3>Accuracy so far</h3>\n" +
          html_table(accuracy_table(schema_, objectives_, review.results.statistics)) +
-         (of_errors.rows.empty() ? "" : html_table(of_errors)) +
-         (of_fit.rows.empty() ? "" : html_table(of_fit)) + "<h3>Errors so far</h3>\n<figure>\n" +
+         table_or_nothing(standard_error_table(schema_, errors)) +
+         table_or_nothing(fit_table(schema_, errors.fit)) + "<h3>Errors so far</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }
 

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_tables.hpp"

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <string_view>
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
-#include "core/campaign/campaign.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/order.hpp"
@@ -202,17 +201,16 @@ std::string warnings_text(const ResultSchema& schema, const CampaignWarnings& wa
   std::string text =
       fmt::format("          {} completed with a warning, of shifts up to\n", warnings.num_runs);
   for (const WarnedQuantity& of : warnings.quantities) {
-    text += fmt::format("          {:.2g} of the objective of {}, by {} ({} {}, most in run {})\n",
+    text += fmt::format("          {:.2g} of the objective of {}, by {} ({}, most in run {})\n",
                         of.largest_part, schema.quantities[of.quantity].symbol, of.effect,
-                        of.num_runs, of.num_runs == 1 ? "run" : "runs", of.run.value);
+                        counted(of.num_runs, "run"), of.run.value);
   }
   return text;
 }
 
 ReadResults read_results(const Store& store, const Campaign& campaign,
                          const ResultVisitor& further) {
-  ReadResults results{
-      .statistics = {}, .digests = {}, .totals = {}, .warnings = {}, .standard_errors = {}};
+  ReadResults results;
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
   RunningStandardErrors standard_errors(store.schema());
@@ -276,12 +274,6 @@ void update_statistics(Store& store, const Campaign& campaign) {
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results) {
   store.write_statistics(results.statistics, campaign.error_budget(), results.digests,
                          results.warnings.first);
-}
-
-std::vector<std::string> statistic_differences(const Store& store, const Campaign& campaign,
-                                               const ReadResults& results) {
-  return store.statistic_differences(results.statistics, campaign.error_budget(),
-                                     results.warnings.first);
 }
 
 }  // namespace proofmass::coordinator

@@ -111,12 +111,6 @@ struct CheckedResults {
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);
 
-/// What `statistic`, `budget_entry` and `run_warning` have other than write_statistics() would
-/// store, a line each: `statistic.mean of gain = 1 (must be 25.5)`.
-[[nodiscard]] std::vector<std::string> statistic_differences(const Store& store,
-                                                             const Campaign& campaign,
-                                                             const ReadResults& results);
-
 /// Brings the statistics and budgets that are stored in the file up to its results; does nothing
 /// if they are.
 void update_statistics(Store& store, const Campaign& campaign);

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <utility>
 
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -68,7 +70,7 @@ void RunningReplicates::Mean::finish(std::uint64_t num_runs) {
 ReplicatedMean RunningReplicates::Mean::mean() const {
   if (!means) return {};
   const Moments moments = means->moments();
-  ReplicatedMean of{.mean = moments.mean, .interval = {}};
+  ReplicatedMean of{.mean = moments.mean};
   if (moments.count < num_replicates_of_interval) return of;
   of.interval = mean_interval(moments, default_confidence);
   return of;
@@ -129,8 +131,7 @@ ReplicateStatistics RunningReplicates::statistics() const {
     ReplicatedQuantity of{.magnitude = quantity.magnitude.mean(),
                           .bias = quantity.bias.mean(),
                           .mean_square = quantity.mean_square.mean(),
-                          .beyond = quantity.beyond.share(num_runs),
-                          .covered = {}};
+                          .beyond = quantity.beyond.share(num_runs)};
     if (have_standard_errors_ && quantity.has_standard_error) {
       of.covered = quantity.covered.share(statistics.num_estimated);
     }
@@ -146,12 +147,6 @@ std::optional<Interval> root_of(std::optional<Interval> interval) {
   if (!interval) return interval;
   interval->lower = std::sqrt(std::max(interval->lower, 0.0));
   interval->upper = std::sqrt(interval->upper);
-  return interval;
-}
-
-/// Of |error|, which is not negative.
-std::optional<Interval> not_negative(std::optional<Interval> interval) {
-  if (interval) interval->lower = std::max(interval->lower, 0.0);
   return interval;
 }
 
@@ -173,9 +168,8 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
   if (const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
       statistics.num_estimated < num_runs) {
     const std::uint64_t num_without = num_runs - statistics.num_estimated;
-    notes.push_back(fmt::format("{} {} without an estimate {} left out of the means of {}",
-                                num_without, num_without == 1 ? "run" : "runs",
-                                num_without == 1 ? "is" : "are",
+    notes.push_back(fmt::format("{} without an estimate {} left out of the means of {}",
+                                counted(num_without, "run"), num_without == 1 ? "is" : "are",
                                 num_without == 1 ? "its replicate" : "their replicates"));
   }
   if (statistics.num_drawn_again > 0) {
@@ -238,19 +232,12 @@ Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& sta
   return table;
 }
 
-namespace {
-
-using Json = nlohmann::ordered_json;
-
-Json json_of(const ReplicatedMean& of) {
-  Json json{{"mean", of.mean}, {"interval", nullptr}};
-  if (of.interval) json["interval"] = {of.interval->lower, of.interval->upper};
-  return json;
+// The library finds it by its argument, and would not in an unnamed namespace.
+static void to_json(Json& json, const ReplicatedMean& of) {
+  json = {{"mean", of.mean}, {"interval", of.interval}};
 }
 
-}  // namespace
-
-nlohmann::ordered_json json_of(const ResultSchema& schema, const ReplicateStatistics& statistics) {
+Json json_of(const ResultSchema& schema, const ReplicateStatistics& statistics) {
   Json json{{"design", name_of(statistics.design.kind)},
             {"points", statistics.design.points},
             {"num_replicates", statistics.num_replicates},
@@ -258,16 +245,16 @@ nlohmann::ordered_json json_of(const ResultSchema& schema, const ReplicateStatis
             {"first_incomplete", statistics.incomplete},
             {"num_estimated", statistics.num_estimated},
             {"num_drawn_again", statistics.num_drawn_again},
-            {"within_objectives", json_of(statistics.within_objectives)},
+            {"within_objectives", statistics.within_objectives},
             {"parameters", Json::array()}};
   for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
     const ReplicatedQuantity& of = statistics.quantities[i];
     json["parameters"].push_back({{"parameter", schema.quantities[i].name},
-                                  {"magnitude", json_of(of.magnitude)},
-                                  {"bias", json_of(of.bias)},
-                                  {"mean_square", json_of(of.mean_square)},
-                                  {"beyond", json_of(of.beyond)},
-                                  {"covered", of.covered ? json_of(*of.covered) : Json()}});
+                                  {"magnitude", of.magnitude},
+                                  {"bias", of.bias},
+                                  {"mean_square", of.mean_square},
+                                  {"beyond", of.beyond},
+                                  {"covered", of.covered}});
   }
   return json;
 }

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "coordinator/table/table.hpp"
@@ -20,7 +18,7 @@ struct ReplicatedMean {
   double mean = 0.0;  ///< Of the replicates' means.
   /// By Student's law of the replicates' means, 95 %; empty where they cannot tell, see
   /// RunningReplicates::statistics().
-  std::optional<Interval> interval;
+  std::optional<Interval> interval = {};
 };
 
 /// estimate − truth of one quantity, SI.
@@ -31,7 +29,7 @@ struct ReplicatedQuantity {
   /// Share of runs whose |error| is above the objective, or that have no estimate.
   ReplicatedMean beyond;
   /// Share of completed runs whose |error| is within normal_95 standard errors; if there are any.
-  std::optional<ReplicatedMean> covered;
+  std::optional<ReplicatedMean> covered = {};
 };
 
 /// What the replicates of a sampling design tell, with the replicate as the unit of intervals.

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/independence.hpp"
-#include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -29,17 +31,15 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
                                        results.digests.results, check)) +
       given_up_text(given_up, paint) + note_text(campaign) +
       wire::visible_lines(warnings_text(schema, results.warnings) + stop_text(store));
-  const InstrumentStatistics instruments = results.instruments.value_or(InstrumentStatistics{});
-  for (const Table& table :
-       {accuracy_table(schema, campaign.objectives(), statistics),
-        interval_table(schema, statistics, num_given_up),
-        error_table(schema, campaign.objectives(), statistics, num_given_up,
-                    campaign.interpretation(), why_not_independent(campaign)),
-        standard_error_table(schema, results.standard_errors),
-        fit_table(schema, results.standard_errors.fit), variance_table(schema, instruments),
-        instrument_table(schema, instruments),
-        replicate_table(schema, results.replicates.value_or(ReplicateStatistics{})),
-        budget_table(schema, campaign.error_budget(), statistics, results.totals)}) {
+  std::vector<Table> tables{accuracy_table(schema, campaign.objectives(), statistics),
+                            interval_table(schema, statistics, num_given_up),
+                            error_table(schema, campaign.objectives(), statistics, num_given_up,
+                                        campaign.interpretation(), why_not_independent(campaign)),
+                            standard_error_table(schema, results.standard_errors),
+                            fit_table(schema, results.standard_errors.fit)};
+  std::ranges::move(group_tables(schema, results), std::back_inserter(tables));
+  tables.push_back(budget_table(schema, campaign.error_budget(), statistics, results.totals));
+  for (const Table& table : tables) {
     if (!table.rows.empty()) text += "\n" + terminal_text(table, {.paint = paint});
   }
   return text;

@@ -4,7 +4,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/requirements.hpp"

@@ -1,12 +1,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/review_tables.hpp"
+#include "coordinator/report/status_json.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
@@ -14,26 +15,13 @@
 namespace proofmass::coordinator {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-template <typename Value>
-Json or_null(const std::optional<Value>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json bounds_of(const Interval& interval) { return {interval.lower, interval.upper}; }
-
-Json bounds_of(const std::optional<Interval>& interval) {
-  return interval ? bounds_of(*interval) : Json(nullptr);
-}
-
 Json percentiles_of(const AccuracyStatistic& accuracy) {
   Json json = Json::array();
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
     if (percentile.level == 0.0) continue;  // Not computed, see RunningStatistics.
     json.push_back({{"level", percentile.level},
                     {"value", percentile.value},
-                    {"interval", bounds_of(percentile.interval)}});
+                    {"interval", percentile.interval}});
   }
   return json;
 }
@@ -44,19 +32,19 @@ Json statistics_of(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
   Json json{{"worst", accuracy.worst},
             {"worst_run", accuracy.worst_run.value},
             {"mean", accuracy.mean},
-            {"mean_interval", bounds_of(accuracy.mean_interval)},
+            {"mean_interval", accuracy.mean_interval},
             {"standard_deviation", accuracy.standard_deviation},
-            {"standard_deviation_interval", bounds_of(accuracy.deviation_interval)},
+            {"standard_deviation_interval", accuracy.deviation_interval},
             {"percentiles", percentiles_of(accuracy)},
             {"bias", error.bias},
-            {"bias_interval", bounds_of(error.bias_interval)},
+            {"bias_interval", error.bias_interval},
             {"error_rms", error.rms},
             {"error_standard_deviation", error.standard_deviation},
-            {"error_standard_deviation_interval", bounds_of(error.deviation_interval)},
+            {"error_standard_deviation_interval", error.deviation_interval},
             {"error_skewness", error.skewness},
             {"num_beyond_objective", accuracy.num_beyond_objective},
             {"fraction_beyond_objective", nullptr},
-            {"fraction_beyond_objective_interval", bounds_of(accuracy.beyond_objective)}};
+            {"fraction_beyond_objective_interval", accuracy.beyond_objective}};
   if (num_runs == 0) {
     for (const auto& item : json.items()) item.value() = nullptr;
     return json;
@@ -143,17 +131,17 @@ Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistic
     json["parameters"].push_back({{"parameter", schema.quantities[of.quantity].name},
                                   {"num_runs", of.num_runs},
                                   {"mean", of.mean},
-                                  {"squared_ratio", or_null(of.squared_ratio)},
-                                  {"squared_ratio_standard_error", or_null(of.squared_ratio_error)},
+                                  {"squared_ratio", of.squared_ratio},
+                                  {"squared_ratio_standard_error", of.squared_ratio_error},
                                   {"num_within_95", of.num_within},
-                                  {"fraction_within_95_interval", bounds_of(of.within)}});
+                                  {"fraction_within_95_interval", of.within}});
   }
   for (const FitStatistic& of : statistics.fit) {
     json["fit"].push_back({{"session", of.session},
                            {"mean_chi_squared", of.chi_squared},
                            {"mean_degrees_of_freedom", of.degrees_of_freedom},
-                           {"ratio_standard_error", or_null(of.ratio_error)},
-                           {"p_value", or_null(of.p_value)}});
+                           {"ratio_standard_error", of.ratio_error},
+                           {"p_value", of.p_value}});
   }
   return json;
 }
@@ -164,22 +152,18 @@ Json json_of(const RequirementAnswer& answer) {
   Json json{{"requirement", answer.stated.requirement},
             {"answer", name_of(check.verdict)},
             {"rule", check.is_of_fixed_size ? "fixed size" : "sequential"},
-            {"parameter", nullptr},
-            {"limit", nullptr},
+            {"parameter", answer.is_joint() ? Json(nullptr) : Json(answer.subject.name)},
+            {"limit", answer.is_joint() ? Json(nullptr) : Json(requirement.limit)},
             {"coverage", requirement.tolerance.coverage},
             {"confidence", requirement.tolerance.confidence},
             {"num_runs", check.num_runs},
             {"num_exceedances", check.num_exceedances},
             {"num_without_estimate", check.num_without_estimate},
             {"num_exceedances_allowed", check.num_allowed},
-            {"exceedance_bounds", bounds_of(check.exceedance)},
-            {"tolerance_bound", answer.is_joint() ? Json(nullptr) : or_null(answer.bound)},
-            {"num_runs_at_best", or_null(check.num_runs_at_best)},
-            {"num_runs_at_this_rate", or_null(check.num_runs_at_this_rate)}};
-  if (!answer.is_joint()) {
-    json["parameter"] = answer.subject.name;
-    json["limit"] = requirement.limit;
-  }
+            {"exceedance_bounds", check.exceedance},
+            {"tolerance_bound", answer.is_joint() ? Json(nullptr) : Json(answer.bound)},
+            {"num_runs_at_best", check.num_runs_at_best},
+            {"num_runs_at_this_rate", check.num_runs_at_this_rate}};
   return json;
 }
 
@@ -187,12 +171,12 @@ Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
   Json json{{"id", row.stated.id},
             {"text", row.stated.text},
             {"interpretation", name_of(interpretation)},
-            {"bound", or_null(row.bound)},
-            {"relative_margin", or_null(row.relative_margin())},
+            {"bound", row.bound},
+            {"relative_margin", row.relative_margin()},
             {"worst_run", row.worst ? Json(row.worst->run.value) : Json(nullptr)},
             {"worst_value", row.worst ? Json(row.worst->value) : Json(nullptr)}};
   json.update(json_of(row));
-  json["limit"] = or_null(row.limit);
+  json["limit"] = row.limit;
   return json;
 }
 
@@ -233,7 +217,7 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"all_objectives",
              {{"num_within", statistics.num_within_objectives},
               {"num_runs", statistics.num_runs + num_given_up},
-              {"fraction_within_interval", bounds_of(statistics.within_objectives(num_given_up))}}},
+              {"fraction_within_interval", statistics.within_objectives(num_given_up)}}},
             {"standard_errors", standard_errors_of(schema, checked.results.standard_errors)},
             {"budget", budget_of(schema, campaign, checked.results)},
             {"requirements", Json::array()},
@@ -250,8 +234,7 @@ std::string report_json(const Store& store, const Campaign& campaign,
     if (!statistics.are_draws_independent) break;
     json["matrix"].push_back(json_of(row, campaign.interpretation()));
   }
-  constexpr int indent = 2;
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+  return dumped(json, JsonLayout::indented);
 }
 
 }  // namespace proofmass::coordinator

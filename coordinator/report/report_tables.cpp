@@ -69,11 +69,9 @@ Row accuracy_row(const Quantity& quantity, double objective, const AccuracyStati
   return row;
 }
 
-// Of |error|: of few runs the symmetric interval of a mean may begin below 0, where none can lie.
 void add_triple(double value, const std::optional<Interval>& interval, double scale, Row& row) {
   row.push_back(figure_cell(value, scale));
-  row.push_back(interval ? figure_cell(std::max(interval->lower, 0.0), scale) : no_figure());
-  row.push_back(interval ? figure_cell(interval->upper, scale) : no_figure());
+  add_ends(not_negative(interval), scale, row);
 }
 
 Cell skewness_cell(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
@@ -114,14 +112,17 @@ std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_est
   return text + " (one parameter by itself, not all together)";
 }
 
-Row error_row(const Quantity& quantity, double objective, const AccuracyStatistic& accuracy) {
-  const double scale = quantity.display_scale;
-  const std::optional<Interval>& bias = accuracy.error.bias_interval;
-  Row row{quantity.symbol, bias ? figure_cell(bias->lower, scale) : no_figure(),
-          bias ? figure_cell(bias->upper, scale) : no_figure()};
+void add_percentiles(const AccuracyStatistic& accuracy, double scale, Row& row) {
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
     row.push_back(figure_cell(percentile.value, scale));
   }
+}
+
+Row error_row(const Quantity& quantity, double objective, const AccuracyStatistic& accuracy) {
+  const double scale = quantity.display_scale;
+  Row row{quantity.symbol};
+  add_ends(accuracy.error.bias_interval, scale, row);
+  add_percentiles(accuracy, scale, row);
   for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
     row.push_back(std::isfinite(objective) ? figure_cell(share, 0.01) : no_figure());
   }
@@ -197,9 +198,7 @@ Table dependent_error_table(const ResultSchema& schema, const CampaignStatistics
     const AccuracyStatistic& accuracy = statistics.accuracy[i];
     Row row{quantity.symbol, figure_cell(accuracy.error.bias, quantity.display_scale),
             skewness_cell(accuracy, statistics.num_estimated)};
-    for (const PercentileStatistic& percentile : accuracy.percentiles) {
-      row.push_back(figure_cell(percentile.value, quantity.display_scale));
-    }
+    add_percentiles(accuracy, quantity.display_scale, row);
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -227,10 +226,10 @@ std::vector<std::string> budget_notes(const ResultSchema& schema, const ErrorBud
 
 }  // namespace
 
-Cell figure_cell(double value, double scale) {
-  Cell cell(signed_figure(value / scale));
-  cell.value = value;
-  cell.document = figure_text(value / scale);
+Cell figure_cell(const std::optional<double>& value, double scale) {
+  if (!value) return no_figure();
+  Cell cell(signed_figure(*value / scale), *value);
+  cell.document = figure_text(*value / scale);
   return cell;
 }
 
@@ -238,6 +237,11 @@ Cell no_figure() {
   Cell cell("-");
   cell.document = "–";
   return cell;
+}
+
+std::optional<Interval> not_negative(std::optional<Interval> interval) {
+  if (interval) interval->lower = std::fmax(interval->lower, 0.0);
+  return interval;
 }
 
 void add_ends(const std::optional<Interval>& interval, double scale, Row& row) {
@@ -255,9 +259,8 @@ Cell unit_cell(const Quantity& quantity) {
 Table accuracy_table(const ResultSchema& schema, std::span<const double> objectives,
                      const CampaignStatistics& statistics) {
   Table table{.id = "accuracy",
-              .caption = fmt::format("Accuracy of the estimates: |estimate − truth| of {} {}",
-                                     statistics.num_estimated,
-                                     statistics.num_estimated == 1 ? "run" : "runs"),
+              .caption = fmt::format("Accuracy of the estimates: |estimate − truth| of {}",
+                                     counted(statistics.num_estimated, "run")),
               .columns = {{"parameter", true, 11},
                           {"unit", true, 9},
                           {"objective", false, 9},
@@ -347,6 +350,13 @@ Table error_table(const ResultSchema& schema, const std::vector<double>& objecti
     table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
   }
   return table;
+}
+
+std::vector<Table> group_tables(const ResultSchema& schema, const ReadResults& results) {
+  if (results.replicates) return {replicate_table(schema, *results.replicates)};
+  if (!results.instruments) return {};
+  return {variance_table(schema, *results.instruments),
+          instrument_table(schema, *results.instruments)};
 }
 
 Table budget_table(const ResultSchema& schema, const std::optional<ErrorBudget>& budget,

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/table/table.hpp"
@@ -15,11 +16,14 @@ namespace proofmass::coordinator {
 // `schema` is that of the campaign whose statistics are shown.
 // Without an estimate, a table has no rows unless it says otherwise.
 
-/// A number in the display unit, and in SI units for programs.
-[[nodiscard]] Cell figure_cell(double value, double scale = 1.0);
+/// A number in the display unit, and in SI units for programs; a dash if there is none.
+[[nodiscard]] Cell figure_cell(const std::optional<double>& value, double scale = 1.0);
 [[nodiscard]] Cell no_figure();
 /// Adds the cells of the ends of an interval; of none, two without a figure.
 void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
+/// Of |error|: of few values the symmetric interval of a mean may begin below 0, where none can
+/// lie.
+[[nodiscard]] std::optional<Interval> not_negative(std::optional<Interval> interval);
 /// The unit in which a table shows a quantity.
 [[nodiscard]] Cell unit_cell(const Quantity& quantity);
 
@@ -46,6 +50,10 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
                                 const CampaignStatistics& statistics, std::uint64_t num_given_up,
                                 Interpretation interpretation,
                                 const std::string& why_not_independent = "");
+
+/// The tables whose unit is an instrument or a replicate, of several runs each.
+[[nodiscard]] std::vector<Table> group_tables(const ResultSchema& schema,
+                                              const ReadResults& results);
 
 /// Budget before and after estimation beside the published one, and what single runs have. A
 /// campaign without a budget has no rows; one without an estimate has.

@@ -48,34 +48,22 @@ std::string missing_lines(const RequirementAnswer& answer) {
                      num_missing, reasons_text(answer.missing));
 }
 
-/// How many runs exceed the limit, and the bound that decides.
-std::string exceedance_lines(const RequirementAnswer& answer) {
-  const RequirementCheck& check = answer.check;
-  const double allowed = 1.0 - answer.requirement.tolerance.coverage;
-  const std::string counts =
-      fmt::format("Exceeding    {} of {} runs", check.num_exceedances, check.num_runs);
-  std::string text = counts + "\n";
-  if (check.exceedance) {
-    text = line_of(counts + ";", bounds_text(*check.exceedance, allowed, check.verdict), margin);
-  }
-  return text + fmt::format("Allowed      {} of all draws\n", given_percent(allowed)) +
-         missing_lines(answer);
-}
-
-/// The lines about the runs in which all objectives hold.
-std::string holding_lines(const RequirementAnswer& answer) {
+/// How many runs exceed the limit, or in how many all objectives hold, and the bound that decides.
+std::string count_lines(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const double required = answer.requirement.tolerance.coverage;
-  const std::string counts = fmt::format("Holding      {} of {} runs",
-                                         check.num_runs - check.num_exceedances, check.num_runs);
+  const bool is_joint = answer.is_joint();
+  const std::string counts = fmt::format(
+      "{}    {} of {} runs", is_joint ? "Holding  " : "Exceeding",
+      is_joint ? check.num_runs - check.num_exceedances : check.num_exceedances, check.num_runs);
   std::string text = counts + "\n";
   if (check.exceedance) {
-    const Interval bounds{.lower = 1.0 - check.exceedance->upper,
-                          .upper = 1.0 - check.exceedance->lower,
-                          .confidence = check.exceedance->confidence};
-    text = line_of(counts + ";", success_text(bounds, required, check.verdict), margin);
+    text = line_of(counts + ";", bounds_text(answer.requirement, *check.exceedance, check.verdict),
+                   margin);
   }
-  return text + fmt::format("Required     {} of all draws\n", given_percent(required)) +
+  return text +
+         fmt::format("{}     {} of all draws\n", is_joint ? "Required" : "Allowed ",
+                     given_percent(is_joint ? required : 1.0 - required)) +
          missing_lines(answer);
 }
 
@@ -90,11 +78,10 @@ std::string bound_line(const RequirementAnswer& answer) {
             : fmt::format("draws of which {} have no estimate", answer.check.num_without_estimate),
         given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
-  const Quantity& quantity = answer.subject;
+  const std::string_view unit = answer.subject.unit;
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
-                     given_percent(tolerance.coverage), *answer.bound,
-                     quantity.unit == "1" ? "" : " ", quantity.unit == "1" ? "" : quantity.unit,
-                     given_percent(tolerance.confidence));
+                     given_percent(tolerance.coverage), *answer.bound, unit == "1" ? "" : " ",
+                     unit == "1" ? "" : unit, given_percent(tolerance.confidence));
 }
 
 std::string needed_line(const RequirementAnswer& answer) {
@@ -148,8 +135,8 @@ ExceedanceCount Exceedances::of(std::uint64_t num_runs) const {
 }
 
 std::optional<double> RequirementAnswer::relative_margin() const {
-  if (!limit || !bound) return std::nullopt;
-  return 1.0 - *bound / *limit;
+  if (!bound) return std::nullopt;
+  return 1.0 - *bound / limit;
 }
 
 std::string rule_text(const RequirementAnswer& answer) {
@@ -160,15 +147,8 @@ std::string rule_text(const RequirementAnswer& answer) {
 }
 
 std::string_view name_of(RequirementVerdict verdict) {
-  switch (verdict) {
-    case RequirementVerdict::met:
-      return "met";
-    case RequirementVerdict::not_met:
-      return "not met";
-    case RequirementVerdict::undecided:
-      return "undecided";
-  }
-  PROOFMASS_EXPECT(false);
+  if (verdict == RequirementVerdict::undecided) return "undecided";
+  return verdict == RequirementVerdict::met ? "met" : "not met";
 }
 
 // Thirteen decimals are those that a double near 1 has.
@@ -183,27 +163,23 @@ std::string interval_percent(const Interval& interval) {
   return fmt::format("{} to {} %", short_percent(interval.lower), short_percent(interval.upper));
 }
 
-std::string bounds_text(const Interval& bounds, double limit, RequirementVerdict verdict) {
-  const std::string confidence = given_percent(bounds.confidence);
-  const std::string lower = percent_beside(bounds.lower, limit);
-  const std::string upper = percent_beside(bounds.upper, limit);
-  if (verdict == RequirementVerdict::met) {
-    return fmt::format("at most {} of all draws, with {}", upper, confidence);
+std::string bounds_text(const Requirement& requirement, const Interval& exceedance,
+                        RequirementVerdict verdict) {
+  const double required = requirement.tolerance.coverage;
+  const std::string confidence = given_percent(exceedance.confidence);
+  const bool is_joint = requirement.subject == Requirement::Subject::all_objectives;
+  const std::string lower = is_joint ? percent_beside(1.0 - exceedance.upper, required)
+                                     : percent_beside(exceedance.lower, 1.0 - required);
+  const std::string upper = is_joint ? percent_beside(1.0 - exceedance.lower, required)
+                                     : percent_beside(exceedance.upper, 1.0 - required);
+  if (verdict == RequirementVerdict::undecided) {
+    return fmt::format("at least {} and at most {} of all draws, each with {}", lower, upper,
+                       confidence);
   }
-  if (verdict == RequirementVerdict::not_met) {
-    return fmt::format("at least {} of all draws, with {}", lower, confidence);
-  }
-  return fmt::format("at least {} and at most {} of all draws, each with {}", lower, upper,
-                     confidence);
-}
-
-std::string success_text(const Interval& bounds, double required, RequirementVerdict verdict) {
-  // What is above the requirement meets it: as what is below the limit does, the other way round.
-  if (verdict == RequirementVerdict::met)
-    return bounds_text(bounds, required, RequirementVerdict::not_met);
-  if (verdict == RequirementVerdict::not_met)
-    return bounds_text(bounds, required, RequirementVerdict::met);
-  return bounds_text(bounds, required, verdict);
+  // What holds often enough meets a requirement, as what exceeds a limit seldom enough does.
+  const bool is_upper = (verdict == RequirementVerdict::met) != is_joint;
+  return fmt::format("at {} {} of all draws, with {}", is_upper ? "most" : "least",
+                     is_upper ? upper : lower, confidence);
 }
 
 Tone tone_of(RequirementVerdict verdict) {
@@ -215,9 +191,8 @@ std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
   return fmt::format("Requirement  {}\nAnswer       {}\nRule         {}\n{}{}{}",
                      wire::visible_text(answer.stated.requirement),
                      in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
-                     rule_text(answer),
-                     answer.is_joint() ? holding_lines(answer) : exceedance_lines(answer),
-                     bound_line(answer), needed_line(answer));
+                     rule_text(answer), count_lines(answer), bound_line(answer),
+                     needed_line(answer));
 }
 
 }  // namespace proofmass::coordinator

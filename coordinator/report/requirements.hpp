@@ -31,15 +31,11 @@ namespace proofmass::coordinator {
 
 /// The bound that a verdict was made by: `at most 0.9969 % of all draws, with 95 %` or `at least
 /// ...`; both if there is none. A bound has as many digits as it takes to see on which side of the
-/// limit it lies.
-/// @param bounds  Each one-sided, of the probability of an exceedance.
-/// @param limit   The probability that is allowed.
-[[nodiscard]] std::string bounds_text(const Interval& bounds, double limit,
+/// limit it lies. It is of the probability of an exceedance, and for all objectives of the
+/// probability that they hold.
+/// @param exceedance  Bounds of the probability of an exceedance, each one-sided.
+[[nodiscard]] std::string bounds_text(const Requirement& requirement, const Interval& exceedance,
                                       RequirementVerdict verdict);
-
-/// bounds_text() of the probability that a requirement holds, beside what is required.
-[[nodiscard]] std::string success_text(const Interval& bounds, double required,
-                                       RequirementVerdict verdict);
 
 /// What a requirement of the subject at a position compares with its limit, see
 /// requirement_subjects(): an |error|, the total of the budget or a term of it.
@@ -88,8 +84,8 @@ struct RequirementAnswer {
   RequirementCheck check;
   MissingEstimates missing;  ///< The exceedances for want of an estimate.
   /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest
-  /// ratio of an |error| to its objective. Empty if they are infinite, all of them.
-  std::optional<double> limit;
+  /// ratio of an |error| to its objective.
+  double limit = 1.0;
   /// Upper tolerance bound of the |error| or of that ratio by order statistics: with the confidence
   /// of the requirement, `coverage` of all draws stay below. Empty if draws are too few.
   std::optional<double> bound;

@@ -3,10 +3,8 @@
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
-#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/model.hpp"
-#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -26,25 +24,16 @@ CampaignIdentity identity_of(const Store& store, const Campaign& campaign) {
 
 Review read_of_one_state(const Store& store, const Campaign& campaign,
                          std::vector<StatedRequirement> stated) {
-  Review review{.database = {},
-                .identity = identity_of(store, campaign),
+  Review review{.identity = identity_of(store, campaign),
                 .schema = store.schema(),
-                .results = {},
-                .missing = {},
                 .objectives = campaign.objectives(),
                 .interpretation = campaign.interpretation(),
                 .budget = campaign.error_budget(),
-                .figures = {},
-                .matrix = {},
-                .why_not_independent = {},
-                .causes = {},
-                .spectra = {},
-                .execution = {},
-                .stop = {}};
-  review.num_given_up = num_runs_in(store.given_up_runs());
+                .why_not_independent = why_not_independent(campaign)};
+  const std::uint64_t num_given_up = num_runs_in(store.given_up_runs());
   ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()));
-  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives,
-                            review.num_given_up, store.num_runs_fixed(), review.budget);
+  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives, num_given_up,
+                            store.num_runs_fixed(), review.budget);
   CheckedResults checked = read_checked_results(
       store, campaign,
       {.result =
@@ -56,10 +45,9 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                          auto magnitudes) { matrix.add_magnitudes(quantity, magnitudes); }});
   review.results = std::move(checked.results);
   review.digest_check = checked.check;
-  review.missing = missing_in(review.results.statistics, review.num_given_up);
+  review.missing = missing_in(review.results.statistics, num_given_up);
   review.figures = figures.figures();
   review.matrix = matrix.answers();
-  review.why_not_independent = why_not_independent(campaign);
   if (!review.why_not_independent.empty()) {
     for (QuantityFigures& quantity : review.figures) leave_out_intervals(quantity);
   }

@@ -33,24 +33,24 @@ struct CampaignIdentity {
 
 /// Everything that a review report and its charts are made of.
 struct Review {
-  std::string database;  ///< As commands name it.
-  CampaignIdentity identity;
-  ResultSchema schema;  ///< What the results are.
-  ReadResults results;
+  std::string database = {};  ///< As commands name it.
+  CampaignIdentity identity = {};
+  ResultSchema schema = {};  ///< What the results are.
+  ReadResults results = {};
   DigestCheck digest_check = DigestCheck::not_checked;
-  std::uint64_t num_given_up = 0;
-  MissingEstimates missing;
-  std::vector<double> objectives;  ///< Of each quantity, SI.
+  MissingEstimates missing = {};
+  std::vector<double> objectives = {};  ///< Of each quantity, SI.
   Interpretation interpretation = Interpretation::mixed;
-  std::optional<ErrorBudget> budget;
-  std::vector<QuantityFigures> figures;   ///< Of each quantity.
-  std::vector<RequirementAnswer> matrix;  ///< The row of all objectives together is the last one.
+  std::optional<ErrorBudget> budget = {};
+  std::vector<QuantityFigures> figures = {};  ///< Of each quantity.
+  /// The row of all objectives together is the last one.
+  std::vector<RequirementAnswer> matrix = {};
   /// See why_not_independent(); then the matrix has no verdicts to be shown.
-  std::string why_not_independent;
-  std::optional<Causes> causes;       ///< Empty if runs are too few, or not asked for.
-  std::optional<RunSpectra> spectra;  ///< Of worst_run_of(); empty if not asked for.
-  CampaignExecution execution;
-  std::string stop;  ///< See stop_text().
+  std::string why_not_independent = {};
+  std::optional<Causes> causes = {};       ///< Empty if runs are too few, or not asked for.
+  std::optional<RunSpectra> spectra = {};  ///< Of worst_run_of(); empty if not asked for.
+  CampaignExecution execution = {};
+  std::string stop = {};  ///< See stop_text().
 };
 
 /// The run with the largest |error| of any quantity beside its objective; none if no run has an

@@ -4,14 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "coordinator/table/terminal_table.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
@@ -100,10 +96,10 @@ std::string cell_label(double correlation) {
 std::string strongest_sentence(const ResultSchema& schema, const Causes& causes) {
   std::string text;
   for (const CauseTerm& term : causes.terms) {
-    if (term.share < 0.5) continue;
+    if (term.found.share < 0.5) continue;
     text += fmt::format(" The error of {} is {} times {}, which explains {:.0f} % of its variance.",
-                        schema.quantities[term.quantity].symbol, figure_text(term.slope), term.name,
-                        100.0 * term.share);
+                        schema.quantities[term.quantity].symbol, figure_text(term.found.slope),
+                        term.name, 100.0 * term.found.share);
   }
   return text;
 }
@@ -135,8 +131,7 @@ std::optional<BarChart> budget_chart(const Review& review) {
                 .description = fmt::format("{}. Before estimation the total is {}", budget.title,
                                            figure_text(before.total))};
   chart.x = {.label = "m/s²", .scale = Scale::logarithmic};
-  chart.series = {{.name = "before", .values = {}, .ink = Ink::second},
-                  {.name = "after, worst errors", .values = {}, .ink = Ink::first}};
+  chart.series = {{.name = "before", .ink = Ink::second}, {.name = "after, worst errors"}};
   for (std::size_t i = 0; i <= budget.terms.size(); ++i) {
     const bool is_total = i == budget.terms.size();
     const auto value_of = [&](const Budget& of) { return is_total ? of.total : of.entries[i]; };
@@ -158,9 +153,7 @@ std::optional<HeatMap> cause_map(const Review& review) {
                        .description =
                            fmt::format("Linear correlation coefficients of {} runs.{}",
                                        causes.num_runs, strongest_sentence(review.schema, causes))},
-              .rows = causes.inputs,
-              .columns = {},
-              .cells = {}};
+              .rows = causes.inputs};
   for (const Quantity& quantity : review.schema.quantities) {
     map.columns.emplace_back(quantity.symbol);
   }

@@ -115,15 +115,10 @@ std::string standard_errors_markup(const Review& review) {
               table_part(fit_table(review.schema, statistics.fit)) + figure_of(*pulls));
 }
 
-std::string instruments_markup(const Review& review) {
-  const ResultSchema& schema = review.schema;
-  if (const auto& replicates = review.results.replicates) {
-    return table_part(replicate_table(schema, *replicates));
-  }
-  const auto& instruments = review.results.instruments;
-  if (!instruments) return "";
-  return table_part(variance_table(schema, *instruments)) +
-         table_part(instrument_table(schema, *instruments));
+std::string groups_markup(const Review& review) {
+  std::string html;
+  for (const Table& table : group_tables(review.schema, review.results)) html += table_part(table);
+  return html;
 }
 
 std::string budget_markup(const Review& review) {
@@ -185,11 +180,12 @@ std::vector<Section> sections_of(const Review& review) {
           {"results", "Accuracy",
            flow(table_part(accuracy_table(schema, review.objectives, statistics)) +
                 characteristics_markup(review)) +
-               table_part(interval_table(schema, statistics, review.num_given_up)) +
-               table_part(error_table(schema, review.objectives, statistics, review.num_given_up,
-                                      review.interpretation, review.why_not_independent))},
+               table_part(interval_table(schema, statistics, review.missing.num_given_up)) +
+               table_part(error_table(schema, review.objectives, statistics,
+                                      review.missing.num_given_up, review.interpretation,
+                                      review.why_not_independent))},
           {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
-          {"instruments-section", groups_heading(review), instruments_markup(review)},
+          {"instruments-section", groups_heading(review), groups_markup(review)},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
@@ -283,7 +279,7 @@ std::string code_span(std::string_view text) {
   return "`" + span + "`";
 }
 
-std::string section(std::string_view title, std::initializer_list<Table> tables) {
+std::string section(std::string_view title, const std::vector<Table>& tables) {
   std::string text;
   for (const Table& table : tables) {
     if (!table.rows.empty()) text += markdown_table(table);
@@ -296,30 +292,25 @@ std::string section(std::string_view title, std::initializer_list<Table> tables)
 std::string review_markdown(const Review& review) {
   const ResultSchema& schema = review.schema;
   const CampaignStatistics& statistics = review.results.statistics;
-  const InstrumentStatistics instruments =
-      review.results.instruments.value_or(InstrumentStatistics{});
   std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.identity.name));
   for (const auto& [sentence, source] : review_summary(review)) {
     text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
   }
   text += "\n";
-  text +=
-      section("Verification matrix", {matrix_table(review)}) +
-      section("Accuracy", {accuracy_table(schema, review.objectives, statistics),
-                           interval_table(schema, statistics, review.num_given_up),
-                           error_table(schema, review.objectives, statistics, review.num_given_up,
-                                       review.interpretation, review.why_not_independent)}) +
-      section("Standard errors", {standard_error_table(schema, review.results.standard_errors),
-                                  fit_table(schema, review.results.standard_errors.fit)}) +
-      section(
-          groups_heading(review),
-          {variance_table(schema, instruments), instrument_table(schema, instruments),
-           replicate_table(schema, review.results.replicates.value_or(ReplicateStatistics{}))}) +
-      section("Budget", {review_budget_table(review)}) +
-      section("Causes of the errors", {cause_table(review)}) +
-      section("How it was run",
-              {identity_table(review), execution_table(review), host_table(review)}) +
-      "## How to reproduce it\n\n";
+  text += section("Verification matrix", {matrix_table(review)}) +
+          section("Accuracy",
+                  {accuracy_table(schema, review.objectives, statistics),
+                   interval_table(schema, statistics, review.missing.num_given_up),
+                   error_table(schema, review.objectives, statistics, review.missing.num_given_up,
+                               review.interpretation, review.why_not_independent)}) +
+          section("Standard errors", {standard_error_table(schema, review.results.standard_errors),
+                                      fit_table(schema, review.results.standard_errors.fit)}) +
+          section(groups_heading(review), group_tables(schema, review.results)) +
+          section("Budget", {review_budget_table(review)}) +
+          section("Causes of the errors", {cause_table(review)}) +
+          section("How it was run",
+                  {identity_table(review), execution_table(review), host_table(review)}) +
+          "## How to reproduce it\n\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     text += fmt::format("- {} {}\n", code_span(command), markdown_text(effect));
   }

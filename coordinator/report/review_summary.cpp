@@ -7,6 +7,7 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/review_tables.hpp"
+#include "coordinator/table/figures.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -54,7 +55,7 @@ std::string question(const Review& review) {
 std::string draws(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
   const std::uint64_t num_wanted = review.identity.num_runs;
-  const std::uint64_t num_done = statistics.num_runs + review.num_given_up;
+  const std::uint64_t num_done = statistics.num_runs + review.missing.num_given_up;
   const std::uint64_t num_missing = num_done - statistics.num_estimated;
   std::string text = num_done < num_wanted
                          ? fmt::format("The campaign is not finished: {} of {} {} {} done",
@@ -84,8 +85,7 @@ std::string verdicts(const Review& review) {
     parts.push_back(fmt::format("{} {} {}", names.size(), be(names.size()), name_of(verdict)));
     if (verdict != RequirementVerdict::met) parts.back() += fmt::format(" ({})", list_of(names));
   }
-  return fmt::format("Of {} {}, {}.", review.matrix.size(),
-                     review.matrix.size() == 1 ? "requirement" : "requirements",
+  return fmt::format("Of {}, {}.", counted(review.matrix.size(), "requirement"),
                      fmt::join(parts, ", "));
 }
 
@@ -115,7 +115,7 @@ std::string driver_of(const Review& review, std::size_t quantity) {
         causes->num_runs);
   }
   return fmt::format("of the variance of this error over the draws, {} % follows from {}",
-                     figure_text(100.0 * term->share), term->name);
+                     figure_text(100.0 * term->found.share), term->name);
 }
 
 SummarySentence worst_error(const Review& review) {

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <regex>
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
+#include "coordinator/table/figures.hpp"
 #include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
@@ -77,8 +77,8 @@ Table cause_table(const Review& review) {
           {"error of", true}, {"term", true}, {"slope, SI"}, {"of the variance, %"}, {"p"}}};
   for (const CauseTerm& term : review.causes->terms) {
     table.rows.push_back({review.schema.quantities[term.quantity].symbol, term.name,
-                          figure_cell(term.slope), figure_cell(term.share, 0.01),
-                          term.p_value < 1e-9 ? "<10⁻⁹" : figure_text(term.p_value)});
+                          figure_cell(term.found.slope), figure_cell(term.found.share, 0.01),
+                          term.found.p_value < 1e-9 ? "<10⁻⁹" : figure_text(term.found.p_value)});
   }
   table.notes.push_back(fmt::format(
       "Computed from {} of {} runs with an estimate{}. Of the variance: beyond that of the terms "
@@ -117,13 +117,13 @@ Table execution_table(const Review& review) {
       {{"time of processor cores", hours(execution.compute_s)},
        {"first and last result", execution.first_result_utc.value_or("none") + " to " +
                                      execution.last_result_utc.value_or("none")},
-       {"workers", fmt::format("{} on {} {}", execution.num_workers, execution.num_hosts,
-                               execution.num_hosts == 1 ? "machine" : "machines")},
+       {"workers",
+        fmt::format("{} on {}", execution.num_workers, counted(execution.num_hosts, "machine"))},
        {"starts of a coordinator", std::to_string(execution.num_coordinators)},
        {"results of a later attempt than the first", std::to_string(execution.num_retried)},
        {"results computed a second time",
         fmt::format("{}, {} of them differed", execution.num_audited, execution.num_contradicting)},
-       {"runs given up", std::to_string(review.num_given_up)}});
+       {"runs given up", std::to_string(review.missing.num_given_up)}});
   for (const LossCount& loss : execution.losses) {
     table.rows.push_back(
         {fmt::format("lost: {}", loss.reason),

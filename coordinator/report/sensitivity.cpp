@@ -4,18 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "coordinator/report/digest.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/review_tables.hpp"
+#include "coordinator/report/status_json.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "core/runs.hpp"
-#include "core/statistics/sensitivity.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -51,21 +48,21 @@ void drop_repeated_truths(DrawnRuns& drawn, std::size_t num_drawn) {
   }
 }
 
-std::vector<double> magnitudes_of(const std::vector<double>& errors) {
-  std::vector<double> magnitudes(errors.size());
-  std::ranges::transform(errors, magnitudes.begin(), [](double error) { return std::abs(error); });
-  return magnitudes;
-}
-
 std::vector<proofmass::Column> inputs_of(const DrawnRuns& drawn) {
   return {drawn.columns.begin(), drawn.columns.end()};
+}
+
+std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quantity) {
+  return explanatory_terms(inputs_of(drawn), drawn.errors[quantity], num_terms_max,
+                           default_confidence);
 }
 
 /// Of error and |error|, the most significant first.
 std::vector<std::vector<Sensitivity>> sensitivities_of(const DrawnRuns& drawn,
                                                        std::size_t quantity) {
   const std::vector<double>& errors = drawn.errors[quantity];
-  const std::vector<double> magnitudes = magnitudes_of(errors);
+  std::vector<double> magnitudes(errors.size());
+  std::ranges::transform(errors, magnitudes.begin(), [](double error) { return std::abs(error); });
   const std::vector<proofmass::Column> inputs = inputs_of(drawn);
   const std::vector<proofmass::Column> outputs{errors, magnitudes};
   return sensitivities(inputs, outputs, default_confidence);
@@ -130,8 +127,7 @@ std::string not_found_text(const DrawnRuns& drawn) {
 
 /// The sum of quantities and products of two that explains the error.
 Table term_table(const DrawnRuns& drawn, std::size_t quantity) {
-  const std::vector<ExplanatoryTerm> terms = explanatory_terms(
-      inputs_of(drawn), drawn.errors[quantity], num_terms_max, default_confidence);
+  const std::vector<ExplanatoryTerm> terms = terms_of(drawn, quantity);
   if (terms.empty()) return {.notes = {not_found_text(drawn)}};
   Table table{.columns = {{.title = "error as a sum of",
                            .is_text = true,
@@ -205,19 +201,14 @@ std::size_t rank_of(const std::vector<double>& errors, std::size_t position) {
                  errors, [&](double error) { return std::abs(error) > magnitude; }));
 }
 
-using Json = nlohmann::ordered_json;
-
 Json json_of(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
              std::optional<std::size_t> position) {
   Json json = Json::array();
   for (const Sensitivity& row : rows) {
     const FirstOrderIndex& index = row.first_order;
-    Json entry{{"quantity", drawn.names[row.input]},
-               {"fraction_of_variance", index.index},
-               {"interval", {index.interval.lower, index.interval.upper}},
-               {"rank_correlation", row.rank_correlation},
-               {"p_value", row.adjusted_p_value},
-               {"run_value", nullptr},
+    Json entry{{"quantity", drawn.names[row.input]}, {"fraction_of_variance", index.index},
+               {"interval", index.interval},         {"rank_correlation", row.rank_correlation},
+               {"p_value", row.adjusted_p_value},    {"run_value", nullptr},
                {"run_percentile", nullptr}};
     if (position) {
       const std::vector<double>& values = drawn.columns[row.input];
@@ -229,10 +220,9 @@ Json json_of(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
   return json;
 }
 
-Json terms_of(const DrawnRuns& drawn, std::size_t quantity) {
+Json json_of_terms(const DrawnRuns& drawn, std::size_t quantity) {
   Json json = Json::array();
-  for (const ExplanatoryTerm& term : explanatory_terms(inputs_of(drawn), drawn.errors[quantity],
-                                                       num_terms_max, default_confidence)) {
+  for (const ExplanatoryTerm& term : terms_of(drawn, quantity)) {
     json.push_back({{"quantity", drawn.names[term.first]},
                     {"times", term.second ? Json(drawn.names[*term.second]) : Json(nullptr)},
                     {"slope", term.slope},
@@ -367,10 +357,9 @@ std::string sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t
          {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},
          {"drives_magnitude", json_of(drawn, first_of(both[1], num_rows), position)},
          {"drives_error", json_of(drawn, first_of(both[0], num_rows), position)},
-         {"terms", terms_of(drawn, quantity)}});
+         {"terms", json_of_terms(drawn, quantity)}});
   }
-  constexpr int indent = 2;
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+  return dumped(json, JsonLayout::indented);
 }
 
 }  // namespace proofmass::coordinator

@@ -9,6 +9,7 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
@@ -29,14 +30,13 @@ Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statist
         {0.5 * (from + to), static_cast<double>(statistic.num_runs) *
                                 (normal_cumulative(to) - normal_cumulative(from))});
   }
-  return {.text = {.id = fmt::format("pull-{}", quantity.name),
-                   .title = std::string(quantity.symbol),
-                   .description = ""},
-          .x = {.label = "error / standard error"},
-          .y = {.label = "runs"},
-          .layers = {std::move(bars), std::move(law), LimitLine{.value = -normal_95},
-                     LimitLine{.value = normal_95}},
-          .plot_height = 90.0};
+  return {
+      .text = {.id = fmt::format("pull-{}", quantity.name), .title = std::string(quantity.symbol)},
+      .x = {.label = "error / standard error"},
+      .y = {.label = "runs"},
+      .layers = {std::move(bars), std::move(law), LimitLine{.value = -normal_95},
+                 LimitLine{.value = normal_95}},
+      .plot_height = 90.0};
 }
 
 }  // namespace
@@ -98,14 +98,6 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
   return statistics;
 }
 
-namespace {
-
-Cell ratio_cell(const std::optional<double>& ratio) {
-  return ratio ? figure_cell(*ratio) : no_figure();
-}
-
-}  // namespace
-
 Table standard_error_table(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return {};
   // Draws that are not independent have no standard error of the ratio; those of a design may have
@@ -120,9 +112,8 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
   constexpr const char* ratio = "Σerror²/Σσ²";
   constexpr const char* within = "within 1.96 σ, %";
   Table table{.id = "standard-error-table",
-              .caption = fmt::format("Standard errors σ of the estimates of {} {}",
-                                     statistics.quantities.front().num_runs,
-                                     statistics.quantities.front().num_runs == 1 ? "run" : "runs"),
+              .caption = fmt::format("Standard errors σ of the estimates of {}",
+                                     counted(statistics.quantities.front().num_runs, "run")),
               .columns = {{"parameter", true, 11},
                           {"unit", true, 9},
                           {"mean", false, 9},
@@ -140,8 +131,8 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
     const Quantity& quantity = schema.quantities[statistic.quantity];
     Row row{quantity.symbol, unit_cell(quantity),
             figure_cell(statistic.mean, quantity.display_scale),
-            ratio_cell(statistic.squared_ratio)};
-    if (have_ratio_errors) row.push_back(ratio_cell(statistic.squared_ratio_error));
+            figure_cell(statistic.squared_ratio)};
+    if (have_ratio_errors) row.push_back(figure_cell(statistic.squared_ratio_error));
     row.push_back(figure_cell(share_within(statistic), 0.01));
     if (have_intervals) add_ends(statistic.within, 0.01, row);
     table.rows.push_back(std::move(row));
@@ -155,9 +146,7 @@ std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
   ChartGrid grid{.text = {.id = "pulls",
                           .title = "Errors in units of their standard errors",
                           .description = "Histograms beside the normal law of honest standard "
-                                         "errors; the lines hold 95 % of it."},
-                 .num_columns = 2,
-                 .charts = {}};
+                                         "errors; the lines hold 95 % of it."}};
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
     const Quantity& quantity = schema.quantities[statistic.quantity];
     grid.charts.push_back(pull_chart(quantity, statistic, grid.charts.empty()));

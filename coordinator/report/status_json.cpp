@@ -1,85 +1,78 @@
 #include "coordinator/report/status_json.hpp"
 
-#include <nlohmann/json.hpp>
-
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using StatusJson = nlohmann::ordered_json;
+/// Null where there is nothing to say.
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-StatusJson factory_object(const proto::FactoryStatus& factory) {
+Json factory_object(const proto::FactoryStatus& factory) {
   const proto::FactoryReport& report = factory.report();
-  StatusJson json{{"name", report.name()},
-                  {"batch_system", report.batch_system()},
-                  {"phase", wire::name_of(report.phase())},
-                  {"num_wanted", report.num_wanted()},
-                  {"num_registered", report.num_registered()},
-                  {"num_queued", report.num_queued()},
-                  {"wait_s", nullptr},
-                  {"reason", nullptr},
-                  {"interval_s", report.interval_s()},
-                  {"silent_s", factory.silent_s()},
-                  {"owner", nullptr}};
+  Json json{{"name", report.name()},
+            {"batch_system", report.batch_system()},
+            {"phase", wire::name_of(report.phase())},
+            {"num_wanted", report.num_wanted()},
+            {"num_registered", report.num_registered()},
+            {"num_queued", report.num_queued()},
+            {"wait_s", nullptr},
+            {"reason", text_or_null(report.reason())},
+            {"interval_s", report.interval_s()},
+            {"silent_s", factory.silent_s()},
+            {"owner", text_or_null(factory.owner())}};
   if (report.phase() == proto::FACTORY_PHASE_WAITING) json["wait_s"] = report.wait_s();
-  if (!report.reason().empty()) json["reason"] = report.reason();
-  if (!factory.owner().empty()) json["owner"] = factory.owner();
   return json;
 }
 
-StatusJson campaign_object(const proto::CampaignStatus& campaign) {
-  StatusJson json{{"name", campaign.name()},
-                  {"phase", wire::phase_name(campaign)},
-                  {"priority", campaign.priority()}};
+Json campaign_object(const proto::CampaignStatus& campaign) {
+  Json json{{"name", campaign.name()},
+            {"phase", wire::phase_name(campaign)},
+            {"priority", campaign.priority()}};
   for (const CampaignCounter& counter : campaign_counters()) {
     json[std::string(counter.name)] = (campaign.*counter.count)();
   }
   json.update({{"rate_hz", campaign.rate_hz()},
                {"remaining_s", nullptr},
-               {"storage_failure", nullptr},
-               {"missing_model", nullptr},
-               {"owner", nullptr}});
+               {"storage_failure", text_or_null(campaign.storage_failure())},
+               {"missing_model", text_or_null(campaign.missing_model())},
+               {"owner", text_or_null(campaign.owner())}});
   if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();
-  if (!campaign.storage_failure().empty()) json["storage_failure"] = campaign.storage_failure();
-  if (!campaign.missing_model().empty()) json["missing_model"] = campaign.missing_model();
-  if (!campaign.owner().empty()) json["owner"] = campaign.owner();
   return json;
 }
 
-StatusJson worker_object(const proto::WorkerStatus& worker) {
-  StatusJson json{{"worker_id", worker.worker_id()},
-                  {"name", worker.name()},
-                  {"host", worker.host()},
-                  {"process_id", worker.process_id()},
-                  {"num_slots", worker.num_slots()},
-                  {"num_lent", worker.num_lent()},
-                  {"num_results", worker.num_results()},
-                  {"silent_s", worker.silent_s()},
-                  {"is_quarantined", worker.is_quarantined()},
-                  {"cards", nullptr},
-                  {"card_rate_hz", nullptr}};
-  if (!worker.cards().empty()) json["cards"] = worker.cards();
+Json worker_object(const proto::WorkerStatus& worker) {
+  Json json{{"worker_id", worker.worker_id()},
+            {"name", worker.name()},
+            {"host", worker.host()},
+            {"process_id", worker.process_id()},
+            {"num_slots", worker.num_slots()},
+            {"num_lent", worker.num_lent()},
+            {"num_results", worker.num_results()},
+            {"silent_s", worker.silent_s()},
+            {"is_quarantined", worker.is_quarantined()},
+            {"cards", text_or_null(worker.cards())},
+            {"card_rate_hz", nullptr}};
   if (worker.card_rate_hz() > 0.0) json["card_rate_hz"] = worker.card_rate_hz();
   return json;
 }
 
-StatusJson status_object(const proto::StatusReply& status) {
-  StatusJson json{{"version", status.version()},     {"model_version", status.model_version()},
-                  {"uptime_s", status.uptime_s()},   {"num_workers", status.num_workers()},
-                  {"num_slots", status.num_slots()}, {"campaigns", StatusJson::array()}};
+Json status_object(const proto::StatusReply& status) {
+  Json json{{"version", status.version()},     {"model_version", status.model_version()},
+            {"uptime_s", status.uptime_s()},   {"num_workers", status.num_workers()},
+            {"num_slots", status.num_slots()}, {"campaigns", Json::array()}};
   for (const auto& campaign : status.campaigns())
     json["campaigns"].push_back(campaign_object(campaign));
-  json["unserved_files"] = StatusJson::array();
+  json["unserved_files"] = Json::array();
   for (const proto::UnservedFile& file : status.unserved_files()) {
     json["unserved_files"].push_back({{"file", file.file()}, {"reason", file.reason()}});
   }
   json["num_unserved_files"] = status.num_unserved_files();
-  json["quarantined_hosts"] = StatusJson::array();
-  for (const auto& host : status.quarantined_hosts()) json["quarantined_hosts"].push_back(host);
+  json["quarantined_hosts"] = status.quarantined_hosts();
   json["num_quarantined_hosts"] = status.num_quarantined_hosts();
-  json["factories"] = StatusJson::array();
+  json["factories"] = Json::array();
   for (const auto& factory : status.factories())
     json["factories"].push_back(factory_object(factory));
   return json;
@@ -87,8 +80,8 @@ StatusJson status_object(const proto::StatusReply& status) {
 
 }  // namespace
 
-std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout) {
-  constexpr auto replace = nlohmann::ordered_json::error_handler_t::replace;
+std::string dumped(const Json& json, JsonLayout layout) {
+  constexpr auto replace = Json::error_handler_t::replace;
   return json.dump(layout == JsonLayout::indented ? 2 : -1, ' ', false, replace) + "\n";
 }
 
@@ -97,7 +90,7 @@ std::string status_json(const proto::StatusReply& status, JsonLayout layout) {
 }
 
 std::string workers_json(const proto::WorkersReply& workers) {
-  StatusJson json{{"workers", StatusJson::array()}};
+  Json json{{"workers", Json::array()}};
   for (const auto& worker : workers.workers()) json["workers"].push_back(worker_object(worker));
   return dumped(json, JsonLayout::indented);
 }

@@ -36,10 +36,6 @@ std::span<const CampaignCounter> campaign_counters() {
   return counters;
 }
 
-std::string counted(std::uint64_t count, std::string_view thing) {
-  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
-}
-
 std::uint64_t percent_done(const proto::CampaignStatus& campaign) {
   return campaign.num_done() * 100 / std::max<std::uint64_t>(1, campaign.num_runs());
 }

@@ -26,9 +26,6 @@ struct CampaignCounter {
 /// row in status_notes.cpp, its count in CampaignState, and CampaignService::record_of().
 [[nodiscard]] std::span<const CampaignCounter> campaign_counters();
 
-/// `1 run`, `2 runs`.
-[[nodiscard]] std::string counted(std::uint64_t count, std::string_view thing);
-
 /// `and 3 more workers`; empty if all of `count` are shown.
 [[nodiscard]] std::string further_note(std::uint64_t count, int num_shown, std::string_view thing);
 

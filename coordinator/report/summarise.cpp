@@ -169,20 +169,17 @@ RequirementVerdict verdict_of(const StopRule& rule, const StopCheck& check) {
 
 std::string verdict_text(const StopRule& rule, const StopCheckRow& row) {
   const StopCheck& check = row.check;
-  const Tolerance& tolerance = rule.requirement.tolerance;
   Interval bounds = check.interval.value_or(Interval{.lower = 0.0, .upper = 1.0});
-  bounds.confidence = tolerance.confidence;  // Stored with the rule and not with the bounds.
+  bounds.confidence =
+      rule.requirement.tolerance.confidence;  // Stored with the rule and not with the bounds.
   const RequirementVerdict verdict = verdict_of(rule, check);
   // As report --requirement has it: runs in which all objectives hold, or those beyond the limit.
   const bool is_joint = rule.requirement.subject == Requirement::Subject::all_objectives;
   const double fraction = is_joint ? 1.0 - check.estimate : check.estimate;
-  const Interval holding{
-      .lower = 1.0 - bounds.upper, .upper = 1.0 - bounds.lower, .confidence = bounds.confidence};
   return fmt::format("          {} after {} runs; {}: {:.0f}\n          {}\n", name_of(verdict),
                      row.num_runs, is_joint ? "holding" : "exceeding",
                      fraction * static_cast<double>(row.num_runs),
-                     is_joint ? success_text(holding, tolerance.coverage, verdict)
-                              : bounds_text(bounds, 1.0 - tolerance.coverage, verdict));
+                     bounds_text(rule.requirement, bounds, verdict));
 }
 
 std::string width_text(const StopRule& rule, const StopCheckRow& row) {

@@ -31,8 +31,7 @@ std::size_t key_of(const RequirementAnswer& answer) {
   return answer.is_joint() ? key_of_joint : answer.requirement.parameter;
 }
 
-}  // namespace
-
+/// A requirement for each objective of the campaign.
 std::vector<StatedRequirement> requirements_of_objectives(const ResultSchema& schema,
                                                           std::span<const double> objectives) {
   const std::vector<Quantity>& quantities = schema.quantities;
@@ -48,6 +47,8 @@ std::vector<StatedRequirement> requirements_of_objectives(const ResultSchema& sc
   }
   return stated;
 }
+
+}  // namespace
 
 StatedRequirement joint_requirement() {
   return {.id = "all",
@@ -99,7 +100,6 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
       answer.subject = requirement_subject(schema, answer.requirement.parameter);
       answer.limit = answer.requirement.limit;
     }
-    if (answer.is_joint()) answer.limit = 1.0;
     exceedances_.emplace_back(answer.requirement, objectives, budget);
     subjects_.try_emplace(key_of(answer));
     answers_.push_back(std::move(answer));
@@ -148,7 +148,7 @@ void VerificationMatrix::set_bounds(std::size_t key, std::span<const double> asc
   const std::uint64_t num_missing = missing_.total();
   for (RequirementAnswer& answer : answers_) {
     const std::uint64_t order = answer.check.bound_order;
-    if (key_of(answer) != key || ascending.empty() || !answer.limit || order <= num_missing) {
+    if (key_of(answer) != key || ascending.empty() || order <= num_missing) {
       continue;
     }
     answer.bound = ascending[static_cast<std::size_t>(ascending.size() - (order - num_missing))];

@@ -17,10 +17,6 @@ namespace proofmass::coordinator {
 /// shown with 90 % confidence.
 inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.90};
 
-/// A requirement for each objective of the campaign, with the default tolerance.
-[[nodiscard]] std::vector<StatedRequirement> requirements_of_objectives(
-    const ResultSchema& schema, std::span<const double> objectives);
-
 /// All objectives together, with the default tolerance.
 [[nodiscard]] StatedRequirement joint_requirement();
 
@@ -28,8 +24,9 @@ inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.9
 [[nodiscard]] std::vector<StatedRequirement> numbered_requirements(
     std::span<const std::string> requirements);
 
-/// What the rows of a matrix are about: these, or the objectives if there are none, and then all
-/// objectives together unless that is asked for or no objective is finite.
+/// What the rows of a matrix are about: these, or each objective with the default tolerance if
+/// there are none, and then all objectives together unless that is asked for or no objective is
+/// finite.
 /// @throws ConfigError as parse_requirement().
 [[nodiscard]] std::vector<StatedRequirement> matrix_requirements(
     const ResultSchema& schema, std::vector<StatedRequirement> stated,

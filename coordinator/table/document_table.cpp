@@ -18,16 +18,9 @@ std::string_view text_class(const Column& column) {
 }
 
 std::string_view class_of(Tone tone) {
-  switch (tone) {
-    case Tone::good:
-      return "met";
-    case Tone::bad:
-      return "unmet";
-    case Tone::open:
-      return "open";
-    default:
-      return "";
-  }
+  if (tone == Tone::good) return "met";
+  if (tone == Tone::bad) return "unmet";
+  return tone == Tone::open ? "open" : "";
 }
 
 std::string group_line(const Table& table) {

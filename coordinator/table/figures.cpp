@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 namespace proofmass::coordinator {
 
@@ -29,6 +28,10 @@ std::string given_figure(double value) {
   figure.erase(figure.find_last_not_of('0') + 1);
   if (figure.back() == '.') figure.pop_back();
   return figure;
+}
+
+std::string counted(std::uint64_t count, std::string_view thing) {
+  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
 }
 
 std::string duration_text(double seconds) {

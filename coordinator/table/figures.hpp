@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace proofmass::coordinator {
 
@@ -13,6 +15,9 @@ namespace proofmass::coordinator {
 
 /// A number ≥ 0 that somebody gave, without zeros that say nothing: `7.3`, `2000`.
 [[nodiscard]] std::string given_figure(double value);
+
+/// `1 run`, `2 runs`.
+[[nodiscard]] std::string counted(std::uint64_t count, std::string_view thing);
 
 /// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
 [[nodiscard]] std::string duration_text(double seconds);

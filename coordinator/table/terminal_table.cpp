@@ -157,7 +157,7 @@ std::string TerminalTable::rule() const {
   for (std::size_t i = 0; i < count; ++i) {
     if (columns_[i].column->is_after_line) rule += "┼";
     rule.append(columns_[i].lead, ' ');
-    rule += horizontal_rule(columns_[i].width - columns_[i].lead);
+    for (std::size_t k = columns_[i].lead; k < columns_[i].width; ++k) rule += "─";
   }
   return rule + "\n";
 }
@@ -213,18 +213,8 @@ std::string TerminalTable::text() const {
 }  // namespace
 
 int colour_of(Tone tone) {
-  switch (tone) {
-    case Tone::good:
-      return 31;  // #0087af.
-    case Tone::open:
-    case Tone::bad:
-      return 130;  // #af5f00.
-    case Tone::plain:
-    case Tone::heading:
-    case Tone::changed:
-      break;
-  }
-  return 0;
+  if (tone == Tone::good) return 31;                         // #0087af.
+  return tone == Tone::open || tone == Tone::bad ? 130 : 0;  // #af5f00.
 }
 
 std::string in_tone(std::string_view text, Tone tone, Paint paint) {
@@ -267,12 +257,6 @@ std::string line_of(std::string_view first, std::string_view second, std::size_t
   const bool fits = display_width(first) + 1 + display_width(second) <= columns_max;
   return fits ? fmt::format("{} {}\n", first, second)
               : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);
-}
-
-std::string horizontal_rule(std::size_t count) {
-  std::string rule;
-  for (std::size_t i = 0; i < count; ++i) rule += "─";
-  return rule;
 }
 
 }  // namespace proofmass::coordinator

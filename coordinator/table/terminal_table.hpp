@@ -47,7 +47,4 @@ struct TerminalStyle {
 [[nodiscard]] std::string line_of(std::string_view first, std::string_view second,
                                   std::size_t margin);
 
-/// `count` times the line ─.
-[[nodiscard]] std::string horizontal_rule(std::size_t count);
-
 }  // namespace proofmass::coordinator

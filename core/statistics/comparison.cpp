@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
-#include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 
 namespace proofmass {
@@ -15,38 +13,6 @@ namespace {
 
 constexpr std::size_t num_exact_ranks_max = 50;  // 2⁵⁰ signs are counted exactly in a double.
 constexpr std::uint64_t num_exact_steps_max = 4'000'000;
-
-/// Sum of the ranks of the positive differences, by the ranks of their magnitudes.
-struct SignedRanks {
-  double positive_sum = 0.0;
-  double square_sum = 0.0;  ///< Σ rank².
-  bool has_equal = false;
-  std::size_t count = 0;
-};
-
-// Sorts the differences, of which only the sign and the order of magnitudes count.
-SignedRanks signed_ranks(std::vector<double> differences) {
-  std::erase(differences, 0.0);
-  std::ranges::sort(differences, {}, [](double difference) { return std::abs(difference); });
-  SignedRanks result{.count = differences.size()};
-  CompensatedSum square_sum;
-  for (std::size_t first = 0; first < differences.size();) {
-    std::size_t end = first;
-    std::size_t num_positive = 0;
-    for (; end < differences.size() && std::abs(differences[end]) == std::abs(differences[first]);
-         ++end) {
-      if (differences[end] > 0.0) ++num_positive;
-    }
-    // Equal ones share the mean of the ranks first + 1 to end.
-    const double rank = 0.5 * static_cast<double>(first + 1 + end);
-    result.positive_sum += rank * static_cast<double>(num_positive);
-    square_sum.add(rank * rank * static_cast<double>(end - first));
-    result.has_equal = result.has_equal || end - first > 1;
-    first = end;
-  }
-  result.square_sum = square_sum.value();
-  return result;
-}
 
 /// Fraction of all choices of signs whose sum of positive ranks is at most `sum`.
 double exact_rank_probability(std::size_t count, double sum) {
@@ -62,19 +28,6 @@ double exact_rank_probability(std::size_t count, double sum) {
     num_below += num_choices[total];
   }
   return std::ldexp(num_below, -static_cast<int>(count));
-}
-
-double rank_p_value(const SignedRanks& ranks) {
-  if (ranks.count == 0) return 1.0;
-  const auto n = static_cast<double>(ranks.count);
-  const double all = 0.5 * n * (n + 1.0);
-  const double smaller = std::min(ranks.positive_sum, all - ranks.positive_sum);
-  if (ranks.count <= num_exact_ranks_max && !ranks.has_equal) {
-    return std::min(2.0 * exact_rank_probability(ranks.count, smaller), 1.0);
-  }
-  // Each rank counts with probability ½: variance Σ rank²/4, equal ones included.
-  const double deviation = std::sqrt(0.25 * ranks.square_sum);
-  return std::min(2.0 * normal_cumulative((smaller - 0.5 * all) / deviation), 1.0);
 }
 
 /// Largest |i/m − j/n| of the distribution functions, times m n: an exact integer.
@@ -157,7 +110,28 @@ UnpairedComparison compare_means(const Moments& first, const Moments& second, do
 
 double rank_test_p_value(std::vector<double> differences) {
   detail::check_values("differences", differences, 1);
-  return rank_p_value(signed_ranks(std::move(differences)));
+  std::erase(differences, 0.0);
+  if (differences.empty()) return 1.0;
+  std::vector<double> magnitudes;
+  for (const double difference : differences) magnitudes.push_back(std::abs(difference));
+  const std::vector<double> ranks = average_ranks(magnitudes);
+  double positive_sum = 0.0;  // Of halves: exact.
+  CompensatedSum square_sum;
+  for (std::size_t i = 0; i < ranks.size(); ++i) {
+    if (differences[i] > 0.0) positive_sum += ranks[i];
+    square_sum.add(ranks[i] * ranks[i]);
+  }
+  const auto n = static_cast<double>(ranks.size());
+  const double all = 0.5 * n * (n + 1.0);
+  const double smaller = std::min(positive_sum, all - positive_sum);
+  // Ranks that are shared have smaller squares than 1² + 2² + ... + n².
+  const bool has_equal = square_sum.value() < all * (2.0 * n + 1.0) / 3.0;
+  if (ranks.size() <= num_exact_ranks_max && !has_equal) {
+    return std::min(2.0 * exact_rank_probability(ranks.size(), smaller), 1.0);
+  }
+  // Each rank counts with probability ½: variance Σ rank²/4, equal ones included.
+  const double deviation = std::sqrt(0.25 * square_sum.value());
+  return std::min(2.0 * normal_cumulative((smaller - 0.5 * all) / deviation), 1.0);
 }
 
 UnpairedComparison compare_unpaired(std::span<const double> first, std::span<const double> second,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <vector>
 
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/moments.hpp"
@@ -12,24 +11,32 @@
 namespace proofmass {
 namespace {
 
-// Central sums with d = x − c, each corrected for what the rounded mean c lacks (see moments.hpp).
-std::optional<double> coefficient_of(std::span<const double> x, std::span<const double> y) {
-  const auto n = static_cast<double>(x.size());
-  const double x_centre = compensated_sum(x) / n;
-  const double y_centre = compensated_sum(y) / n;
-  CompensatedSum sum_x, sum_y, sum_xx, sum_yy, sum_xy;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const double dx = x[i] - x_centre;
-    const double dy = y[i] - y_centre;
-    sum_x.add(dx);
-    sum_y.add(dy);
-    sum_xx.add(dx * dx);
-    sum_yy.add(dy * dy);
-    sum_xy.add(dx * dy);
+/// Sums of d = x − c, c being the rounded mean, which lacks a little; see moments.hpp.
+struct CentralSums {
+  CentralSums(std::span<const double> xs, std::span<const double> ys)
+      : n(static_cast<double>(xs.size())),
+        x_centre(compensated_sum(xs) / n),
+        y_centre(compensated_sum(ys) / n) {
+    for (std::size_t i = 0; i < xs.size(); ++i) {
+      const double dx = xs[i] - x_centre;
+      const double dy = ys[i] - y_centre;
+      x.add(dx);
+      y.add(dy);
+      xx.add(dx * dx);
+      yy.add(dy * dy);
+      xy.add(dx * dy);
+    }
   }
-  const double xx = sum_xx.value() - sum_x.value() * sum_x.value() / n;
-  const double yy = sum_yy.value() - sum_y.value() * sum_y.value() / n;
-  const double xy = sum_xy.value() - sum_x.value() * sum_y.value() / n;
+
+  double n, x_centre, y_centre;
+  CompensatedSum x, y, xx, yy, xy;
+};
+
+std::optional<double> coefficient_of(std::span<const double> x, std::span<const double> y) {
+  const CentralSums sums(x, y);
+  const double xx = sums.xx.value() - sums.x.value() * sums.x.value() / sums.n;
+  const double yy = sums.yy.value() - sums.y.value() * sums.y.value() / sums.n;
+  const double xy = sums.xy.value() - sums.x.value() * sums.y.value() / sums.n;
   if (xx <= 0.0 || yy <= 0.0) return std::nullopt;
   return std::clamp(xy / std::sqrt(xx) / std::sqrt(yy), -1.0, 1.0);
 }
@@ -56,23 +63,13 @@ std::optional<RegressionLine> fit_line(std::span<const double> x, std::span<cons
   check_columns(x, y);
   if (x.size() < 2) return std::nullopt;
   if (std::ranges::all_of(x, [&](double value) { return value == x[0]; })) return std::nullopt;
-  const auto n = static_cast<double>(x.size());
-  const double x_centre = compensated_sum(x) / n;
-  const double y_centre = compensated_sum(y) / n;
-  CompensatedSum sum_x, sum_y, sum_xx, sum_xy;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const double dx = x[i] - x_centre;
-    const double dy = y[i] - y_centre;
-    sum_x.add(dx);
-    sum_y.add(dy);
-    sum_xx.add(dx * dx);
-    sum_xy.add(dx * dy);
-  }
+  const CentralSums sums(x, y);
+  const double n = sums.n, x_centre = sums.x_centre, y_centre = sums.y_centre;
   // What the rounded means lack, and central sums corrected for it.
-  const double x_rest = sum_x.value() / n;
-  const double y_rest = sum_y.value() / n;
-  const double xx = sum_xx.value() - n * x_rest * x_rest;
-  const double slope = (sum_xy.value() - n * x_rest * y_rest) / xx;
+  const double x_rest = sums.x.value() / n;
+  const double y_rest = sums.y.value() / n;
+  const double xx = sums.xx.value() - n * x_rest * x_rest;
+  const double slope = (sums.xy.value() - n * x_rest * y_rest) / xx;
 
   // The slope of the residuals is what the rounded slope lacks.
   CompensatedSum sum_rest;

@@ -65,8 +65,7 @@ double gap_p_value(std::span<const double> ascending) {
 }
 
 double regular_p_value(std::span<const double> values) {
-  std::vector<double> ascending(values.begin(), values.end());
-  std::ranges::sort(ascending);
+  const std::vector<double> ascending = sorted(values);
   std::vector<double> levels = ascending;
   levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
   if (levels.size() * num_at_level_min > values.size()) return gap_p_value(ascending);

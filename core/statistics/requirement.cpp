@@ -8,6 +8,7 @@
 
 #include "core/error.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/detail/bisection.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
 #include "core/statistics/distribution.hpp"
@@ -32,13 +33,8 @@ void Tolerance::validate() const {
 
 std::uint64_t wilks_order(const Tolerance& tolerance, std::uint64_t num_runs) {
   tolerance.validate();
-  std::uint64_t holds = 0;
-  std::uint64_t fails = num_runs + 1;
-  while (fails - holds > 1) {
-    const std::uint64_t middle = holds + (fails - holds) / 2;
-    (is_bound(tolerance, num_runs, middle) ? holds : fails) = middle;
-  }
-  return holds;
+  return detail::last_that_holds(
+      0, num_runs + 1, [&](std::uint64_t order) { return is_bound(tolerance, num_runs, order); });
 }
 
 std::optional<double> wilks_upper(std::span<const double> values, const Tolerance& tolerance,
@@ -114,17 +110,8 @@ namespace {
 /// for a count holds for all smaller ones.
 template <typename Holds>
 std::uint64_t end_of_counts(std::uint64_t num_runs, const Holds& holds) {
-  std::uint64_t end = 0;
-  std::uint64_t fails = num_runs + 1;
-  while (fails > end) {
-    const std::uint64_t middle = end + (fails - end) / 2;
-    if (holds(static_cast<double>(middle))) {
-      end = middle + 1;
-    } else {
-      fails = middle;
-    }
-  }
-  return end;
+  return detail::last_that_holds(
+      0, num_runs + 2, [&](std::uint64_t end) { return holds(static_cast<double>(end - 1)); });
 }
 
 /// The verdicts of decide() about one tolerance.
@@ -199,11 +186,8 @@ class VerdictRule {
       enough = std::min(std::max(2 * enough, std::uint64_t{1}), num_runs_max);
       if (enough == too_few) return std::nullopt;
     } while (!shows_less(k, enough));
-    while (enough - too_few > 1) {
-      const std::uint64_t middle = too_few + (enough - too_few) / 2;
-      (shows_less(k, middle) ? enough : too_few) = middle;
-    }
-    return enough;
+    return detail::last_that_holds(enough, too_few,
+                                   [&](std::uint64_t num_runs) { return shows_less(k, num_runs); });
   }
 
   [[nodiscard]] RequirementVerdict fixed_verdict(double k, double n) const {
@@ -260,11 +244,8 @@ std::optional<std::uint64_t> runs_to_decide(const VerdictRule& rule,
     enough *= 2;
     if (runs_with(too_few + 1, check) > num_runs_max) return std::nullopt;
   } while (!decides(enough));
-  while (enough - too_few > 1) {
-    const std::uint64_t middle = too_few + (enough - too_few) / 2;
-    (decides(middle) ? enough : too_few) = middle;
-  }
-  const std::uint64_t num_runs = runs_with(enough, check);
+  const std::uint64_t num_runs =
+      runs_with(detail::last_that_holds(enough, too_few, decides), check);
   return num_runs <= num_runs_max ? std::optional(num_runs) : std::nullopt;
 }
 

@@ -91,11 +91,10 @@ class TermSearch {
           *std::ranges::max_element(inputs[i], {}, [](double value) { return std::abs(value); }));
       if (!detail::varies(inputs[i])) continue;
       // Products of values in units of the largest one stay within the range of a double.
-      Values scaled(inputs[i].begin(), inputs[i].end());
+      Values& scaled = columns_.emplace_back(inputs[i].begin(), inputs[i].end());
       for (double& value : scaled) value /= largest;
       positions_.push_back(i);
       units_.push_back(largest);
-      columns_.push_back(std::move(scaled));
     }
   }
 
@@ -112,8 +111,6 @@ class TermSearch {
   }
 
  private:
-  [[nodiscard]] double num_candidates() const { return num_terms_of(columns_.size()); }
-
   [[nodiscard]] Values values_of(const Candidate& candidate) const {
     Values values = columns_[candidate.first];
     if (candidate.second) {
@@ -182,10 +179,12 @@ class TermSearch {
       const double product = dot(values, rest_);
       const double share = product * product / square / variance_;
       if (share < term_share_min) continue;
-      const double p_value =
-          std::min(num_candidates() * p_value_of(candidate, values_of(candidate)), 1.0);
+      const double p_value = std::min(
+          num_terms_of(columns_.size()) * p_value_of(candidate, values_of(candidate)), 1.0);
       if (p_value >= significance) continue;
-      keep(candidate, values);
+      kept_.push_back(candidate);
+      remove(values, rest_);
+      basis_.push_back(std::move(values));
       ExplanatoryTerm term{.first = positions_[candidate.first],
                            .second = std::nullopt,
                            .slope = 0.0,
@@ -195,13 +194,6 @@ class TermSearch {
       return term;
     }
     return std::nullopt;
-  }
-
-  /// @param orthogonal  Its values without the terms before.
-  void keep(const Candidate& candidate, const Values& orthogonal) {
-    basis_.push_back(orthogonal);
-    kept_.push_back(candidate);
-    remove(orthogonal, rest_);
   }
 
   // Of the fit of all terms: with Q the orthogonal columns and X = Q R, R slopes = Qᵀy/Q².
@@ -231,7 +223,7 @@ class TermSearch {
   Values rest_;
   double variance_;
   std::vector<Candidate> kept_;
-  std::vector<Values> basis_;
+  std::vector<Values> basis_;  ///< Values of these without the terms before.
 };
 
 }  // namespace

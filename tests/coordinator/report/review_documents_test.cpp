@@ -171,7 +171,7 @@ TEST_F(ReviewSummary, SaysWhatIsMissing) {
   store.extend(test::campaign_of(30), canonical_definition(test::campaign_of(30)));
   Review review = review_of(store, 30);
   EXPECT_EQ(sentences_of(review)[1], "The campaign is not finished: 20 of 30 draws are done.");
-  review.num_given_up = review.missing.num_given_up = 1;
+  review.missing.num_given_up = 1;
   EXPECT_EQ(sentences_of(review)[1],
             "The campaign is not finished: 21 of 30 draws are done, 1 of them without an estimate "
             "(1 given up), which counts as an exceedance.");
@@ -195,8 +195,10 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
       sentences_of(review)[3],
       HasSubstr(
           "; in 0 draws no drawn quantity or product of two was found to explain it; those "));
-  review.causes->terms = {{.quantity = 0, .name = "true a × b", .slope = 1.0, .share = 0.982},
-                          {.quantity = 0, .name = "c", .slope = 1.0, .share = 0.01}};
+  const auto term = [](std::string name, double share) {
+    return CauseTerm{.name = std::move(name), .found = {.second = {}, .share = share}};
+  };
+  review.causes->terms = {term("true a × b", 0.982), term("c", 0.01)};
   EXPECT_THAT(sentences_of(review)[3],
               HasSubstr("100 nm or 100 % of its objective; of the variance of this error over the "
                         "draws, 98.2 % follows from true a × b."));
