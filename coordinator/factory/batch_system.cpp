@@ -16,6 +16,7 @@
 
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
 
@@ -182,23 +183,20 @@ constexpr std::size_t output_size_max = 1 << 20;
 class MemoryFile {
  public:
   explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
-    if (descriptor_ < 0) fail("memory of a command");
+    if (descriptor() < 0) fail("memory of a command");
   }
-  ~MemoryFile() { close(descriptor_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
 
-  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
 
   void write_from_start(std::string_view text) const {
-    if (pwrite(descriptor_, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
+    if (pwrite(descriptor(), text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
       fail("input of a command");
     }
   }
 
   [[nodiscard]] std::string text() const {
     std::string text(output_size_max, '\0');
-    const ssize_t size = pread(descriptor_, text.data(), text.size(), 0);
+    const ssize_t size = pread(descriptor(), text.data(), text.size(), 0);
     text.resize(size < 0 ? 0 : static_cast<std::size_t>(size));
     return text;
   }
@@ -208,7 +206,7 @@ class MemoryFile {
     throw Error(fmt::format("{}: {}", what, std::generic_category().message(errno)));
   }
 
-  int descriptor_;
+  wire::Descriptor descriptor_;
 };
 
 /// @return What waitpid() says of the end; nothing if it does not end in time and is killed.

@@ -24,8 +24,10 @@
 
 #include "coordinator/store/sha256.hpp"
 #include "core/error.hpp"
+#include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/wire/client_codec.hpp"
 
@@ -33,6 +35,7 @@ namespace proofmass::coordinator {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using wire::Descriptor;
 
 constexpr std::uint64_t memory_size_max = std::uint64_t{4} << 30;  // Of address space, bytes.
 constexpr std::size_t block_size = std::size_t{1} << 20;
@@ -125,6 +128,47 @@ void require_space(const Order& order, const std::filesystem::path& database) {
   throw Error(fmt::format("answer: {}: {}", what, std::strerror(errno)));
 }
 
+}  // namespace
+
+/// A file without a name: it is gone when its descriptor is closed.
+class UnnamedFile {
+ public:
+  explicit UnnamedFile(int descriptor) : descriptor_(descriptor) {}
+
+  /// @throws Error if they cannot be written.
+  void append(std::string_view bytes) const {
+    if (!wire::write_all(descriptor_.number(), bytes)) fail("write");
+  }
+
+  [[nodiscard]] std::uint64_t size() const {  ///< Bytes.
+    struct stat status {};
+    if (fstat(descriptor_.number(), &status) != 0) fail("size");
+    return static_cast<std::uint64_t>(status.st_size);
+  }
+
+  /// At most so many bytes from the offset on; fewer only at the end of the file.
+  /// @throws Error if it cannot be read.
+  [[nodiscard]] std::string read(std::uint64_t offset, std::size_t size_max) const {
+    std::string bytes(size_max, '\0');
+    std::size_t size = 0;
+    while (size < size_max) {
+      const ssize_t num_read = pread(descriptor_.number(), bytes.data() + size, size_max - size,
+                                     static_cast<off_t>(offset + size));
+      if (num_read < 0 && errno == EINTR) continue;
+      if (num_read < 0) fail("read");
+      if (num_read == 0) break;
+      size += static_cast<std::size_t>(num_read);
+    }
+    bytes.resize(size);
+    return bytes;
+  }
+
+ private:
+  Descriptor descriptor_;
+};
+
+namespace {
+
 /// @param directory  Is made if it is not there.
 std::unique_ptr<UnnamedFile> make_unnamed_file(const std::filesystem::path& directory) {
   mkdir(directory.c_str(), S_IRWXU);  // If that fails, so does what follows.
@@ -140,30 +184,12 @@ void limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) 
   if (prlimit(process_id, resource, &wanted, nullptr) != 0 && errno != ESRCH) fail("limits");
 }
 
-/// Closes a descriptor at the end of a scope, or before.
-class Descriptor {
- public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  ~Descriptor() { reset(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  [[nodiscard]] int number() const { return number_; }
-  void reset(int number = -1) {
-    if (number_ >= 0) close(number_);
-    number_ = number;
-  }
-
- private:
-  int number_;
-};
-
 struct Pipe {
   Pipe() {
     std::array<int, 2> ends{};
     if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
-    reading.reset(ends[0]);
-    writing.reset(ends[1]);
+    reading = Descriptor(ends[0]);
+    writing = Descriptor(ends[1]);
   }
 
   Descriptor reading;
@@ -180,8 +206,8 @@ class AnswerProcess {
         {.arguments = order.arguments,
          .descriptors = {nothing.number(), output_.writing.number(), errors_.writing.number()},
          .environment = wire::environment_without_settings()});
-    output_.writing.reset();
-    errors_.writing.reset();
+    output_.writing = Descriptor();
+    errors_.writing = Descriptor();
   }
   ~AnswerProcess() {
     if (process_id_ == 0) return;
@@ -305,37 +331,7 @@ struct CopyRemover {
 
 }  // namespace
 
-UnnamedFile::~UnnamedFile() { close(descriptor_); }
-
-std::uint64_t UnnamedFile::size() const {
-  struct stat status {};
-  if (fstat(descriptor_, &status) != 0) fail("size");
-  return static_cast<std::uint64_t>(status.st_size);
-}
-
-std::string UnnamedFile::read(std::uint64_t offset, std::size_t size_max) const {
-  std::string bytes(size_max, '\0');
-  std::size_t size = 0;
-  while (size < size_max) {
-    const ssize_t num_read =
-        pread(descriptor_, bytes.data() + size, size_max - size, static_cast<off_t>(offset + size));
-    if (num_read < 0 && errno == EINTR) continue;
-    if (num_read < 0) fail("read");
-    if (num_read == 0) break;
-    size += static_cast<std::size_t>(num_read);
-  }
-  bytes.resize(size);
-  return bytes;
-}
-
-void UnnamedFile::append(std::string_view bytes) const {
-  while (!bytes.empty()) {
-    const ssize_t num_written = write(descriptor_, bytes.data(), bytes.size());
-    if (num_written < 0 && errno == EINTR) continue;
-    if (num_written < 0) fail("write");
-    bytes.remove_prefix(static_cast<std::size_t>(num_written));
-  }
-}
+Answers::Answers(const ServiceContext& context) : context_(context) {}
 
 Answers::~Answers() {
   for (const Computing& computing : computing_) *computing.is_cancelled = true;

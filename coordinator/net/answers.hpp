@@ -17,23 +17,7 @@
 
 namespace proofmass::coordinator {
 
-/// A file without a name: it is gone when its descriptor is closed.
-class UnnamedFile {
- public:
-  explicit UnnamedFile(int descriptor) : descriptor_(descriptor) {}
-  ~UnnamedFile();
-  UnnamedFile(const UnnamedFile&) = delete;
-  UnnamedFile& operator=(const UnnamedFile&) = delete;
-
-  void append(std::string_view bytes) const;  ///< @throws Error if they cannot be written.
-  [[nodiscard]] std::uint64_t size() const;   ///< Bytes.
-  /// At most so many bytes from the offset on; fewer only at the end of the file.
-  /// @throws Error if it cannot be read.
-  [[nodiscard]] std::string read(std::uint64_t offset, std::size_t size_max) const;
-
- private:
-  int descriptor_;
-};
+class UnnamedFile;
 
 /// Answers clients' questions about results. Each is answered by the program `proofmass` in a
 /// process of its own, with the command that a user would type on this machine: what a question
@@ -51,7 +35,7 @@ class Answers {
   /// Of an answer, bytes, unless it is a copy of the database.
   static constexpr std::uint64_t size_max = std::uint64_t{64} << 20;
 
-  explicit Answers(const ServiceContext& context) : context_(context) {}
+  explicit Answers(const ServiceContext& context);
   ~Answers();  ///< Ends the processes.
   Answers(const Answers&) = delete;
   Answers& operator=(const Answers&) = delete;

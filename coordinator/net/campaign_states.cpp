@@ -238,14 +238,10 @@ void CampaignService::begin_closing(CampaignId id, std::function<void(bool is_cl
       Served& served = served_.at(id);
       served.is_held = false;
       served.closing_at = context_.now();
-      bool is_closing = is_folded && is_settled(id, served) && has_ended(phase_of(id));
-      try {
-        if (is_closing) close_ended(id);
-      } catch (const std::exception& error) {
-        say_not_closed(error.what());
-        is_closing = false;
-      }
-      then(is_closing);
+      if (!is_folded || !is_settled(id, served) || !has_ended(phase_of(id))) return then(false);
+      const std::string failure = failure_of([&] { close_ended(id); });
+      if (!failure.empty()) say_not_closed(failure);
+      then(failure.empty());
     };
   });
 }
@@ -346,11 +342,8 @@ std::vector<ServedCampaign> CampaignService::close() {
     Served& served = served_.at(id);
     if (served.summary.valid()) served.summary.wait();
     Store store = writer_.close(id);
-    try {
-      store.end_coordinator(context_.start.epoch);
-    } catch (const std::exception& error) {
-      say_not_closed(error.what());
-    }
+    const std::string failure = failure_of([&] { store.end_coordinator(context_.start.epoch); });
+    if (!failure.empty()) say_not_closed(failure);
     const CampaignState& campaign = state_.campaigns.at(id);
     campaigns.push_back(
         {.file = served.record.file, .store = std::move(store), .definition = campaign.definition});

@@ -87,9 +87,9 @@ RequestParts::Outcome RequestParts::take(const std::string& connection, std::uin
   if (unfinished.bytes.size() < unfinished.total_size) {
     return part_reply(unfinished.bytes.size());
   }
-  Whole whole{.bytes = std::move(unfinished.bytes)};
+  std::string bytes = std::move(unfinished.bytes);
   unfinished_.erase(found);
-  return whole;
+  return bytes;
 }
 
 void RequestParts::release(std::size_t size) {
@@ -156,7 +156,7 @@ void ClientGateway::take_part(const Address& from, std::uint64_t request,
     return send(waiter, std::move(*reply));
   }
   send(waiter, part_reply(part.total_size()));
-  take_whole(from, request, std::move(std::get<RequestParts::Whole>(outcome).bytes));
+  take_whole(from, request, std::get<std::string>(std::move(outcome)));
 }
 
 void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::string bytes) {
@@ -185,15 +185,14 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
 }
 
 void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
-  try {
+  const Respond to_all = [this, ticket](const proto::ReplyEnvelope& reply) {
+    respond(ticket, reply);
+  };
+  respond_or_say_why(to_all, [&] {
     const std::optional<Asker> asker = callbacks_.asker_of(key);
     if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));
-    callbacks_.carry_out(
-        std::move(request), *asker,
-        [this, ticket](const proto::ReplyEnvelope& reply) { respond(ticket, reply); });
-  } catch (const std::exception& error) {
-    respond(ticket, wire::error_reply(error.what()));
-  }
+    callbacks_.carry_out(std::move(request), *asker, to_all);
+  });
 }
 
 std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint64_t request,

@@ -37,11 +37,8 @@ struct Request {
 /// request at a time: the first part of another one replaces it.
 class RequestParts {
  public:
-  /// All parts of a request are here.
-  struct Whole {
-    std::string bytes;
-  };
-  using Outcome = std::variant<Whole, proto::ReplyEnvelope>;
+  /// All bytes of a request, once all of its parts are here; before, what to reply.
+  using Outcome = std::variant<std::string, proto::ReplyEnvelope>;
 
   /// @param size_max  Of all requests together, bytes. Room for a request is taken with its first
   ///                  part.

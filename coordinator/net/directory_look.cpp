@@ -1,18 +1,16 @@
 #include "coordinator/net/directory_look.hpp"
 
 #include <fmt/format.h>
-#include <sys/random.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <exception>
 #include <functional>
 #include <iterator>
 #include <map>
 #include <optional>
+#include <random>
 #include <string>
 #include <utility>
 
@@ -168,12 +166,9 @@ FileLook opened(const CampaignDirectory& directory, const std::filesystem::path&
 }
 
 wire::Epoch random_epoch() {
+  std::random_device device;
   wire::Epoch epoch;
-  while (epoch.value == 0) {
-    if (getrandom(&epoch.value, sizeof epoch.value, 0) < 0 && errno != EINTR) {
-      throw Error(fmt::format("getrandom: {}", std::strerror(errno)));
-    }
-  }
+  while (epoch.value == 0) epoch.value = (std::uint64_t{device()} << 32) | device();
   return epoch;
 }
 

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -55,10 +55,8 @@ std::uint64_t raise_descriptor_limit() {
 }
 
 int lowest_free_descriptor() {
-  const int descriptor = open("/dev/null", O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return std::numeric_limits<int>::max();
-  close(descriptor);
-  return descriptor;
+  const wire::Descriptor lowest(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  return lowest.number() < 0 ? std::numeric_limits<int>::max() : lowest.number();
 }
 
 bool MemoryBound::is_exceeded(std::size_t size) {
@@ -76,24 +74,17 @@ bool MemoryBound::note_reset(std::size_t size) {
 }
 
 ResidentMemory::ResidentMemory() : file_(open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {
-  if (file_ < 0) throw Error(fmt::format("/proc/self/statm: {}", std::strerror(errno)));
+  if (file_.number() < 0) throw Error(fmt::format("/proc/self/statm: {}", std::strerror(errno)));
 }
-
-ResidentMemory::~ResidentMemory() { close(file_); }
 
 std::size_t ResidentMemory::size() const {
   // In pages: the size of the address space, what of it is resident.
   std::array<char, 128> text{};
-  const ssize_t length = pread(file_, text.data(), text.size(), 0);
+  const ssize_t length = pread(file_.number(), text.data(), text.size() - 1, 0);
   PROOFMASS_EXPECT(length > 0);
-  std::array<std::size_t, 2> pages{};
-  const char* position = text.data();
-  for (std::size_t& number : pages) {
-    const auto end = std::from_chars(position, text.data() + length, number);
-    PROOFMASS_EXPECT(end.ec == std::errc());
-    position = end.ptr + 1;
-  }
-  return pages[1] * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  char* after_first = nullptr;
+  (void)std::strtoull(text.data(), &after_first, 10);
+  return std::strtoull(after_first, nullptr, 10) * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
 MemoryGuard::MemoryGuard(std::size_t size_max, Actions actions)

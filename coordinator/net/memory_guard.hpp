@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "coordinator/dispatch/outbox.hpp"
+#include "proto/link/descriptor.hpp"
 
 namespace proofmass::coordinator {
 
@@ -70,14 +71,11 @@ class MemoryBound {
 class ResidentMemory {
  public:
   ResidentMemory();  ///< @throws Error if the system does not tell.
-  ~ResidentMemory();
-  ResidentMemory(const ResidentMemory&) = delete;
-  ResidentMemory& operator=(const ResidentMemory&) = delete;
 
   [[nodiscard]] std::size_t size() const;  ///< Bytes.
 
  private:
-  int file_;
+  wire::Descriptor file_;
 };
 
 /// Watches the memory and the descriptors of this process 40 times a second, in a thread of its

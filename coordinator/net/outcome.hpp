@@ -33,4 +33,13 @@ using Respond = std::function<void(proto::ReplyEnvelope)>;
   }
 }
 
+/// Lets an action respond; if it throws instead, responds with the reason.
+inline void respond_or_say_why(const Respond& respond, const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    respond(wire::error_reply(error.what()));
+  }
+}
+
 }  // namespace proofmass::coordinator

@@ -41,7 +41,7 @@ std::filesystem::path parent_directory() {
 /// A new directory, and the lock in it, which this process holds.
 struct LockedDirectory {
   std::filesystem::path path;
-  int lock = -1;
+  wire::Descriptor lock;
 };
 
 // It gets its name when its lock is held: until then nobody takes it for one that was left behind.
@@ -51,13 +51,12 @@ LockedDirectory make_directory(const std::filesystem::path& parent) {
   const std::filesystem::path lock_file = std::filesystem::path(draft) / lock_name;
   const std::filesystem::path path =
       parent / (std::string(prefix) + draft.substr(draft.size() - random_size));
-  const int lock = open(lock_file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (lock >= 0 && wire::lock_file(lock) == wire::Locked::yes &&
+  wire::Descriptor lock(open(lock_file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  if (lock.number() >= 0 && wire::lock_file(lock.number()) == wire::Locked::yes &&
       rename(draft.c_str(), path.c_str()) == 0) {
-    return {.path = path, .lock = lock};
+    return {.path = path, .lock = std::move(lock)};
   }
   const int error = errno;
-  if (lock >= 0) close(lock);
   unlink(lock_file.c_str());
   rmdir(draft.c_str());
   errno = error;
@@ -78,32 +77,30 @@ bool is_private(int directory) {
 }
 
 void remove_if_stale(int parent, const char* name) {
-  const int directory = openat(parent, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-  if (directory < 0) return;
-  if (is_private(directory)) {
-    const int lock = openat(directory, lock_name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    // While its process lives, also one in another container, the lock is held.
-    const bool is_stale = lock >= 0 && wire::lock_file(lock) == wire::Locked::yes;
-    if (is_stale) remove_directory(parent, name, directory);
-    if (lock >= 0) close(lock);
-  }
-  close(directory);
+  const wire::Descriptor opened(
+      openat(parent, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  const int directory = opened.number();
+  if (directory < 0 || !is_private(directory)) return;
+  const wire::Descriptor lock(
+      openat(directory, lock_name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  // While its process lives, also one in another container, the lock is held.
+  const bool is_stale = lock.number() >= 0 && wire::lock_file(lock.number()) == wire::Locked::yes;
+  if (is_stale) remove_directory(parent, name, directory);
 }
 
 }  // namespace
 
 void remove_stale_endpoints(const std::filesystem::path& parent) {
-  const int descriptor = open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
+  const wire::Descriptor opened(open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened.number() < 0) return;
   std::error_code error;
   for (std::filesystem::directory_iterator entry(parent, error), end; !error && entry != end;
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (name.starts_with(prefix) && name.size() == prefix.size() + random_size) {
-      remove_if_stale(descriptor, name.c_str());
+      remove_if_stale(opened.number(), name.c_str());
     }
   }
-  close(descriptor);
 }
 
 PrivateEndpoint::PrivateEndpoint() {
@@ -111,14 +108,13 @@ PrivateEndpoint::PrivateEndpoint() {
   remove_stale_endpoints(parent);
   LockedDirectory made = make_directory(parent);
   directory_ = std::move(made.path);
-  lock_ = made.lock;
+  lock_ = std::move(made.lock);
 }
 
 PrivateEndpoint::~PrivateEndpoint() {
   unlink((directory_ / socket_name).c_str());
   unlink((directory_ / lock_name).c_str());
   rmdir(directory_.c_str());
-  close(lock_);
 }
 
 std::string PrivateEndpoint::address() const {
@@ -131,17 +127,14 @@ int PrivateEndpoint::listen() const {
   address.sun_family = AF_UNIX;
   PROOFMASS_EXPECT(path.size() < sizeof address.sun_path);
   path.copy(address.sun_path, path.size());
-  const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (listener < 0) fail(path);
+  wire::Descriptor listener(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   // The interface of sockets takes addresses of all families as this type.
   const auto* const any = reinterpret_cast<const sockaddr*>(&address);
-  if (bind(listener, any, sizeof address) == 0 && ::listen(listener, SOMAXCONN) == 0) {
-    return listener;
+  if (listener.number() < 0 || bind(listener.number(), any, sizeof address) != 0 ||
+      ::listen(listener.number(), SOMAXCONN) != 0) {
+    fail(path);
   }
-  const int error = errno;
-  close(listener);
-  errno = error;
-  fail(path);
+  return listener.release();
 }
 
 }  // namespace proofmass::coordinator

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <string>
 
+#include "proto/link/descriptor.hpp"
+
 namespace proofmass::coordinator {
 
 /// An `ipc://` address in a new directory `proofmass-run-XXXXXX` that only this user can enter; the
@@ -27,7 +29,7 @@ class PrivateEndpoint {
 
  private:
   std::filesystem::path directory_;
-  int lock_ = -1;  ///< Descriptor of the lock in the directory.
+  wire::Descriptor lock_;  ///< In the directory.
 };
 
 /// Removes what killed processes of this user left in a directory: directories

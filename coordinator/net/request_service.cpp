@@ -260,11 +260,8 @@ bool RequestService::is_busy(const std::string& name) const {
 void RequestService::review() {
   answers_.review();
   for (const Deferred& waiting : std::exchange(deferred_, {})) {
-    try {
-      submit(waiting.request, waiting.asker, waiting.respond);
-    } catch (const std::exception& error) {
-      waiting.respond(wire::error_reply(error.what()));
-    }
+    respond_or_say_why(waiting.respond,
+                       [&] { submit(waiting.request, waiting.asker, waiting.respond); });
   }
 }
 
@@ -362,11 +359,7 @@ void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction 
     return [this, name, campaign, action, size, failure, respond] {
       under_way_.erase(name);
       if (!failure.empty()) return respond(wire::error_reply(failure));
-      try {
-        reopen_measured(name, campaign, action, size, respond);
-      } catch (const std::exception& error) {
-        respond(wire::error_reply(error.what()));
-      }
+      respond_or_say_why(respond, [&] { reopen_measured(name, campaign, action, size, respond); });
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();

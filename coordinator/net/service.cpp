@@ -63,17 +63,13 @@ class Service::Impl final : public Outbox {
 
   /// For all that is measured here and in the dispatch.
   [[nodiscard]] TimePoint now() { return time_.at(std::chrono::steady_clock::now()); }
-  [[nodiscard]] const State& state() const { return state_; }
-  [[nodiscard]] const CampaignService& campaign_service() const { return campaign_service_; }
-  [[nodiscard]] const ServiceSockets& sockets() const { return sockets_; }
   [[nodiscard]] bool is_done() const {
     return campaign_service_.is_all_done() && campaign_service_.is_all_served();
   }
-  [[nodiscard]] bool has_storage_failed() const { return has_storage_failed_; }
 
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
     while (!is_over(stop)) {
-      sockets_.wait(sockets_.has_faults() ? tick_interval / 10 : tick_interval);
+      sockets_.wait(sockets_.workers().has_faults() ? tick_interval / 10 : tick_interval);
       turn();
       on_turn();
     }
@@ -99,8 +95,6 @@ class Service::Impl final : public Outbox {
     history_.note_reason(worker, reason);
     on_gone(state_, worker, reason, now(), *this);
   }
-
-  std::vector<ServedCampaign> close() { return campaign_service_.close(); }
 
   // Outbox.
 
@@ -149,6 +143,8 @@ class Service::Impl final : public Outbox {
   }
 
  private:
+  friend class Service;
+
   /// Registers no more workers than there are descriptors for; `proofmass run` has few of them.
   void limit_workers() {
     const Descriptors& descriptors = sockets_.descriptors();
@@ -172,11 +168,13 @@ class Service::Impl final : public Outbox {
   WorkerGateway::Callbacks worker_callbacks() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
-                  return sockets_.send_to_worker(routing_id, bytes, now());
+                  return sockets_.workers().send(routing_id, bytes, now());
                 },
             .is_allowed =
                 [this](const std::string& key, TimePoint time) {
-                  return is_allowed(wire::Domain::workers, key, time);
+                  Authenticator* const authenticator = sockets_.authenticator();
+                  return authenticator == nullptr ||
+                         authenticator->is_allowed(wire::Domain::workers, key, time);
                 },
             .on_leaving = [this](WorkerId worker,
                                  LossReason reason) { history_.note_reason(worker, reason); }};
@@ -185,7 +183,7 @@ class Service::Impl final : public Outbox {
   ClientGateway::Callbacks client_callbacks() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
-                  (void)sockets_.send_to_client(routing_id, bytes, now());
+                  (void)sockets_.clients()->send(routing_id, bytes, now());
                   if (!campaign_service_.is_all_done()) told_progress_at_ = now();
                 },
             .asker_of = [this](const std::string& key) -> std::optional<Asker> {
@@ -198,11 +196,6 @@ class Service::Impl final : public Outbox {
                 },
             .now = [this] { return now(); },
             .paths = paths_};
-  }
-
-  [[nodiscard]] bool is_allowed(wire::Domain domain, const std::string& key, TimePoint time) {
-    Authenticator* const authenticator = sockets_.authenticator();
-    return authenticator == nullptr || authenticator->is_allowed(domain, key, time);
   }
 
   Delivery delivery_of(WorkerId worker, wire::LeasedResult&& result) {
@@ -236,9 +229,7 @@ class Service::Impl final : public Outbox {
   void turn() {
     sockets_.serve(now());
     receive_from_workers();
-    for (const Completion& completion : writer_.take_completions()) {
-      std::visit([this](const auto& content) { complete(content); }, completion);
-    }
+    take_completions();
     receive_from_clients();
     finish_background();
     if (now() - ticked_at_ < tick_interval) return;
@@ -265,7 +256,7 @@ class Service::Impl final : public Outbox {
   }
 
   void receive_from_workers() {
-    const int count = sockets_.receive_from_workers(
+    const int count = sockets_.workers().receive(
         worker_messages_per_turn_max, now(), [this](const Incoming& message) {
           guarded("worker", [&] { worker_gateway_.receive(message, now(), *this); });
         });
@@ -273,10 +264,11 @@ class Service::Impl final : public Outbox {
   }
 
   void receive_from_clients() {
-    sockets_.receive_from_clients(client_messages_per_turn_max, now(),
-                                  [this](const Incoming& message) {
-                                    guarded("client", [&] { client_gateway_.receive(message); });
-                                  });
+    if (sockets_.clients() == nullptr) return;
+    (void)sockets_.clients()->receive(
+        client_messages_per_turn_max, now(), [this](const Incoming& message) {
+          guarded("client", [&] { client_gateway_.receive(message); });
+        });
   }
 
   void finish_background() {
@@ -301,6 +293,12 @@ class Service::Impl final : public Outbox {
       log({.severity = Severity::error,
            .kind = "request_failed",
            .fields = {{"of", who}, Field::reason(error.what())}});
+    }
+  }
+
+  void take_completions() {
+    for (const Completion& completion : writer_.take_completions()) {
+      std::visit([this](const auto& content) { complete(content); }, completion);
     }
   }
 
@@ -330,9 +328,7 @@ class Service::Impl final : public Outbox {
   void end(bool leaves_workers) {
     settle_background();
     writer_.flush();
-    for (const Completion& completion : writer_.take_completions()) {
-      std::visit([this](const auto& content) { complete(content); }, completion);
-    }
+    take_completions();
     for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
     campaign_service_.review();  // Statistics are made while the workers end.
     if (!leaves_workers) dismiss_workers();
@@ -394,9 +390,12 @@ Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& con
 
 Service::~Service() = default;
 
-std::string Service::workers_endpoint() const { return impl_->sockets().workers_endpoint(); }
+std::string Service::workers_endpoint() const { return impl_->sockets_.workers().endpoint(); }
 
-std::string Service::clients_endpoint() const { return impl_->sockets().clients_endpoint(); }
+std::string Service::clients_endpoint() const {
+  RouterSocket* const clients = impl_->sockets_.clients();
+  return clients == nullptr ? std::string() : clients->endpoint();
+}
 
 void Service::run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
   impl_->run(stop, on_turn);
@@ -404,7 +403,7 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
 
 std::vector<proto::CampaignStatus> Service::campaigns() const {
   std::vector<proto::CampaignStatus> statuses;
-  for (CampaignRecord& campaign : impl_->campaign_service().records()) {
+  for (CampaignRecord& campaign : impl_->campaign_service_.records()) {
     statuses.push_back(std::move(campaign.status));
   }
   return statuses;
@@ -414,27 +413,27 @@ ServiceSnapshot Service::snapshot(SnapshotDepth depth) const { return impl_->sna
 
 bool Service::is_done() const { return impl_->is_done(); }
 
-bool Service::has_storage_failed() const { return impl_->has_storage_failed(); }
+bool Service::has_storage_failed() const { return impl_->has_storage_failed_; }
 
 std::optional<WorkerId> Service::worker_of(std::uint64_t process_id) const {
-  for (const auto& [id, worker] : impl_->state().workers) {
+  for (const auto& [id, worker] : impl_->state_.workers) {
     if (worker.process_id == process_id) return id;
   }
   return std::nullopt;
 }
 
 std::string Service::runs_held_text(WorkerId worker) const {
-  return coordinator::runs_held_text(impl_->state(), worker);
+  return coordinator::runs_held_text(impl_->state_, worker);
 }
 
 bool Service::is_quarantined(const std::string& host) const {
-  return coordinator::is_quarantined(impl_->state(), host);
+  return coordinator::is_quarantined(impl_->state_, host);
 }
 
 void Service::worker_ended(WorkerId worker, LossReason reason) {
   impl_->worker_ended(worker, reason);
 }
 
-std::vector<ServedCampaign> Service::close() { return impl_->close(); }
+std::vector<ServedCampaign> Service::close() { return impl_->campaign_service_.close(); }
 
 }  // namespace proofmass::coordinator

@@ -40,12 +40,6 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
     clients_ = std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
                                               security_of(config, wire::Domain::clients));
   }
-  if (authenticator_ != nullptr) {
-    authenticator_->watch(wire::Domain::workers, [this] { return workers_->take_event(); });
-    if (clients_ != nullptr) {
-      authenticator_->watch(wire::Domain::clients, [this] { return clients_->take_event(); });
-    }
-  }
   descriptors_ = shared_out(raise_descriptor_limit(), config.num_descriptors_reserved,
                             lowest_free_descriptor());
   if (!config.memory_size_max) return;
@@ -59,10 +53,6 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
 }
 
 ServiceSockets::~ServiceSockets() = default;
-
-std::string ServiceSockets::clients_endpoint() const {
-  return clients_ == nullptr ? "" : clients_->endpoint();
-}
 
 void ServiceSockets::wait(std::chrono::milliseconds duration_max) {
   // Polled all the time, a socket would hardly ever be free for the guard.
@@ -89,26 +79,18 @@ void ServiceSockets::wait(std::chrono::milliseconds duration_max) {
 
 void ServiceSockets::serve(TimePoint now) {
   (void)wake_.take();
-  if (authenticator_ != nullptr) authenticator_->serve(now);
-  for (const Event& event : take_notes()) log_(event);
-}
-
-int ServiceSockets::receive_from_workers(int count_max, TimePoint now, const Handle& handle) {
-  return workers_->receive(count_max, now, handle);
-}
-
-void ServiceSockets::receive_from_clients(int count_max, TimePoint now, const Handle& handle) {
-  if (clients_ != nullptr) (void)clients_->receive(count_max, now, handle);
-}
-
-bool ServiceSockets::send_to_worker(const std::string& routing_id, const std::string& bytes,
-                                    TimePoint now) {
-  return workers_->send(routing_id, bytes, now);
-}
-
-bool ServiceSockets::send_to_client(const std::string& routing_id, const std::string& bytes,
-                                    TimePoint now) {
-  return clients_ != nullptr && clients_->send(routing_id, bytes, now);
+  if (authenticator_ != nullptr) {
+    const auto hand_on_events = [&](wire::Domain domain, RouterSocket& socket) {
+      while (const auto event = socket.take_event()) authenticator_->on_event(domain, *event, now);
+    };
+    hand_on_events(wire::Domain::workers, *workers_);
+    if (clients_ != nullptr) hand_on_events(wire::Domain::clients, *clients_);
+    authenticator_->serve(now);
+  }
+  std::unique_lock lock(mutex_);
+  const std::vector<Event> notes = std::exchange(notes_, {});
+  lock.unlock();
+  for (const Event& event : notes) log_(event);
 }
 
 void ServiceSockets::close() {
@@ -140,11 +122,6 @@ void ServiceSockets::set_closing(bool is_closing) {
     is_closing_ = is_closing;
   }
   closed_.notify_all();
-}
-
-std::vector<Event> ServiceSockets::take_notes() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(notes_, {});
 }
 
 }  // namespace proofmass::coordinator

@@ -4,11 +4,9 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "coordinator/net/authentication/authenticator.hpp"
@@ -26,8 +24,6 @@ namespace proofmass::coordinator {
 /// again to free what they hold.
 class ServiceSockets {
  public:
-  using Handle = std::function<void(const Incoming&)>;
-
   /// Binds the sockets.
   ///
   /// @param log  Refused peers, lists that cannot be read, sockets that were closed; called by
@@ -39,12 +35,8 @@ class ServiceSockets {
   ServiceSockets(const ServiceSockets&) = delete;
   ServiceSockets& operator=(const ServiceSockets&) = delete;
 
-  /// The addresses to connect to, with the ports that were chosen.
-  [[nodiscard]] std::string workers_endpoint() const { return workers_->endpoint(); }
-  [[nodiscard]] std::string clients_endpoint() const;  ///< Empty if there are no clients.
-
-  /// Whether messages come late on purpose.
-  [[nodiscard]] bool has_faults() const { return workers_->has_faults(); }
+  [[nodiscard]] RouterSocket& workers() { return *workers_; }
+  [[nodiscard]] RouterSocket* clients() { return clients_.get(); }  ///< Null if there are none.
 
   /// Who may connect; null if there are no keys.
   [[nodiscard]] Authenticator* authenticator() { return authenticator_.get(); }
@@ -61,23 +53,12 @@ class ServiceSockets {
   /// Answers handshakes and logs what happened to the sockets. Never waits.
   void serve(TimePoint now);
 
-  /// Hands the next messages to `handle`, as many as there are and at most `count_max`.
-  /// @return Their number.
-  int receive_from_workers(int count_max, TimePoint now, const Handle& handle);
-  void receive_from_clients(int count_max, TimePoint now, const Handle& handle);
-
-  /// False if the peer is gone, its queue is full, or the sockets are closed at the moment.
-  bool send_to_worker(const std::string& routing_id, const std::string& bytes, TimePoint now);
-  bool send_to_client(const std::string& routing_id, const std::string& bytes, TimePoint now);
-
  private:
   // Called in the guard's thread.
   void close();
   bool open();
   void note(Event event);
   void set_closing(bool is_closing);
-
-  std::vector<Event> take_notes();
 
   Log log_;
   wire::Wake wake_;

@@ -10,7 +10,6 @@
 
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"
-#include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 #include "core/statistics/requirement.hpp"
@@ -145,24 +144,6 @@ double count_of(std::string_view name, double value, double largest) {
       fmt::format("{} = {} (must be a whole number in [0, {}])", name, value, largest));
 }
 
-std::optional<Interval> interval_of(std::span<const std::optional<double>> arguments) {
-  const bool is_known =
-      std::ranges::all_of(arguments, [](const auto& argument) { return argument.has_value(); });
-  if (!is_known) return std::nullopt;
-  const double num_runs = count_of("runs", *arguments[1], num_runs_counted_max);
-  const double num_hits = count_of("hits", *arguments[0], num_runs);
-  const double confidence = fraction_of("confidence", *arguments[2]);
-  if (num_runs == 0.0) return std::nullopt;
-  return probability_interval(num_hits, num_runs, confidence);
-}
-
-template <double Interval::*bound>
-std::optional<double> bound_of(std::span<const std::optional<double>> arguments) {
-  const std::optional<Interval> interval = interval_of(arguments);
-  if (!interval) return std::nullopt;
-  return (*interval).*bound;
-}
-
 }  // namespace
 
 std::span<const Aggregate> aggregates() {
@@ -280,17 +261,15 @@ std::optional<double> AggregateRows::evaluate(std::span<const double> x,
       {.x = x, .y = y, .num_unknown = num_unknown_, .parameters = parameters_});
 }
 
-std::span<const std::string_view> interval_argument_names() {
-  static constexpr std::array<std::string_view, interval_arguments> names{"hits", "runs",
-                                                                          "confidence"};
-  return names;
-}
-
-std::span<const IntervalFunction> interval_functions() {
-  static constexpr std::array<IntervalFunction, 2> all{
-      {{"binomial_interval_lower", bound_of<&Interval::lower>},
-       {"binomial_interval_upper", bound_of<&Interval::upper>}}};
-  return all;
+std::optional<Interval> binomial_interval(std::span<const std::optional<double>> arguments) {
+  const bool is_known =
+      std::ranges::all_of(arguments, [](const auto& argument) { return argument.has_value(); });
+  if (!is_known) return std::nullopt;
+  const double num_runs = count_of("runs", *arguments[1], num_runs_counted_max);
+  const double num_hits = count_of("hits", *arguments[0], num_runs);
+  const double confidence = fraction_of("confidence", *arguments[2]);
+  if (num_runs == 0.0) return std::nullopt;
+  return probability_interval(num_hits, num_runs, confidence);
 }
 
 }  // namespace proofmass::coordinator

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -7,6 +8,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
 
@@ -84,21 +87,15 @@ class AggregateRows {
   std::vector<std::pair<double, double>> pairs_;  ///< Of one with two.
 };
 
-inline constexpr std::size_t interval_arguments = 3;
+/// Names of the arguments of binomial_interval(), for messages.
+inline constexpr std::array<std::string_view, 3> binomial_interval_arguments{"hits", "runs",
+                                                                             "confidence"};
 
-/// A function of one row that yields one bound of an interval.
-struct IntervalFunction {
-  const char* name;
-  /// @param arguments  hits, runs, confidence; empty is NULL.
-  /// @returns Empty (NULL in SQL) if an argument is NULL or there are no runs.
-  /// @throws InvalidArgument if an argument breaks its rule.
-  std::optional<double> (*evaluate)(std::span<const std::optional<double>> arguments);
-};
-
-/// Names of the arguments, for messages.
-[[nodiscard]] std::span<const std::string_view> interval_argument_names();
-
-/// binomial_interval_lower and binomial_interval_upper; see README.md.
-[[nodiscard]] std::span<const IntervalFunction> interval_functions();
+/// The interval between binomial_interval_lower and binomial_interval_upper; see README.md.
+/// @param arguments  Empty is NULL.
+/// @returns Empty (NULL in SQL) if an argument is NULL or there are no runs.
+/// @throws InvalidArgument if an argument breaks its rule.
+[[nodiscard]] std::optional<Interval> binomial_interval(
+    std::span<const std::optional<double>> arguments);
 
 }  // namespace proofmass::coordinator

@@ -100,11 +100,12 @@ struct Offer {
   unsigned char comparison;
   bool is_lower = false;  ///< It bounds the runs from below.
   bool is_upper = false;
+  bool is_text = false;  ///< It names something, byte by byte.
 };
 
 constexpr std::array<Offer, 7> offers{{
     {draw_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ},
-    {quantity_column, SQLITE_INDEX_CONSTRAINT_EQ},
+    {.column = quantity_column, .comparison = SQLITE_INDEX_CONSTRAINT_EQ, .is_text = true},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_EQ, true, true},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_GT, true, false},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_GE, true, false},
@@ -116,15 +117,13 @@ constexpr int quantity_bit = 1 << 1;
 constexpr int run_bit = 1 << 2;
 constexpr int range_bits = 0b1111 << 3;
 
-// The place of the first usable constraint that fits an offer. Names are compared byte by byte, so
-// that only such a comparison of quantities is one.
+// The place of the first usable constraint that fits an offer.
 std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info& plan) {
   for (int i = 0; i < plan.nConstraint; ++i) {
     const auto& constraint = plan.aConstraint[i];
     if (constraint.iColumn != offer.column || constraint.op != offer.comparison) continue;
     if (constraint.usable == 0) continue;
-    const bool is_text = offer.column == quantity_column;
-    if (is_text && std::string_view(sqlite3_vtab_collation(&plan, i)) != "BINARY") continue;
+    if (offer.is_text && std::string_view(sqlite3_vtab_collation(&plan, i)) != "BINARY") continue;
     return i;
   }
   return std::nullopt;
@@ -235,14 +234,6 @@ void DrawCursor::give_column(sqlite3_context* context, int number) const {
   }
 }
 
-}  // namespace
-
-int register_draw_table(sqlite3* connection) {
-  return VirtualTable<DrawCursor>::add_to(connection);
-}
-
-namespace {
-
 enum EntryColumn : int { key_column, entry_value_column, entry_campaign_column };
 
 struct Definition {
@@ -274,15 +265,10 @@ struct DefinitionCursor : sqlite3_vtab_cursor {
 
 // The number of the plan is that of the arguments which the scan gets: the campaign or none.
 void DefinitionCursor::choose_plan(sqlite3_index_info& plan) {
-  for (int i = 0; i < plan.nConstraint && plan.idxNum == 0; ++i) {
-    const auto& constraint = plan.aConstraint[i];
-    if (constraint.iColumn != entry_campaign_column || constraint.usable == 0 ||
-        constraint.op != SQLITE_INDEX_CONSTRAINT_EQ) {
-      continue;
-    }
+  if (const auto i = constraint_for({entry_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ}, plan)) {
     plan.idxNum = 1;
-    plan.aConstraintUsage[i].argvIndex = 1;
-    plan.aConstraintUsage[i].omit = 1;
+    plan.aConstraintUsage[*i].argvIndex = 1;
+    plan.aConstraintUsage[*i].omit = 1;
   }
   constexpr int num_keys_expected = 500;
   plan.estimatedCost = num_keys_expected;
@@ -306,9 +292,7 @@ struct SetValue {
 
   void operator()(std::int64_t number) const { sqlite3_result_int64(context, number); }
   void operator()(double number) const { sqlite3_result_double(context, number); }
-  void operator()(const std::string& text) const {
-    sqlite3_result_text(context, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
-  }
+  void operator()(const std::string& text) const { set_text(context, text); }
 };
 
 void DefinitionCursor::give_column(sqlite3_context* context, int number) const {
@@ -326,8 +310,9 @@ void DefinitionCursor::give_column(sqlite3_context* context, int number) const {
 
 }  // namespace
 
-int register_definition_table(sqlite3* connection) {
-  return VirtualTable<DefinitionCursor>::add_to(connection);
+int register_tables(sqlite3* connection) {
+  const int code = VirtualTable<DrawCursor>::add_to(connection);
+  return code == SQLITE_OK ? VirtualTable<DefinitionCursor>::add_to(connection) : code;
 }
 
 }  // namespace proofmass::coordinator

@@ -48,7 +48,7 @@ class Arguments {
   std::size_t size_;
   std::array<std::optional<double>, aggregate_arguments_max> numbers_;
 };
-static_assert(interval_arguments <= aggregate_arguments_max);
+static_assert(binomial_interval_arguments.size() <= aggregate_arguments_max);
 
 // The rows of the group, which SQLite keeps as a pointer that is null at first; with `size` 0, as
 // in the end of a group without rows, there may be none.
@@ -114,11 +114,13 @@ void finish(sqlite3_context* context) {
   tell(context, rows.get());
 }
 
-void evaluate_interval(sqlite3_context* context, int, sqlite3_value** values) {
-  const auto& function = *static_cast<const IntervalFunction*>(sqlite3_user_data(context));
-  guard(context, function.name, [&] {
-    const auto bound = function.evaluate(Arguments(values, interval_argument_names()).numbers());
-    if (bound) sqlite3_result_double(context, *bound);
+/// One bound of the interval; the name of the function is its data, for messages.
+template <double Interval::*bound>
+void evaluate_bound(sqlite3_context* context, int, sqlite3_value** values) {
+  guard(context, static_cast<const char*>(sqlite3_user_data(context)), [&] {
+    const auto interval =
+        binomial_interval(Arguments(values, binomial_interval_arguments).numbers());
+    if (interval) sqlite3_result_double(context, (*interval).*bound);
   });
 }
 
@@ -131,10 +133,11 @@ int register_aggregate(sqlite3* connection, const Aggregate& aggregate) {
       const_cast<Aggregate*>(&aggregate), step, finish, value, inverse, nullptr);
 }
 
-int register_interval(sqlite3* connection, const IntervalFunction& function) {
-  return sqlite3_create_function_v2(connection, function.name, interval_arguments, flags,
-                                    const_cast<IntervalFunction*>(&function), evaluate_interval,
-                                    nullptr, nullptr, nullptr);
+template <double Interval::*bound>
+int register_bound(sqlite3* connection, const char* name) {
+  return sqlite3_create_function_v2(
+      connection, name, static_cast<int>(binomial_interval_arguments.size()), flags,
+      const_cast<char*>(name), evaluate_bound<bound>, nullptr, nullptr, nullptr);
 }
 
 }  // namespace
@@ -144,12 +147,10 @@ int register_functions(sqlite3* connection) {
     const int code = register_aggregate(connection, aggregate);
     if (code != SQLITE_OK) return code;
   }
-  for (const IntervalFunction& function : interval_functions()) {
-    const int code = register_interval(connection, function);
-    if (code != SQLITE_OK) return code;
-  }
-  const int code = register_draw_table(connection);
-  return code == SQLITE_OK ? register_definition_table(connection) : code;
+  int code = register_bound<&Interval::lower>(connection, "binomial_interval_lower");
+  if (code != SQLITE_OK) return code;
+  code = register_bound<&Interval::upper>(connection, "binomial_interval_upper");
+  return code == SQLITE_OK ? register_tables(connection) : code;
 }
 
 }  // namespace proofmass::coordinator

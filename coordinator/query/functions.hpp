@@ -4,12 +4,10 @@ struct sqlite3;
 
 namespace proofmass::coordinator {
 
-/// Adds the table draw(campaign) to a connection: one row a run and drawn quantity (see README.md).
+/// Adds the tables draw(campaign), one row a run and drawn quantity, and
+/// definition_entry(campaign), one row a key of the campaign file (see README.md).
 /// @returns SQLite's result code.
-[[nodiscard]] int register_draw_table(sqlite3* connection);
-
-/// Adds the table definition_entry(campaign): one row a key of the campaign file.
-[[nodiscard]] int register_definition_table(sqlite3* connection);
+[[nodiscard]] int register_tables(sqlite3* connection);
 
 /// Adds all functions and tables of README.md to a connection.
 /// @returns SQLite's result code.

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "coordinator/query/functions.hpp"
-#include "coordinator/query/read_only_connection.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/text/visible_text.hpp"
@@ -64,6 +65,75 @@ std::string with_remedy(std::string text) {
   return text;
 }
 
+// They tell something of the file and change nothing, whatever their argument.
+constexpr std::array<const char*, 16> telling_pragmas{
+    "collation_list",   "compile_options", "database_list", "foreign_key_check",
+    "foreign_key_list", "function_list",   "index_info",    "index_list",
+    "index_xinfo",      "integrity_check", "module_list",   "pragma_list",
+    "quick_check",      "table_info",      "table_list",    "table_xinfo"};
+// They tell something without an argument, and change it with one.
+constexpr std::array<const char*, 8> pragmas_of_state{"application_id", "data_version", "encoding",
+                                                      "freelist_count", "page_count",   "page_size",
+                                                      "schema_version", "user_version"};
+// The first loads machine code from a file, the second calls what an address points to.
+constexpr std::array<const char*, 2> dangerous_functions{"load_extension", "fts3_tokenizer"};
+
+/// Names of SQLite have no case.
+template <typename Names>
+bool contains(const Names& names, const char* name) {
+  return std::ranges::any_of(names,
+                             [&](const char* known) { return sqlite3_stricmp(known, name) == 0; });
+}
+
+bool is_harmless_pragma(const char* name, bool has_argument) {
+  return contains(telling_pragmas, name) || (!has_argument && contains(pragmas_of_state, name));
+}
+
+/// Why a statement may not do something, for people; empty if it may: it reads and does nothing
+/// else, and calls no function or PRAGMA that is not harmless.
+std::string refusal_of(int action, const char* first, const char* second) {
+  switch (action) {
+    case SQLITE_SELECT:
+    case SQLITE_READ:
+    case SQLITE_RECURSIVE:
+      return {};
+    case SQLITE_UPDATE:
+      // SQLite asks so when a table-valued function is first named, and writes nothing. A statement
+      // that would is known by sqlite3_stmt_readonly(), and the connection is read-only.
+      if (std::string_view(first) == "sqlite_master") return {};
+      return "only reading is allowed";
+    case SQLITE_FUNCTION:
+      if (!contains(dangerous_functions, second)) return {};
+      return fmt::format("the function {} is not allowed", second);
+    case SQLITE_PRAGMA:
+      if (is_harmless_pragma(first, second != nullptr && *second != '\0')) return {};
+      return fmt::format(
+          "PRAGMA {} {}", first,
+          is_harmless_pragma(first, false) ? "may be read, not set" : "is not allowed");
+    default:
+      return "only reading is allowed";
+  }
+}
+
+/// A connection to campaign databases that cannot write to them; each is checked first. Of a file
+/// of an older version it has a private copy, brought up to date.
+/// @throws StoreError if a file is no campaign database or cannot be read.
+std::unique_ptr<detail::Database> open_files(const QueryFiles& files) {
+  PROOFMASS_EXPECT(files.attached.size() <= attached_files_max);
+  detail::check_presence(files.main);
+  auto database = std::make_unique<detail::Database>(files.main, detail::Access::read_only);
+  (void)detail::prepare_reader(*database, files.main);
+  for (const auto& [name, file] : files.attached) {
+    detail::check_presence(file);
+    detail::Database other(file, detail::Access::read_only);
+    (void)detail::prepare_reader(other, file);
+    database->attach(other, name);
+  }
+  // A private copy has it on: the caller has tables of its own to add before it is turned on again.
+  database->execute("PRAGMA query_only = OFF");
+  return database;
+}
+
 /// A read-only connection on which nothing but reading is possible, for some time.
 class Reader {
  public:
@@ -80,6 +150,8 @@ class Reader {
   void restrict_connection();
   void set_limits();
   static int on_progress(void* reader);
+  static int on_action(void* reader, int action, const char* first, const char* second, const char*,
+                       const char*);
   void check(int code) const;
   [[noreturn]] void fail(int code, const std::string& sql) const;
   [[noreturn]] void fail_query(const std::string& sql) const;
@@ -90,7 +162,7 @@ class Reader {
   Clock::time_point end_;
   bool is_late_ = false;
   bool is_interrupted_ = false;
-  ReadRule rule_;
+  std::string refusal_;  ///< The first thing that was refused; empty if nothing was.
   std::unique_ptr<detail::Database> database_;
 };
 
@@ -120,7 +192,7 @@ void Reader::restrict_connection() {
     database_->execute("PRAGMA temp_store = MEMORY");
   }
   database_->execute("PRAGMA query_only = ON");
-  rule_.apply_to(connection());
+  sqlite3_set_authorizer(connection(), &Reader::on_action, this);
   sqlite3_progress_handler(connection(), steps_between_looks, &Reader::on_progress, this);
 }
 
@@ -144,13 +216,22 @@ int Reader::on_progress(void* self) {
   return reader.is_interrupted_ || reader.is_late_ ? 1 : 0;
 }
 
+int Reader::on_action(void* self, int action, const char* first, const char* second, const char*,
+                      const char*) {
+  const std::string refusal = refusal_of(action, first, second);
+  if (refusal.empty()) return SQLITE_OK;
+  auto& reader = *static_cast<Reader*>(self);
+  if (reader.refusal_.empty()) reader.refusal_ = refusal;
+  return SQLITE_DENY;
+}
+
 void Reader::check(int code) const {
   if (code != SQLITE_OK) fail(code, {});
 }
 
 // What the file is to blame for, what the time, and what the query.
 void Reader::fail(int code, const std::string& sql) const {
-  if (!rule_.refusal().empty()) refuse(sql, rule_.refusal());
+  if (!refusal_.empty()) refuse(sql, refusal_);
   const char* text = sqlite3_errmsg(connection());
   switch (code & 0xff) {
     case SQLITE_INTERRUPT:
@@ -200,8 +281,7 @@ Statement Reader::prepare(const std::string& sql) {
   if (!prepared) refuse(sql, "holds no statement");
   require_one_statement(sql, rest);
   if (sqlite3_stmt_readonly(statement) == 0) refuse(sql, "only reading is allowed");
-  const int num_parameters = sqlite3_bind_parameter_count(statement);
-  if (num_parameters > 0) {
+  if (sqlite3_bind_parameter_count(statement) > 0) {
     refuse(sql, "has a parameter such as ?, :name or $name, which nothing gives a value");
   }
   return prepared;
@@ -261,6 +341,23 @@ std::vector<std::string> column_names(sqlite3_stmt* statement) {
 }
 
 }  // namespace
+
+void check_attached_name(std::string_view name) {
+  const auto is_letter = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+  };
+  const auto is_allowed = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); };
+  const bool is_name = !name.empty() && name.size() <= 64 && is_letter(name[0]) &&
+                       std::ranges::all_of(name, is_allowed);
+  const std::string text(name);
+  const bool is_taken =
+      sqlite3_stricmp(text.c_str(), "main") == 0 || sqlite3_stricmp(text.c_str(), "temp") == 0;
+  if (is_name && !is_taken) return;
+  throw InvalidArgument(fmt::format(
+      "name = {} (must be 1 to 64 letters, digits and _, not begin with a digit, and be neither "
+      "main nor temp)",
+      name));
+}
 
 std::string time_limit_text(const QueryLimits& limits) {
   return fmt::format("timeout = {} (the query did not end in so many seconds)",

@@ -37,14 +37,8 @@ std::string shortest_text(double value) {
 }
 
 std::string blob_text(const Blob& blob) {
-  static constexpr std::string_view digits = "0123456789abcdef";
-  std::string text = "x'";
-  for (const char c : blob.bytes) {
-    const auto byte = static_cast<unsigned char>(c);
-    text += digits[byte >> 4U];
-    text += digits[byte & 15U];
-  }
-  return text + "'";
+  const auto* const bytes = reinterpret_cast<const unsigned char*>(blob.bytes.data());
+  return fmt::format("x'{:02x}'", fmt::join(bytes, bytes + blob.bytes.size(), ""));
 }
 
 std::string text_of(const Value& value) { return std::visit(TextOf{}, value); }
@@ -100,31 +94,29 @@ std::string json_value(const Value& value) {
 class CsvWriter : public RowWriter {
  public:
   explicit CsvWriter(TextSink sink) : sink_(std::move(sink)) {}
-  void begin(std::span<const std::string> columns) override;
-  [[nodiscard]] bool row(std::span<const Value> values) override;
+  void begin(std::span<const std::string> columns) override {
+    std::string line;
+    for (const std::string& column : columns) {
+      line += fmt::format("{}{}", line.empty() ? "" : ",", csv_text(column));
+    }
+    sink_(line + "\r\n");
+  }
+
+  [[nodiscard]] bool row(std::span<const Value> values) override {
+    std::string line;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      line += fmt::format("{}{}", i == 0 ? "" : ",", csv_value(values[i]));
+    }
+    // Readers pass over empty lines.
+    sink_((line.empty() ? "\"\"" : line) + "\r\n");
+    return true;
+  }
+
   void end() override {}
 
  private:
   TextSink sink_;
 };
-
-void CsvWriter::begin(std::span<const std::string> columns) {
-  std::string line;
-  for (const std::string& column : columns) {
-    line += fmt::format("{}{}", line.empty() ? "" : ",", csv_text(column));
-  }
-  sink_(line + "\r\n");
-}
-
-bool CsvWriter::row(std::span<const Value> values) {
-  std::string line;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    line += fmt::format("{}{}", i == 0 ? "" : ",", csv_value(values[i]));
-  }
-  // Readers pass over empty lines.
-  sink_((line.empty() ? "\"\"" : line) + "\r\n");
-  return true;
-}
 
 /// [RFC8259]: a list with an object a row. Infinity is the number 1e999; what is not UTF-8 in a
 /// text becomes U+FFFD.
@@ -132,39 +124,35 @@ class JsonWriter : public RowWriter {
  public:
   explicit JsonWriter(TextSink sink) : sink_(std::move(sink)) {}
   /// @throws InvalidArgument if two columns have the same name: readers keep one of them.
-  void begin(std::span<const std::string> columns) override;
-  [[nodiscard]] bool row(std::span<const Value> values) override;
-  void end() override;
+  void begin(std::span<const std::string> columns) override {
+    std::set<std::string> names;
+    for (const std::string& column : columns) {
+      if (!names.insert(column).second) {
+        throw InvalidArgument(fmt::format(
+            "format = json (two columns are called {}; name one of them with AS)", column));
+      }
+      keys_.push_back(json_text(column));
+    }
+    sink_("[");
+  }
+
+  [[nodiscard]] bool row(std::span<const Value> values) override {
+    std::string line = has_rows_ ? ",\n {" : "\n {";
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      line += fmt::format("{}{}: {}", i == 0 ? "" : ", ", keys_[i], json_value(values[i]));
+    }
+    sink_(line + "}");
+    has_rows_ = true;
+    return true;
+  }
+
+  void end() override { sink_(has_rows_ ? "\n]\n" : "]\n"); }
 
  private:
   TextSink sink_;
   std::vector<std::string> keys_;  ///< Quoted.
   bool has_rows_ = false;
 };
-
-void JsonWriter::begin(std::span<const std::string> columns) {
-  std::set<std::string> names;
-  for (const std::string& column : columns) {
-    if (!names.insert(column).second) {
-      throw InvalidArgument(fmt::format(
-          "format = json (two columns are called {}; name one of them with AS)", column));
-    }
-    keys_.push_back(json_text(column));
-  }
-  sink_("[");
-}
-
-bool JsonWriter::row(std::span<const Value> values) {
-  std::string line = has_rows_ ? ",\n {" : "\n {";
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    line += fmt::format("{}{}: {}", i == 0 ? "" : ", ", keys_[i], json_value(values[i]));
-  }
-  sink_(line + "}");
-  has_rows_ = true;
-  return true;
-}
-
-void JsonWriter::end() { sink_(has_rows_ ? "\n]\n" : "]\n"); }
 
 // Formats for people.
 
@@ -182,9 +170,42 @@ std::string figure_text(const Value& value) {
 class TableWriter : public RowWriter {
  public:
   TableWriter(const TableLimits& limits, TextSink sink) : limits_(limits), sink_(std::move(sink)) {}
-  void begin(std::span<const std::string> columns) override;
-  [[nodiscard]] bool row(std::span<const Value> values) override;
-  void end() override;
+  void begin(std::span<const std::string> columns) override {
+    for (const std::string& name : columns) {
+      table_.columns.push_back({.title = shortened(wire::visible_text(name), text_width_max)});
+    }
+  }
+
+  [[nodiscard]] bool row(std::span<const Value> values) override {
+    has_more_ = table_.rows.size() == limits_.num_rows_max;
+    if (has_more_) return false;
+    Row& row = table_.rows.emplace_back();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      // No more than this is ever shown, and a text may have megabytes.
+      const std::string text =
+          wire::visible_text(std::string_view(figure_text(values[i])).substr(0, 1000));
+      Cell& cell = row.emplace_back(shortened(text, text_width_max));
+      if (const auto* integer = std::get_if<std::int64_t>(&values[i])) {
+        cell.value = static_cast<double>(*integer);
+      } else if (const auto* real = std::get_if<double>(&values[i])) {
+        cell.value = *real;
+      } else if (!std::holds_alternative<std::monostate>(values[i])) {
+        table_.columns[i].is_text = true;
+      }
+    }
+    return true;
+  }
+
+  void end() override {
+    if (table_.columns.empty()) return;
+    if (has_more_) {
+      table_.remarks.push_back(
+          {fmt::format("the first {} rows (more with --rows-max)", table_.rows.size())});
+    }
+    TerminalStyle style;
+    if (limits_.num_columns) style.line_width_max = *limits_.num_columns;
+    sink_(terminal_text(table_, style));
+  }
 
  private:
   TableLimits limits_;
@@ -193,81 +214,38 @@ class TableWriter : public RowWriter {
   bool has_more_ = false;
 };
 
-void TableWriter::begin(std::span<const std::string> columns) {
-  for (const std::string& name : columns) {
-    table_.columns.push_back({.title = shortened(wire::visible_text(name), text_width_max)});
-  }
-}
-
-bool TableWriter::row(std::span<const Value> values) {
-  has_more_ = table_.rows.size() == limits_.num_rows_max;
-  if (has_more_) return false;
-  Row& row = table_.rows.emplace_back();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    // No more than this is ever shown, and a text may have megabytes.
-    const std::string text =
-        wire::visible_text(std::string_view(figure_text(values[i])).substr(0, 1000));
-    Cell& cell = row.emplace_back(shortened(text, text_width_max));
-    if (const auto* integer = std::get_if<std::int64_t>(&values[i])) {
-      cell.value = static_cast<double>(*integer);
-    } else if (const auto* real = std::get_if<double>(&values[i])) {
-      cell.value = *real;
-    } else if (!std::holds_alternative<std::monostate>(values[i])) {
-      table_.columns[i].is_text = true;
-    }
-  }
-  return true;
-}
-
-void TableWriter::end() {
-  if (table_.columns.empty()) return;
-  if (has_more_) {
-    table_.remarks.push_back(
-        {fmt::format("the first {} rows (more with --rows-max)", table_.rows.size())});
-  }
-  TerminalStyle style;
-  if (limits_.num_columns) style.line_width_max = *limits_.num_columns;
-  sink_(terminal_text(table_, style));
-}
-
 /// A table of GitHub's Markdown, with all rows; columns whose first value is a number stand to the
 /// right.
 class MarkdownWriter : public RowWriter {
  public:
   explicit MarkdownWriter(TextSink sink) : sink_(std::move(sink)) {}
-  void begin(std::span<const std::string> columns) override;
-  [[nodiscard]] bool row(std::span<const Value> values) override;
-  void end() override;
+  void begin(std::span<const std::string> columns) override {
+    for (const std::string& name : columns) columns_.push_back({.title = name, .is_text = true});
+  }
+
+  [[nodiscard]] bool row(std::span<const Value> values) override {
+    if (!has_heading_) write_heading(values);
+    Row row;
+    for (const Value& value : values) row.emplace_back(text_of(value));
+    sink_(markdown_row(row));
+    return true;
+  }
+
+  void end() override {
+    if (!has_heading_) write_heading({});
+  }
 
  private:
-  void write_heading(std::span<const Value> values);
+  void write_heading(std::span<const Value> values) {
+    for (std::size_t i = 0; i < values.size(); ++i) columns_[i].is_text = !is_number(values[i]);
+    sink_(markdown_heading(columns_));
+    has_heading_ = true;
+  }
 
   TextSink sink_;
   std::vector<Column> columns_;
   bool has_heading_ = false;
 };
-
-void MarkdownWriter::begin(std::span<const std::string> columns) {
-  for (const std::string& name : columns) columns_.push_back({.title = name, .is_text = true});
-}
-
-void MarkdownWriter::write_heading(std::span<const Value> values) {
-  for (std::size_t i = 0; i < values.size(); ++i) columns_[i].is_text = !is_number(values[i]);
-  sink_(markdown_heading(columns_));
-  has_heading_ = true;
-}
-
-bool MarkdownWriter::row(std::span<const Value> values) {
-  if (!has_heading_) write_heading(values);
-  Row row;
-  for (const Value& value : values) row.emplace_back(text_of(value));
-  sink_(markdown_row(row));
-  return true;
-}
-
-void MarkdownWriter::end() {
-  if (!has_heading_) write_heading({});
-}
 
 }  // namespace
 

@@ -52,19 +52,18 @@ std::vector<ComputedRuns> computed_runs(const Database& database, std::size_t nu
 }
 
 std::vector<LostAttempt> lost_attempts(const Database& database, std::size_t count_max) {
-  Statement row = database.prepare(
+  const auto lost = [](const Statement& row) {
+    return LostAttempt{.runs = {{row.count(0)}, row.count(1)},
+                       .attempt = attempt_in(row, 2),
+                       .worker_key = row.count(3),
+                       .reason = row.text(4),
+                       .lost_unix_s = row.count(5)};
+  };
+  return rows_of(
+      database,
       "SELECT first_run, num_runs, attempt, worker_key, reason, lost_unix_s FROM attempt "
-      "ORDER BY attempt_id DESC LIMIT ?");
-  row.bind_all(static_cast<std::uint64_t>(count_max));
-  std::vector<LostAttempt> lost;
-  while (row.step()) {
-    lost.push_back({.runs = {{row.count(0)}, row.count(1)},
-                    .attempt = attempt_in(row, 2),
-                    .worker_key = row.count(3),
-                    .reason = row.text(4),
-                    .lost_unix_s = row.count(5)});
-  }
-  return lost;
+      "ORDER BY attempt_id DESC LIMIT ?",
+      lost, std::uint64_t{count_max});
 }
 
 std::vector<WorkerRecord> worker_records(const Database& database, const RecentAttempts& attempts) {
@@ -83,38 +82,36 @@ std::vector<WorkerRecord> worker_records(const Database& database, const RecentA
 }
 
 std::vector<HostShare> read_hosts(const Database& database) {
-  Statement rows = database.prepare(
-      "SELECT host, count(*), sum(num_results), sum(compute_s),"
-      " ifnull(max(last_result_unix_s) - min(unixepoch(first_seen_utc)), 0),"
-      " ifnull(group_concat(DISTINCT nullif(cards, '')), '') "
-      "FROM worker GROUP BY host ORDER BY sum(num_results) DESC, host LIMIT 20");
-  std::vector<HostShare> hosts;
-  while (rows.step()) {
-    hosts.push_back({.host = rows.text(0),
-                     .num_workers = rows.count(1),
-                     .num_results = rows.count(2),
-                     .compute_s = rows.real(3),
-                     .serving_s = rows.real(4),
-                     .cards = rows.text(5)});
-  }
-  return hosts;
+  const auto host = [](const Statement& row) {
+    return HostShare{.host = row.text(0),
+                     .num_workers = row.count(1),
+                     .num_results = row.count(2),
+                     .compute_s = row.real(3),
+                     .serving_s = row.real(4),
+                     .cards = row.text(5)};
+  };
+  return rows_of(database,
+                 "SELECT host, count(*), sum(num_results), sum(compute_s),"
+                 " ifnull(max(last_result_unix_s) - min(unixepoch(first_seen_utc)), 0),"
+                 " ifnull(group_concat(DISTINCT nullif(cards, '')), '') "
+                 "FROM worker GROUP BY host ORDER BY sum(num_results) DESC, host LIMIT 20",
+                 host);
 }
 
 /// Reasons are words of this program; a file from elsewhere may have any number of others.
 /// @param keys  Columns of which each combination is counted by itself.
 std::vector<LossCount> losses_by(const Database& database, std::string_view keys) {
-  Statement row = database.prepare(
-      fmt::format("SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt "
-                  "GROUP BY {0} ORDER BY 3 DESC, {0} LIMIT 20",
-                  keys));
-  std::vector<LossCount> losses;
-  while (row.step()) {
-    losses.push_back({.reason = row.text(0),
-                      .num_losses = row.count(1),
-                      .num_runs = row.count(2),
-                      .num_blamed = row.count(3)});
-  }
-  return losses;
+  const auto loss = [](const Statement& row) {
+    return LossCount{.reason = row.text(0),
+                     .num_losses = row.count(1),
+                     .num_runs = row.count(2),
+                     .num_blamed = row.count(3)};
+  };
+  return rows_of(database,
+                 fmt::format("SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt "
+                             "GROUP BY {0} ORDER BY 3 DESC, {0} LIMIT 20",
+                             keys),
+                 loss);
 }
 
 std::optional<std::string> utc_of(const Database& database, std::string_view bound) {
@@ -138,15 +135,15 @@ CampaignHistory::~CampaignHistory() = default;
 
 std::vector<StoredEvent> CampaignHistory::events_after(std::uint64_t id,
                                                        std::size_t count_max) const {
-  Statement row = database_->prepare(
-      "SELECT event_id, time_utc, kind, text FROM event WHERE event_id > ? "
-      "ORDER BY event_id DESC LIMIT ?");
-  row.bind_all(id, static_cast<std::uint64_t>(count_max));
-  std::vector<StoredEvent> events;
-  while (row.step()) {
-    events.push_back(
-        {.id = row.count(0), .time_utc = row.text(1), .kind = row.text(2), .text = row.text(3)});
-  }
+  const auto event = [](const Statement& row) {
+    return StoredEvent{
+        .id = row.count(0), .time_utc = row.text(1), .kind = row.text(2), .text = row.text(3)};
+  };
+  std::vector<StoredEvent> events =
+      rows_of(*database_,
+              "SELECT event_id, time_utc, kind, text FROM event WHERE event_id > ? "
+              "ORDER BY event_id DESC LIMIT ?",
+              event, id, std::uint64_t{count_max});
   std::ranges::reverse(events);
   return events;
 }
@@ -155,39 +152,37 @@ std::vector<LossCount> CampaignHistory::losses() const { return losses_by(*datab
 
 // The condition of the inner query is that of an index: completed runs are not looked at.
 std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
-  Statement row = database_->prepare(
-      "SELECT status, cause, session, count(*) FROM "
-      "(SELECT r.status, ifnull(h.loss_cause, '') AS cause, ifnull(h.loss_session, '') AS session "
-      " FROM run_result AS r LEFT JOIN loop_health AS h USING (run_index) "
-      " WHERE r.status <> 1) "
-      "GROUP BY 1, 2, 3 ORDER BY 4 DESC, 1, 2, 3");
-  std::vector<EndCount> ends;
-  while (row.step()) {
+  const auto end = [](const Statement& row) {
     const std::uint64_t status = row.count(0);
-    ends.push_back({.status = status == 2   ? "not converged"
+    return EndCount{.status = status == 2   ? "not converged"
                               : status == 3 ? "not finite"
                               : status == 4 ? "no draw"
                                             : "lost",
                     .cause = row.text(1),
                     .session = row.text(2),
-                    .num_runs = row.count(3)});
-  }
-  return ends;
+                    .num_runs = row.count(3)};
+  };
+  return rows_of(
+      *database_,
+      "SELECT status, cause, session, count(*) FROM "
+      "(SELECT r.status, ifnull(h.loss_cause, '') AS cause, ifnull(h.loss_session, '') AS session "
+      " FROM run_result AS r LEFT JOIN loop_health AS h USING (run_index) "
+      " WHERE r.status <> 1) "
+      "GROUP BY 1, 2, 3 ORDER BY 4 DESC, 1, 2, 3",
+      end);
 }
 
 std::vector<GivenUpRecord> CampaignHistory::given_up(std::size_t count_max) const {
-  Statement row = database_->prepare(
-      "SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure "
-      "ORDER BY run_index LIMIT ?");
-  row.bind_all(static_cast<std::uint64_t>(count_max));
-  std::vector<GivenUpRecord> runs;
-  while (row.step()) {
-    runs.push_back({.run = {row.count(0)},
-                    .reason = row.text(1),
-                    .num_attempts = row.count(2),
-                    .given_up_utc = row.text(3)});
-  }
-  return runs;
+  const auto run = [](const Statement& row) {
+    return GivenUpRecord{.run = {row.count(0)},
+                         .reason = row.text(1),
+                         .num_attempts = row.count(2),
+                         .given_up_utc = row.text(3)};
+  };
+  return rows_of(*database_,
+                 "SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure "
+                 "ORDER BY run_index LIMIT ?",
+                 run, std::uint64_t{count_max});
 }
 
 RecentAttempts CampaignHistory::recent_attempts(std::size_t num_runs_max,
@@ -198,9 +193,7 @@ RecentAttempts CampaignHistory::recent_attempts(std::size_t num_runs_max,
                           .workers = {}};
   attempts.workers = worker_records(*database_, attempts);
   const std::uint64_t num_runs = database_->count("SELECT count(*) FROM delivery");
-  const std::uint64_t num_losses = database_->count("SELECT count(*) FROM attempt");
   attempts.num_runs_left_out = num_runs - std::min<std::uint64_t>(num_runs, num_runs_max);
-  attempts.num_losses_left_out = num_losses - std::min<std::uint64_t>(num_losses, num_losses_max);
   return attempts;
 }
 

@@ -75,7 +75,6 @@ struct RecentAttempts {
   std::vector<LostAttempt> lost = {};       ///< The newest first.
   std::vector<WorkerRecord> workers = {};   ///< The workers of `computed` and `lost`, by key.
   std::uint64_t num_runs_left_out = 0;      ///< Older delivered runs.
-  std::uint64_t num_losses_left_out = 0;    ///< Older losses.
 };
 
 /// Reads what happened to a campaign from its database, also while a coordinator writes to it. For

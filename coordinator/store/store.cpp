@@ -174,24 +174,6 @@ std::string Store::computed_table_digest() const {
   return detail::compute_table_digest(impl_->database, model());
 }
 
-std::vector<DataTable> Store::data_tables() const {
-  return detail::read_data_tables(impl_->database, model());
-}
-
-std::vector<std::vector<double>> Store::table_columns() const {
-  std::vector<std::vector<double>> columns;
-  for (const DrawnQuantity& quantity : model().drawn()) {
-    columns.push_back(detail::read_dispersion_values(impl_->database, quantity.name));
-    if (columns.back().empty()) columns.pop_back();
-  }
-  return columns;
-}
-
-void Store::extend(const Campaign& campaign, std::string_view definition) {
-  impl_->commit(
-      [&](Database& database) { detail::extend_campaign(database, campaign, definition); });
-}
-
 CommitSummary Store::write(std::span<const Entry> entries) {
   check_deliveries(entries, schema(), num_runs());
   CommitSummary summary;

@@ -108,19 +108,19 @@ void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic
 }
 
 std::vector<StopCheckRow> Store::stop_checks() const {
-  Statement select = impl_->database.prepare(
+  const auto check = [](const Statement& row) {
+    return StopCheckRow{.statistic = row.text(0),
+                        .num_runs = row.count(1),
+                        .check = {.is_reached = row.integer(2) != 0,
+                                  .estimate = row.real(3),
+                                  .interval = row.interval(4),
+                                  .relative_half_width = row.optional_real(6)}};
+  };
+  return rows_of(
+      impl_->database,
       "SELECT statistic, num_runs, is_reached, estimate, lower, upper, relative_half_width "
-      "FROM stop_check ORDER BY statistic, num_runs");
-  std::vector<StopCheckRow> rows;
-  while (select.step()) {
-    rows.push_back({.statistic = select.text(0),
-                    .num_runs = select.count(1),
-                    .check = {.is_reached = select.integer(2) != 0,
-                              .estimate = select.real(3),
-                              .interval = select.interval(4),
-                              .relative_half_width = select.optional_real(6)}});
-  }
-  return rows;
+      "FROM stop_check ORDER BY statistic, num_runs",
+      check);
 }
 
 std::uint64_t Store::num_without_estimate() const {
@@ -146,22 +146,21 @@ std::vector<RunRange> Store::given_up_runs() const {
 std::vector<BlamedRun> Store::blamed_runs() const {
   const detail::ReadTransaction one_state(impl_->database);
   check_blamed_attempts(impl_->database);
-  Statement select = impl_->database.prepare(
-      "WITH RECURSIVE blamed (run, last, attempt) AS ("
-      " SELECT first_run, first_run + num_runs - 1, attempt FROM attempt"
-      " WHERE is_blamed AND num_runs > 0"
-      " UNION ALL SELECT run + 1, last, attempt FROM blamed WHERE run < last) "
-      "SELECT run, count(*), max(attempt) FROM blamed"
-      " WHERE NOT EXISTS (SELECT 1 FROM run_result WHERE run_index = blamed.run)"
-      " AND NOT EXISTS (SELECT 1 FROM run_failure WHERE run_index = blamed.run)"
-      " GROUP BY run ORDER BY run");
-  std::vector<BlamedRun> runs;
-  while (select.step()) {
-    runs.push_back({.run = RunIndex{select.count(0)},
-                    .num_crashes = static_cast<std::uint32_t>(select.count(1)),
-                    .attempt = {static_cast<std::uint32_t>(select.count(2))}});
-  }
-  return runs;
+  const auto blamed = [](const Statement& row) {
+    return BlamedRun{.run = RunIndex{row.count(0)},
+                     .num_crashes = static_cast<std::uint32_t>(row.count(1)),
+                     .attempt = {static_cast<std::uint32_t>(row.count(2))}};
+  };
+  return rows_of(impl_->database,
+                 "WITH RECURSIVE blamed (run, last, attempt) AS ("
+                 " SELECT first_run, first_run + num_runs - 1, attempt FROM attempt"
+                 " WHERE is_blamed AND num_runs > 0"
+                 " UNION ALL SELECT run + 1, last, attempt FROM blamed WHERE run < last) "
+                 "SELECT run, count(*), max(attempt) FROM blamed"
+                 " WHERE NOT EXISTS (SELECT 1 FROM run_result WHERE run_index = blamed.run)"
+                 " AND NOT EXISTS (SELECT 1 FROM run_failure WHERE run_index = blamed.run)"
+                 " GROUP BY run ORDER BY run",
+                 blamed);
 }
 
 std::uint64_t Store::num_before_blame() const {
@@ -175,27 +174,24 @@ std::uint64_t Store::num_compared() const {
 }
 
 std::vector<Contradiction> Store::contradictions() const {
-  Statement select = impl_->database.prepare(
-      "SELECT a.run_index, w.worker, a.stored_digest, a.second_digest "
-      "FROM audit AS a JOIN worker AS w USING (worker_key) "
-      "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker_key");
-  std::vector<Contradiction> contradictions;
-  while (select.step()) {
-    contradictions.push_back({.run = RunIndex{select.count(0)},
-                              .worker = select.text(1),
-                              .stored_digest = select.text(2),
-                              .second_digest = select.text(3)});
-  }
-  return contradictions;
+  const auto contradiction = [](const Statement& row) {
+    return Contradiction{.run = RunIndex{row.count(0)},
+                         .worker = row.text(1),
+                         .stored_digest = row.text(2),
+                         .second_digest = row.text(3)};
+  };
+  return rows_of(impl_->database,
+                 "SELECT a.run_index, w.worker, a.stored_digest, a.second_digest "
+                 "FROM audit AS a JOIN worker AS w USING (worker_key) "
+                 "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker_key",
+                 contradiction);
 }
 
 std::vector<wire::SessionId> Store::attached_sessions() const {
-  Statement select = impl_->database.prepare(
-      "SELECT session FROM worker WHERE session IS NOT NULL AND ended_utc IS NULL"
-      " ORDER BY session");
-  std::vector<wire::SessionId> sessions;
-  while (select.step()) sessions.push_back(session_of(select.text(0)));
-  return sessions;
+  return rows_of(impl_->database,
+                 "SELECT session FROM worker WHERE session IS NOT NULL AND ended_utc IS NULL"
+                 " ORDER BY session",
+                 [](const Statement& row) { return session_of(row.text(0)); });
 }
 
 void Store::begin_coordinator(const CoordinatorStart& start) {

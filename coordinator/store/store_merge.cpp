@@ -97,20 +97,97 @@ class MergeRows {
  public:
   /// @param whole   A new file of the campaign; outlives this object.
   /// @param schema  Of the campaign; outlives this object.
-  MergeRows(Database& whole, const ResultSchema& schema);
+  MergeRows(Database& whole, const ResultSchema& schema)
+      : whole_(whole),
+        schema_(schema),
+        num_runs_(whole.count("SELECT num_runs FROM campaign")),
+        results_(whole, schema),
+        largest_errors_(whole, schema) {}
 
   /// @pre Inside a transaction; the part has been checked.
   /// @throws StoreError naming the run, if it has another result in a part before this one, or if
   ///         a result breaks the rules of Store::write().
-  [[nodiscard]] MergedPart add(const Database& part);
+  [[nodiscard]] MergedPart add(const Database& part) {
+    const WorkerKeys workers = add_workers(part);
+    const MergedPart merged = add_results(part, workers);
+    for (const MergedTable& table : merged_tables) copy_rows(part, whole_, table, workers);
+    // min() of a NULL is NULL: what one part does not know, the whole does not.
+    whole_.prepare("UPDATE campaign SET num_runs_fixed = min(num_runs_fixed, ?)")
+        .run(detail::read_num_runs_fixed(part));
+    return merged;
+  }
 
   /// Writes what follows from the rows, and whether the campaign is finished. Called once, after
   /// the last part.
-  void finish();
+  void finish() {
+    whole_.prepare(count_deliveries_sql).run();
+    whole_.prepare("DELETE FROM run_failure WHERE run_index IN (SELECT run_index FROM run_result)")
+        .run();
+    whole_.prepare(delete_repeated_losses_sql).run();
+    whole_.prepare(delete_old_losses_sql).run(detail::num_attempts_max);
+    CampaignControl control = detail::read_control(whole_);
+    const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
+    control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
+    detail::write_control(whole_, control);
+  }
 
  private:
-  [[nodiscard]] WorkerKeys add_workers(const Database& part);
-  [[nodiscard]] MergedPart add_results(const Database& part, const WorkerKeys& workers);
+  WorkerKeys add_workers(const Database& part) {
+    WorkerKeys keys;
+    Statement select = part.prepare(
+        "SELECT worker_key, ifnull(session, ''), worker, host, process_id, num_slots, "
+        "first_seen_utc,"
+        " ifnull(ended_utc, ''), ifnull(end_reason, ''), cards FROM worker ORDER BY worker_key");
+    Statement find = whole_.prepare("SELECT worker_key FROM worker WHERE session = ?");
+    Statement insert = whole_.prepare(insert_worker_sql);
+    while (select.step()) {
+      find.bind_all(select.text(1));
+      if (find.step()) {
+        keys.emplace(select.integer(0), find.integer(0));
+        find.finish();
+        continue;
+      }
+      insert.run(select.text(1), select.text(2), select.text(3), select.optional_count(4),
+                 select.optional_count(5), select.text(6), select.text(7), select.text(8),
+                 select.text(9));
+      keys.emplace(select.integer(0), whole_.last_row());
+    }
+    return keys;
+  }
+
+  MergedPart add_results(const Database& part, const WorkerKeys& workers) {
+    MergedPart merged;
+    ResultReader results(part, schema_);
+    Statement delivery = part.prepare(
+        "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM delivery"
+        " ORDER BY run_index");
+    Statement insert = whole_.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)");
+    while (const std::optional<RunResult> next = results.next()) {
+      const RunResult& result = *next;
+      if (!delivery.step() || delivery.count(0) != result.run.value) {
+        part.refuse_as_damaged(
+            fmt::format("delivery lacks run {}, which has a result", result.run.value));
+      }
+      detail::check_delivery(
+          {.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)}, schema_,
+          num_runs_);
+      if (results_.insert(result)) {
+        insert.run(result.run.value, key_of(workers, delivery, 1), delivery.count(2),
+                   delivery.real(3), delivery.integer(4));
+        largest_errors_.add(result);
+        ++merged.num_new;
+        continue;
+      }
+      ++merged.num_again;
+      if (detail::are_equal(result, results_.read(result.run))) continue;
+      part.refuse(
+          fmt::format("has another result of run {} than a part before it; one of them was "
+                      "computed wrongly or changed, and `proofmass verify` with --fraction "
+                      "tells which",
+                      result.run.value));
+    }
+    return merged;
+  }
 
   Database& whole_;
   const ResultSchema& schema_;
@@ -118,91 +195,6 @@ class MergeRows {
   ResultRows results_;
   LargestErrorRows largest_errors_;
 };
-
-MergeRows::MergeRows(Database& whole, const ResultSchema& schema)
-    : whole_(whole),
-      schema_(schema),
-      num_runs_(whole.count("SELECT num_runs FROM campaign")),
-      results_(whole, schema),
-      largest_errors_(whole, schema) {}
-
-MergedPart MergeRows::add(const Database& part) {
-  const WorkerKeys workers = add_workers(part);
-  const MergedPart merged = add_results(part, workers);
-  for (const MergedTable& table : merged_tables) copy_rows(part, whole_, table, workers);
-  // min() of a NULL is NULL: what one part does not know, the whole does not.
-  whole_.prepare("UPDATE campaign SET num_runs_fixed = min(num_runs_fixed, ?)")
-      .run(detail::read_num_runs_fixed(part));
-  return merged;
-}
-
-void MergeRows::finish() {
-  whole_.prepare(count_deliveries_sql).run();
-  whole_.prepare("DELETE FROM run_failure WHERE run_index IN (SELECT run_index FROM run_result)")
-      .run();
-  whole_.prepare(delete_repeated_losses_sql).run();
-  whole_.prepare(delete_old_losses_sql).run(detail::num_attempts_max);
-  CampaignControl control = detail::read_control(whole_);
-  const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
-  control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
-  detail::write_control(whole_, control);
-}
-
-WorkerKeys MergeRows::add_workers(const Database& part) {
-  WorkerKeys keys;
-  Statement select = part.prepare(
-      "SELECT worker_key, ifnull(session, ''), worker, host, process_id, num_slots, first_seen_utc,"
-      " ifnull(ended_utc, ''), ifnull(end_reason, ''), cards FROM worker ORDER BY worker_key");
-  Statement find = whole_.prepare("SELECT worker_key FROM worker WHERE session = ?");
-  Statement insert = whole_.prepare(insert_worker_sql);
-  while (select.step()) {
-    find.bind_all(select.text(1));
-    if (find.step()) {
-      keys.emplace(select.integer(0), find.integer(0));
-      find.finish();
-      continue;
-    }
-    insert.run(select.text(1), select.text(2), select.text(3), select.optional_count(4),
-               select.optional_count(5), select.text(6), select.text(7), select.text(8),
-               select.text(9));
-    keys.emplace(select.integer(0), whole_.last_row());
-  }
-  return keys;
-}
-
-MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& workers) {
-  MergedPart merged;
-  ResultReader results(part, schema_);
-  Statement delivery = part.prepare(
-      "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM delivery"
-      " ORDER BY run_index");
-  Statement insert = whole_.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)");
-  while (const std::optional<RunResult> next = results.next()) {
-    const RunResult& result = *next;
-    if (!delivery.step() || delivery.count(0) != result.run.value) {
-      part.refuse_as_damaged(
-          fmt::format("delivery lacks run {}, which has a result", result.run.value));
-    }
-    detail::check_delivery(
-        {.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)}, schema_,
-        num_runs_);
-    if (results_.insert(result)) {
-      insert.run(result.run.value, key_of(workers, delivery, 1), delivery.count(2),
-                 delivery.real(3), delivery.integer(4));
-      largest_errors_.add(result);
-      ++merged.num_new;
-      continue;
-    }
-    ++merged.num_again;
-    if (detail::are_equal(result, results_.read(result.run))) continue;
-    part.refuse(
-        fmt::format("has another result of run {} than a part before it; one of them was "
-                    "computed wrongly or changed, and `proofmass verify` with --fraction "
-                    "tells which",
-                    result.run.value));
-  }
-  return merged;
-}
 
 }  // namespace
 

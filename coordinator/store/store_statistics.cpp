@@ -40,7 +40,24 @@ void Store::write_statistics(const CampaignStatistics& statistics,
   });
 }
 
-std::optional<Summary> Store::summary() const { return detail::read_summary(impl_->database); }
+std::optional<Summary> Store::summary() const {
+  detail::Statement select = impl_->database.prepare(
+      "SELECT num_finished, num_estimated, num_not_converged, num_not_finite, num_no_draw,"
+      " num_given_up, digest, computed_utc, num_lost, health_digest, num_within_objectives,"
+      " within_objectives_lower, within_objectives_upper FROM summary");
+  if (!select.step()) return std::nullopt;
+  return Summary{.num_finished = select.count(0),
+                 .num_estimated = select.count(1),
+                 .num_not_converged = select.count(2),
+                 .num_not_finite = select.count(3),
+                 .num_no_draw = select.count(4),
+                 .num_lost = select.count(8),
+                 .num_given_up = select.count(5),
+                 .num_within_objectives = select.count(10),
+                 .within_objectives = select.interval(11),
+                 .digests = {.results = select.text(6), .health = select.text(9)},
+                 .computed_utc = select.text(7)};
+}
 
 std::vector<std::string> Store::parameter_differences(const Campaign& campaign) const {
   constexpr std::array tables{

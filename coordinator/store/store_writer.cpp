@@ -10,13 +10,13 @@
 #include <optional>
 #include <thread>
 #include <utility>
+#include <variant>
 
 #include "coordinator/store/detail/open_file.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
 
-using detail::Attempted;
 using detail::OpenFile;
 using detail::TimePoint;
 
@@ -51,6 +51,38 @@ void note_worker(OpenFile& file, const Entry& entry) {
   if (const auto* ended = std::get_if<WorkerEnded>(&entry)) file.known.erase(ended->session);
 }
 
+/// What came of one attempt to write.
+struct Attempted {
+  CommitSummary summary;
+  std::optional<std::string> failure;
+  std::uint64_t log_size = 0;  // Afterwards.
+};
+
+/// Tries to write what `writing` holds, to a file that has its name before and afterwards.
+Attempted try_to_write(OpenFile& file) {
+  Attempted attempted;
+  try {
+    if (file.writing.empty()) {
+      file.store.check_place();
+    } else {
+      attempted.summary = file.store.write(file.writing);
+    }
+  } catch (const std::exception& error) {
+    attempted.failure = error.what();
+  }
+  attempted.log_size = file.store.log_size();
+  return attempted;
+}
+
+/// Tries to fold the log in; returns why it is still needed.
+std::optional<std::string> try_to_rest(Store& store) {
+  try {
+    return store.rest();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
 }  // namespace
 
 struct StoreWriter::Impl {
@@ -59,7 +91,6 @@ struct StoreWriter::Impl {
 
   // Called by the service.
   OpenFile& file(wire::CampaignId campaign);
-  void add(wire::CampaignId campaign, Entry entry);
   [[nodiscard]] bool add(OpenFile& open_file, Entry entry);
   void wait_for(wire::CampaignId campaign, std::function<void()> action);
 
@@ -97,21 +128,6 @@ OpenFile& StoreWriter::Impl::file(wire::CampaignId campaign) {
   const auto found = files.find(campaign);
   PROOFMASS_EXPECT(found != files.end());
   return found->second;
-}
-
-void StoreWriter::Impl::add(wire::CampaignId campaign, Entry entry) {
-  bool is_sooner = false;
-  {
-    const std::lock_guard lock(mutex);
-    if (campaign != wire::CampaignId{}) {
-      is_sooner = add(file(campaign), std::move(entry));
-    } else {
-      for (auto& [id, open_file] : files) {
-        if (concerns(entry, open_file)) is_sooner = add(open_file, entry) || is_sooner;
-      }
-    }
-  }
-  if (is_sooner) changed.notify_one();  // Otherwise the thread would wake for every result.
 }
 
 /// True if the file is to be written to sooner than before. @pre The lock is held.
@@ -213,7 +229,7 @@ void StoreWriter::Impl::fold(wire::CampaignId campaign, Lock& lock) {
   OpenFile& open_file = file(campaign);
   open_file.rest_at.reset();  // What is added meanwhile sets it again.
   lock.unlock();
-  const std::optional<std::string> reason = detail::try_to_rest(open_file.store);
+  const std::optional<std::string> reason = try_to_rest(open_file.store);
   lock.lock();
   if (reason && open_file.is_rest_wanted) {
     open_file.rest_at = std::chrono::steady_clock::now() + config.retry_after;
@@ -239,7 +255,7 @@ bool StoreWriter::Impl::write_some(wire::CampaignId campaign, std::size_t num_ma
     open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
   }
   lock.unlock();
-  Attempted attempted = detail::try_to_write(open_file);
+  Attempted attempted = try_to_write(open_file);
   const bool is_written = !attempted.failure;
   lock.lock();
   const std::size_t num_before = completions.size();
@@ -265,7 +281,10 @@ void StoreWriter::Impl::finish_write(wire::CampaignId campaign, OpenFile& open_f
   }
   open_file.failure.clear();
   open_file.retry_at.reset();
-  std::vector<RunIndex> runs = detail::delivered_runs(open_file.writing);
+  std::vector<RunIndex> runs;
+  for (const Entry& entry : open_file.writing) {
+    if (const auto* delivery = std::get_if<Delivery>(&entry)) runs.push_back(delivery->result.run);
+  }
   open_file.writing.clear();
   if (!runs.empty()) {
     completions.emplace_back(Committed{.campaign = campaign, .runs = std::move(runs)});
@@ -357,7 +376,18 @@ void StoreWriter::access(wire::CampaignId campaign, const std::function<void(Sto
 }
 
 void StoreWriter::write(wire::CampaignId campaign, Entry entry) {
-  impl_->add(campaign, std::move(entry));
+  bool is_sooner = false;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (campaign != wire::CampaignId{}) {
+      is_sooner = impl_->add(impl_->file(campaign), std::move(entry));
+    } else {
+      for (auto& [id, open_file] : impl_->files) {
+        if (concerns(entry, open_file)) is_sooner = impl_->add(open_file, entry) || is_sooner;
+      }
+    }
+  }
+  if (is_sooner) impl_->changed.notify_one();  // Otherwise the thread would wake for every result.
 }
 
 void StoreWriter::rest(wire::CampaignId campaign) {

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "proto/link/keys.hpp"
 
@@ -39,8 +41,8 @@ class SocketEvents {
   [[nodiscard]] std::optional<SocketEvent> take();
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  void* socket_;
+  std::unique_ptr<zmq::socket_t> events_;
 };
 
 /// Keeps a DEALER connected and says why it is not. ZeroMQ by itself tells nobody about a refusal,
@@ -56,12 +58,11 @@ class ConnectionMonitor {
   /// @throws Error reading `connect = endpoint (reason)` if that can never be connected.
   ConnectionMonitor(zmq::context_t& context, zmq::socket_t& dealer, std::string endpoint,
                     const ClientSecurity& security, TimePoint now);
-  ~ConnectionMonitor();
   ConnectionMonitor(const ConnectionMonitor&) = delete;
   ConnectionMonitor& operator=(const ConnectionMonitor&) = delete;
 
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t.
-  [[nodiscard]] void* handle() const;
+  [[nodiscard]] void* handle() const { return events_.handle(); }
 
   /// Takes in what happened and connects again what was refused, after a pause of 1 s that doubles
   /// to 30 s. Never waits. To be called when the handle is readable and once a second or more
@@ -69,15 +70,32 @@ class ConnectionMonitor {
   void update(TimePoint now);
 
   /// True from a complete handshake to the loss of that connection.
-  [[nodiscard]] bool is_connected() const;
+  [[nodiscard]] bool is_connected() const { return is_connected_; }
 
   /// Why the peer at the address does not let this program in, for people; once for each reason
   /// until a connection succeeds.
-  [[nodiscard]] std::optional<std::string> take_refusal();
+  [[nodiscard]] std::optional<std::string> take_refusal() { return std::exchange(news_, {}); }
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  using Duration = std::chrono::steady_clock::duration;
+
+  void take_in(const SocketEvent& event, TimePoint now);
+  void refused(const std::string& text, TimePoint now);
+  void report(const std::string& text);
+  void connect();
+  void reconnect(TimePoint now);
+
+  zmq::socket_t& dealer_;
+  std::string endpoint_;
+  ClientSecurity security_;
+  SocketEvents events_;
+  bool is_connected_ = false;
+  int num_breaks_ = 0;              ///< Handshakes broken off without a reason, in a row.
+  std::set<std::string> reported_;  ///< Since the last connection.
+  std::optional<std::string> news_;
+  std::optional<TimePoint> retry_at_;
+  Duration pause_;
+  TimePoint last_sign_at_;
 };
 
 }  // namespace proofmass::wire

@@ -2,13 +2,14 @@
 
 #include <sys/socket.h>
 #include <sys/un.h>
-#include <unistd.h>
 
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <utility>
+
+#include "proto/link/descriptor.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -48,11 +49,9 @@ void InitSystem::notify(std::string_view lines) const {
   socket_.copy(address.sun_path, socket_.size());
   if (socket_.front() == '@') address.sun_path[0] = '\0';
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size());
-  const int file = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (file < 0) return;
-  [[maybe_unused]] const auto sent = sendto(file, lines.data(), lines.size(), MSG_NOSIGNAL,
+  const Descriptor file(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  [[maybe_unused]] const auto sent = sendto(file.number(), lines.data(), lines.size(), MSG_NOSIGNAL,
                                             reinterpret_cast<const sockaddr*>(&address), size);
-  close(file);
 }
 
 std::optional<std::chrono::microseconds> InitSystem::watchdog_interval() const {

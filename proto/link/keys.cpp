@@ -1,9 +1,7 @@
 #include "proto/link/keys.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <zmq.h>
 
 #include <array>
@@ -41,35 +39,10 @@ std::string header_line(KeyRole role, Half half) {
   return fmt::format("{} {} {} {}", magic, format_version, to_text(role), to_text(half));
 }
 
-/// Closes a file at the end of a scope.
-class OpenFile {
- public:
-  // Opening a pipe must not wait for its other end.
-  explicit OpenFile(const std::filesystem::path& file)
-      : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
-    if (descriptor_ < 0) refuse(file, std::strerror(errno));
-  }
-  ~OpenFile() { ::close(descriptor_); }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-
-  [[nodiscard]] int descriptor() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
 std::string read_text(const std::filesystem::path& file, Half half) {
-  const OpenFile opened(file);
-  struct stat status {};
-  if (::fstat(opened.descriptor(), &status) != 0) refuse(file, std::strerror(errno));
-  if (!S_ISREG(status.st_mode)) refuse(file, "must be a regular file");
-  check_reach("key file", file, status,
-              half == Half::secret ? Reach::private_to_owner : Reach::written_by_owner);
-  std::string text(key_file_size_max, '\0');
-  const ssize_t size = ::read(opened.descriptor(), text.data(), text.size());
-  if (size < 0) refuse(file, std::strerror(errno));
-  text.resize(static_cast<std::size_t>(size));
+  std::string text = read_within_reach(
+      "key file", file, half == Half::secret ? Reach::private_to_owner : Reach::written_by_owner,
+      key_file_size_max);
   std::erase(text, '\r');
   return std::string(without_byte_order_mark(text));
 }

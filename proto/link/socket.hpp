@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "proto/link/descriptor.hpp"
 #include "proto/link/keys.hpp"
 
 // Only sources see the whole of these.
@@ -42,18 +43,15 @@ namespace proofmass::wire {
 class Wake {
  public:
   Wake();  ///< @throws Error if the system has no descriptor left.
-  ~Wake();
-  Wake(const Wake&) = delete;
-  Wake& operator=(const Wake&) = delete;
 
   /// Readable from a notify() to the next take().
-  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
   void notify() const;
   /// True if notify() was called since the last time.
   [[nodiscard]] bool take() const;
 
  private:
-  int descriptor_;
+  Descriptor descriptor_;
 };
 
 }  // namespace proofmass::wire

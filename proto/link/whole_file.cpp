@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "proto/link/descriptor.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -27,10 +28,9 @@ bool is_unknown_to_file_system(int error_number) {
 
 /// Makes a file, or the entries of a directory, durable where the file system has a way to.
 int synchronise(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return errno;
-  const int error_number = ::fsync(descriptor) == 0 ? 0 : errno;
-  ::close(descriptor);
+  const Descriptor opened(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (opened.number() < 0) return errno;
+  const int error_number = ::fsync(opened.number()) == 0 ? 0 : errno;
   return is_unknown_to_file_system(error_number) ? 0 : error_number;
 }
 
@@ -55,16 +55,6 @@ int rename_to(const std::filesystem::path& draft, const std::filesystem::path& p
   return ::rename(draft.c_str(), path.c_str()) == 0 ? 0 : errno;
 }
 
-bool write_all(int descriptor, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return true;
-}
-
 /// Empty if the file is this user's.
 std::string rule_of_owner(const struct stat& status) {
   if (status.st_uid == ::geteuid()) return {};
@@ -84,10 +74,9 @@ DraftFile::DraftFile(std::string_view what, std::filesystem::path path, mode_t m
     : what_(what), path_(std::move(path)), draft_(path_) {
   draft_.concat(ending.empty() ? fmt::format(".{}.new", ::getpid()) : std::string(ending));
   remove_draft(draft_);
-  const int descriptor =
-      ::open(draft_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode);
-  if (descriptor < 0) fail(errno);
-  ::close(descriptor);
+  const Descriptor made(
+      ::open(draft_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
+  if (made.number() < 0) fail(errno);
 }
 
 DraftFile::~DraftFile() {
@@ -95,11 +84,8 @@ DraftFile::~DraftFile() {
 }
 
 void DraftFile::write(std::string_view text) const {
-  const int descriptor = ::open(draft_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor < 0) fail(errno);
-  const int error_number = write_all(descriptor, text) ? 0 : errno;
-  ::close(descriptor);
-  if (error_number != 0) fail(error_number);
+  const Descriptor opened(::open(draft_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC));
+  if (opened.number() < 0 || !write_all(opened.number(), text)) fail(errno);
 }
 
 void DraftFile::publish(IfThere if_there) {
@@ -147,28 +133,34 @@ int open_own_file(std::string_view what, const std::filesystem::path& file, IfAb
                   mode_t mode) {
   const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
   const bool is_made = if_absent == IfAbsent::make;
-  const int descriptor = ::open(file.c_str(), is_made ? flags | O_CREAT : flags, mode);
-  if (descriptor < 0) {
+  Descriptor opened(::open(file.c_str(), is_made ? flags | O_CREAT : flags, mode));
+  if (opened.number() < 0) {
     if (errno == ENOENT && !is_made) return -1;
     refuse(what, file, errno == ELOOP ? "must not be a symbolic link" : std::strerror(errno));
   }
   struct stat status {};
-  std::string rule;
-  if (::fstat(descriptor, &status) != 0) {
-    rule = std::strerror(errno);
-  } else if (!S_ISREG(status.st_mode) || status.st_nlink > 1) {
-    rule = "must be a regular file with one name";
-  } else {
-    rule = rule_of_owner(status);
+  if (::fstat(opened.number(), &status) != 0) refuse(what, file, std::strerror(errno));
+  if (!S_ISREG(status.st_mode) || status.st_nlink > 1) {
+    refuse(what, file, "must be a regular file with one name");
   }
-  if (rule.empty()) return descriptor;
-  ::close(descriptor);
-  refuse(what, file, rule);
+  const std::string rule = rule_of_owner(status);
+  if (!rule.empty()) refuse(what, file, rule);
+  return opened.release();
 }
 
 Locked lock_file(int descriptor) {
   if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return Locked::yes;
   return errno == EWOULDBLOCK ? Locked::by_another : Locked::impossible;
+}
+
+bool write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
 }
 
 void check_reach(std::string_view what, const std::filesystem::path& file,
@@ -182,6 +174,24 @@ void check_reach(std::string_view what, const std::filesystem::path& file,
          fmt::format("mode {:04o}; must be {}", mode,
                      is_private ? "readable by its owner alone: chmod 600"
                                 : "writable by its owner alone: chmod go-w"));
+}
+
+// Opening a pipe must not wait for its other end.
+std::string read_within_reach(std::string_view what, const std::filesystem::path& file, Reach reach,
+                              std::size_t size_max) {
+  const Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat status {};
+  if (opened.number() < 0 || ::fstat(opened.number(), &status) != 0) {
+    refuse(what, file, std::strerror(errno));
+  }
+  if (!S_ISREG(status.st_mode)) refuse(what, file, "must be a regular file");
+  check_reach(what, file, status, reach);
+  if (static_cast<std::size_t>(status.st_size) > size_max) refuse(what, file, "is too large");
+  std::string text(static_cast<std::size_t>(status.st_size), '\0');
+  const ssize_t size = ::read(opened.number(), text.data(), text.size());
+  if (size < 0) refuse(what, file, std::strerror(errno));
+  text.resize(static_cast<std::size_t>(size));
+  return text;
 }
 
 }  // namespace proofmass::wire

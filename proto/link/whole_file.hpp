@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <sys/types.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -101,6 +102,9 @@ enum class Locked : std::uint8_t {
 inline constexpr std::string_view no_locks_remedy =
     "is on a file system without locks; use a local disk";
 
+/// Writes all of it. @returns False if that is impossible; errno says why.
+[[nodiscard]] bool write_all(int descriptor, std::string_view text);
+
 /// Whose a file must be that decides who may do what, and how far others may reach it.
 enum class Reach : std::uint8_t {
   private_to_owner,  ///< This user's, and nobody else can read it.
@@ -110,5 +114,12 @@ enum class Reach : std::uint8_t {
 /// @throws Error `what = PATH (rule)`.
 void check_reach(std::string_view what, const std::filesystem::path& file,
                  const struct stat& status, Reach reach);
+
+/// The content of a file for which check_reach() holds.
+/// @throws Error as check_reach() does, and if it cannot be read, is no regular file or has more
+///         bytes.
+[[nodiscard]] std::string read_within_reach(std::string_view what,
+                                            const std::filesystem::path& file, Reach reach,
+                                            std::size_t size_max);
 
 }  // namespace proofmass::wire

@@ -4,14 +4,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string_view>
 #include <utility>
 #include <variant>
+#include <vector>
+#include <zmq.hpp>
 
+#include "core/error.hpp"
+#include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/init_system.hpp"
 #include "proto/wire/codec.hpp"
-#include "worker/net/coordinator_link.hpp"
 #include "worker/spool/spool.hpp"
 
 namespace proofmass::worker {
@@ -25,6 +33,124 @@ constexpr std::chrono::milliseconds fault_interval(5);  ///< How exactly faults 
 constexpr std::chrono::seconds spool_interval(30);
 
 TimePoint time_now() { return std::chrono::steady_clock::now(); }
+
+/// A worker's connection to its coordinator, made again whenever it is lost. What is sent without
+/// one, or faster than the network takes it, is lost.
+class CoordinatorLink {
+ public:
+  /// Begins to connect.
+  /// @throws Error if the socket cannot be made.
+  CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security)
+      : endpoint_(endpoint), security_(security) {
+    connect();
+  }
+
+  /// Whether messages come late on purpose.
+  [[nodiscard]] bool has_faults() const { return connection_->sending != nullptr; }
+
+  /// Leaves the connection, with what has not been sent, and makes another one.
+  void reconnect() {
+    connection_->socket.set(zmq::sockopt::linger, 0);
+    connect();
+  }
+
+  /// Waits until there is something to receive or one of the descriptors is readable, at most for
+  /// this time.
+  void wait(std::span<const int> descriptors, Duration time_max) {
+    auto& [context, socket, monitor, sending, receiving, was_connected, is_newly_connected,
+           can_send] = *connection_;
+    // A connection takes messages only some time after its handshake.
+    const short wanted = is_newly_connected ? ZMQ_POLLIN | ZMQ_POLLOUT : ZMQ_POLLIN;
+    std::vector<zmq::pollitem_t> items{{socket.handle(), 0, wanted, 0},
+                                       {monitor.handle(), 0, ZMQ_POLLIN, 0}};
+    for (const int descriptor : descriptors) items.push_back({nullptr, descriptor, ZMQ_POLLIN, 0});
+    try {
+      zmq::poll(items, std::chrono::ceil<std::chrono::milliseconds>(time_max));
+    } catch (const zmq::error_t& error) {
+      // A process that was stopped and continued comes back here.
+      if (error.num() != EINTR) throw;
+    }
+    monitor.update(time_now());
+    const bool is_connected = monitor.is_connected();
+    is_newly_connected = is_connected && (is_newly_connected || !was_connected);
+    was_connected = is_connected;
+    can_send = (items[0].revents & ZMQ_POLLOUT) != 0;
+  }
+
+  void send(std::string bytes, TimePoint now) {
+    if (!connection_->sending) return transmit(bytes);
+    connection_->sending->pass("", std::move(bytes), now);
+    transmit_due(now);
+  }
+
+  /// Hands the messages that have come to `handle`, until it returns false.
+  void receive(TimePoint now, const std::function<bool(std::string_view)>& handle) {
+    transmit_due(now);
+    wire::LinkFaults* const faults = connection_->receiving.get();
+    zmq::message_t frame;
+    while (connection_->socket.recv(frame, zmq::recv_flags::dontwait)) {
+      if (faults != nullptr) {
+        faults->pass("", frame.to_string(), now);
+      } else if (!handle(frame.to_string_view())) {
+        return;
+      }
+    }
+    if (faults == nullptr) return;
+    for (const wire::Parcel& parcel : faults->due(now)) {
+      if (!handle(parcel.bytes)) return;
+    }
+  }
+
+  /// True if a connection was made since the last call.
+  [[nodiscard]] bool take_connected() {
+    return connection_->can_send && std::exchange(connection_->is_newly_connected, false);
+  }
+  /// Why the coordinator does not let this worker in, once for each reason.
+  [[nodiscard]] std::optional<std::string> take_refusal() {
+    return connection_->monitor.take_refusal();
+  }
+
+ private:
+  struct Connection {
+    Connection(const std::string& endpoint, const wire::ClientSecurity& security)
+        : socket(wire::make_dealer(context, security)),
+          monitor(context, socket, endpoint, security, time_now()) {}
+
+    zmq::context_t context;
+    zmq::socket_t socket;
+    wire::ConnectionMonitor monitor;
+    // Null unless something shall go wrong.
+    std::unique_ptr<wire::LinkFaults> sending =
+        wire::link_faults(wire::LinkFaults::Direction::sending);
+    std::unique_ptr<wire::LinkFaults> receiving =
+        wire::link_faults(wire::LinkFaults::Direction::receiving);
+    bool was_connected = false;
+    bool is_newly_connected = false;  ///< The connection is new, and nobody has been told.
+    bool can_send = false;            ///< At the last look; looked at only while nobody was told.
+  };
+
+  void connect() {
+    try {
+      connection_ = std::make_unique<Connection>(endpoint_, security_);
+    } catch (const zmq::error_t& error) {
+      throw Error(fmt::format("connect = {} ({})", endpoint_, error.what()));
+    }
+  }
+
+  void transmit_due(TimePoint now) {
+    if (!connection_->sending) return;
+    for (const wire::Parcel& parcel : connection_->sending->due(now)) transmit(parcel.bytes);
+  }
+
+  // What the queue has no room for is lost; the conversation repeats what is not answered.
+  void transmit(const std::string& bytes) {
+    (void)connection_->socket.send(zmq::buffer(bytes), zmq::send_flags::dontwait);
+  }
+
+  std::string endpoint_;
+  wire::ClientSecurity security_;
+  std::unique_ptr<Connection> connection_;
+};
 
 /// True, and the time is set to come after the interval, if it has come.
 bool take_turn(TimePoint& due_at, TimePoint now, Duration interval) {

@@ -25,15 +25,11 @@ int open_signals(SignalSource source) {
   return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
-EndRequest after_one_more(EndRequest request) {
-  return request == EndRequest::none ? EndRequest::drain : EndRequest::abandon;
-}
-
 /// What is asked for once this signal has come, too.
 EndRequest after(EndRequest request, const signalfd_siginfo& signal, SignalSource source) {
   switch (source) {
     case SignalSource::anyone:
-      return after_one_more(request);
+      return request == EndRequest::none ? EndRequest::drain : EndRequest::abandon;
     case SignalSource::supervisor: {
       const bool is_second =
           signal.ssi_signo == static_cast<std::uint32_t>(handed_on_signal()) && signal.ssi_int >= 2;
@@ -48,14 +44,12 @@ EndRequest after(EndRequest request, const signalfd_siginfo& signal, SignalSourc
 }  // namespace
 
 StopSignals::StopSignals(SignalSource source) : source_(source), descriptor_(open_signals(source)) {
-  if (descriptor_ < 0) throw Error(fmt::format("signalfd: {}", std::strerror(errno)));
+  if (descriptor() < 0) throw Error(fmt::format("signalfd: {}", std::strerror(errno)));
 }
-
-StopSignals::~StopSignals() { close(descriptor_); }
 
 EndRequest StopSignals::request() {
   signalfd_siginfo signal{};
-  while (read(descriptor_, &signal, sizeof signal) == sizeof signal) {
+  while (read(descriptor(), &signal, sizeof signal) == sizeof signal) {
     request_ = after(request_, signal, source_);
   }
   return request_;

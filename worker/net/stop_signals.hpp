@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "proto/link/descriptor.hpp"
+
 namespace proofmass::worker {
 
 /// Who asks a worker to end, and by which signals.
@@ -19,22 +21,19 @@ enum class EndRequest : std::uint8_t { none, drain, abandon };
 /// coordinator and the commands use handlers instead: some of their threads never poll.)
 class StopSignals {
  public:
-  /// Blocks the signals for the calling thread and those that it makes from now on.
+  /// Blocks the signals, for good, for the calling thread and those that it makes from now on.
   /// @throws Error if the system has no descriptor left.
   explicit StopSignals(SignalSource source);
-  ~StopSignals();  ///< The signals stay blocked.
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
 
   /// Readable while request() has something to take in.
-  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
 
   /// Takes in the signals that have come and returns the strongest request since the beginning.
   [[nodiscard]] EndRequest request();
 
  private:
   SignalSource source_;
-  int descriptor_;
+  wire::Descriptor descriptor_;
   EndRequest request_ = EndRequest::none;
 };
 

@@ -70,18 +70,12 @@ Spool::Spool(std::filesystem::path path, std::string_view model, std::uint64_t s
       header_(fmt::format("proofmass-spool 1 {}\n", model)),
       size_max_(size_max),
       file_(wire::open_own_file("spool", path_, wire::IfAbsent::make)) {
-  try {
-    lock();
-    read();
-  } catch (const Error&) {
-    close(file_);
-    throw;
-  }
+  lock();
+  read();
 }
 
 Spool::~Spool() {
   if (is_empty()) unlink(path_.c_str());
-  close(file_);
 }
 
 std::string Spool::message(std::string_view reason) const {
@@ -89,7 +83,7 @@ std::string Spool::message(std::string_view reason) const {
 }
 
 void Spool::lock() const {
-  const wire::Locked locked = wire::lock_file(file_);
+  const wire::Locked locked = wire::lock_file(file_.number());
   if (locked == wire::Locked::yes) return;
   throw Error(message(locked == wire::Locked::by_another ? "used by another worker"
                                                          : wire::no_locks_remedy));
@@ -99,7 +93,7 @@ void Spool::read() {
   std::string content;
   std::array<char, 1 << 16> part{};
   ssize_t count = 0;
-  while ((count = ::read(file_, part.data(), part.size())) > 0) {
+  while ((count = ::read(file_.number(), part.data(), part.size())) > 0) {
     content.append(part.data(), static_cast<std::size_t>(count));
     if (content.size() > size_max_) {
       throw Error(message(fmt::format("must be at most {} bytes", size_max_)));
@@ -128,7 +122,8 @@ void Spool::read_records(std::string_view content) {
   }
   num_bytes_dropped_ = content.size() - size_;
   if (num_bytes_dropped_ == 0) return;
-  if (ftruncate(file_, static_cast<off_t>(size_)) != 0) throw Error(message(std::strerror(errno)));
+  if (ftruncate(file_.number(), static_cast<off_t>(size_)) != 0)
+    throw Error(message(std::strerror(errno)));
 }
 
 std::optional<std::string> Spool::append(std::span<const wire::LeasedResult> results) {
@@ -147,15 +142,16 @@ std::optional<std::string> Spool::write(std::string_view bytes) {
   }
   std::size_t num_written = 0;
   while (num_written < bytes.size()) {
-    const ssize_t count = pwrite(file_, bytes.data() + num_written, bytes.size() - num_written,
-                                 static_cast<off_t>(size_ + num_written));
+    const ssize_t count =
+        pwrite(file_.number(), bytes.data() + num_written, bytes.size() - num_written,
+               static_cast<off_t>(size_ + num_written));
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) break;
     num_written += static_cast<std::size_t>(count);
   }
-  if (num_written < bytes.size() || fdatasync(file_) != 0) {
+  if (num_written < bytes.size() || fdatasync(file_.number()) != 0) {
     std::string reason = message(std::strerror(errno));
-    [[maybe_unused]] const int cut = ftruncate(file_, static_cast<off_t>(size_));
+    [[maybe_unused]] const int cut = ftruncate(file_.number(), static_cast<off_t>(size_));
     return reason;
   }
   size_ += bytes.size();
@@ -165,7 +161,7 @@ std::optional<std::string> Spool::write(std::string_view bytes) {
 void Spool::clear() {
   if (is_empty()) return;
   // If it cannot be cut, its results are delivered once more, which changes nothing.
-  if (ftruncate(file_, static_cast<off_t>(header_.size())) == 0) size_ = header_.size();
+  if (ftruncate(file_.number(), static_cast<off_t>(header_.size())) == 0) size_ = header_.size();
 }
 
 Spooler::Spooler(Spool& spool) : spool_(spool) {
@@ -191,19 +187,15 @@ std::optional<std::string> Spooler::look(const std::vector<wire::LeasedResult>& 
     if (seen_.contains(key) && !spooled_.contains(key)) old.push_back(result);
   }
   seen_ = std::move(seen);
-  return append(old);
+  if (old.empty()) return std::nullopt;
+  if (auto reason = spool_.append(old)) return reason;
+  for (const wire::LeasedResult& result : old) spooled_.insert(key_of(result));
+  return std::nullopt;
 }
 
 std::optional<std::string> Spooler::finish(const std::vector<wire::LeasedResult>& unacknowledged) {
   (void)look(unacknowledged);
   return look(unacknowledged);
-}
-
-std::optional<std::string> Spooler::append(const std::vector<wire::LeasedResult>& results) {
-  if (results.empty()) return std::nullopt;
-  if (auto reason = spool_.append(results)) return reason;
-  for (const wire::LeasedResult& result : results) spooled_.insert(key_of(result));
-  return std::nullopt;
 }
 
 }  // namespace proofmass::worker

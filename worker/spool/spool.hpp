@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/link/descriptor.hpp"
 #include "worker/execution/execution.hpp"
 
 namespace proofmass::worker {
@@ -66,7 +67,7 @@ class Spool {
   std::filesystem::path path_;
   std::string header_;
   std::uint64_t size_max_;
-  int file_ = -1;
+  wire::Descriptor file_;
   std::uint64_t size_ = 0;
   std::uint64_t num_bytes_dropped_ = 0;
   std::vector<wire::LeasedResult> former_results_;
@@ -93,7 +94,6 @@ class Spooler {
   using RunKey = std::pair<wire::CampaignId, RunIndex>;
 
   [[nodiscard]] static RunKey key_of(const wire::LeasedResult& result);
-  [[nodiscard]] std::optional<std::string> append(const std::vector<wire::LeasedResult>& results);
 
   Spool& spool_;
   std::set<RunKey> spooled_;

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <utility>
 
 #include "core/error.hpp"
@@ -61,22 +59,10 @@ std::string_view read_line(std::string_view line, wire::Domain domain, AllowedKe
   return {};
 }
 
-std::string read_file(const std::filesystem::path& file) {
-  struct stat status {};
-  if (::stat(file.c_str(), &status) != 0) refuse(file, std::strerror(errno));
-  if (!S_ISREG(status.st_mode)) refuse(file, "must be a regular file");
-  wire::check_reach("allow-list", file, status, wire::Reach::written_by_owner);
-  if (static_cast<std::size_t>(status.st_size) > file_size_max) refuse(file, "is too large");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) refuse(file, std::strerror(errno));
-  std::string text(static_cast<std::size_t>(status.st_size), '\0');
-  stream.read(text.data(), status.st_size);
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  return text;
-}
-
 AllowedKeys read_allow_list(const std::filesystem::path& file, wire::Domain domain) {
-  return parse_allow_list(read_file(file), domain, file);
+  const std::string text =
+      wire::read_within_reach("allow-list", file, wire::Reach::written_by_owner, file_size_max);
+  return parse_allow_list(text, domain, file);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <utility>
+#include <vector>
 #include <zmq.hpp>
 
 #include "core/error.hpp"
@@ -99,14 +100,14 @@ Authenticator::~Authenticator() = default;
 
 void* Authenticator::handle() const { return socket_->handle(); }
 
-void Authenticator::watch(Domain domain, EventSource next_event) {
-  watched_.emplace_back(domain, std::move(next_event));
+void Authenticator::on_event(Domain domain, const wire::SocketEvent& event, TimePoint now) {
+  if ((event.kind & failed_handshakes) == 0) return;
+  refusals_.refused(
+      {.domain = to_text(domain), .address = {}, .public_key = {}, .reason = reason_of(event)},
+      now);
 }
 
 void Authenticator::serve(TimePoint now) {
-  for (const auto& [domain, next_event] : watched_) {
-    log_failed_handshakes(next_event, domain, refusals_, now);
-  }
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;

@@ -8,7 +8,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
@@ -46,10 +45,10 @@ class Authenticator {
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t; then call serve().
   [[nodiscard]] void* handle() const;
 
-  /// Logs peers of a socket whose handshake ends before they show a key.
-  ///
-  /// @param next_event  Gives the next failed handshake of a ROUTER of the same context, if any.
-  void watch(wire::Domain domain, EventSource next_event);
+  /// What happened to the socket of a domain: logs a peer whose handshake ended before it showed a
+  /// key, one that uses none, that trusts another coordinator's key, or that speaks another
+  /// protocol. ZeroMQ does not report its address.
+  void on_event(wire::Domain domain, const wire::SocketEvent& event, TimePoint now);
 
   /// Answers all handshakes that wait; never waits itself.
   void serve(TimePoint now);
@@ -77,7 +76,6 @@ class Authenticator {
   AllowList workers_;
   AllowList clients_;
   std::unique_ptr<zmq::socket_t> socket_;
-  std::vector<std::pair<wire::Domain, EventSource>> watched_;
 };
 
 }  // namespace proofmass::coordinator

@@ -36,14 +36,6 @@ std::string_view protocol_reason(std::uint32_t error) {
   }
 }
 
-/// Which end of a handshake without keys notices first is a matter of chance, so the coordinator
-/// sometimes sees no more than the end.
-std::string_view reason_of(const wire::SocketEvent& event) {
-  if (event.kind == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) return protocol_reason(event.value);
-  return event.value == EAGAIN ? "handshake takes too long"
-                               : "ends during the handshake, as one without a key does";
-}
-
 }  // namespace
 
 RefusalLog::RefusalLog(Log log) : log_(std::move(log)) {}
@@ -80,14 +72,12 @@ void RefusalLog::begin_minute(TimePoint now) {
 const int failed_handshakes =
     ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL;
 
-void log_failed_handshakes(const EventSource& next_event, wire::Domain domain, RefusalLog& log,
-                           RefusalLog::TimePoint now) {
-  while (const auto event = next_event()) {
-    if ((event->kind & failed_handshakes) == 0) continue;
-    log.refused(
-        {.domain = to_text(domain), .address = {}, .public_key = {}, .reason = reason_of(*event)},
-        now);
-  }
+// Which end of a handshake without keys notices first is a matter of chance, so the coordinator
+// sometimes sees no more than the end.
+std::string_view reason_of(const wire::SocketEvent& event) {
+  if (event.kind == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) return protocol_reason(event.value);
+  return event.value == EAGAIN ? "handshake takes too long"
+                               : "ends during the handshake, as one without a key does";
 }
 
 }  // namespace proofmass::coordinator

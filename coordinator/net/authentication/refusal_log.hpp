@@ -3,15 +3,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "proto/link/connection_monitor.hpp"
-#include "proto/link/keys.hpp"
 
 namespace proofmass::coordinator {
 
@@ -42,16 +39,10 @@ class RefusalLog {
   std::uint64_t num_left_out_ = 0;
 };
 
-/// Events that log_failed_handshakes() looks for: ZMQ_EVENT_..., joined by |.
+/// Events of handshakes that failed: ZMQ_EVENT_..., joined by |.
 extern const int failed_handshakes;
 
-/// Gives the next event of a socket, if there is one.
-using EventSource = std::function<std::optional<wire::SocketEvent>()>;
-
-/// Logs peers whose handshake ended before they showed a key: those that use none, that trust
-/// another coordinator's key, or that speak another protocol. ZeroMQ does not report their address.
-/// Never waits.
-void log_failed_handshakes(const EventSource& next_event, wire::Domain domain, RefusalLog& log,
-                           std::chrono::steady_clock::time_point now);
+/// Why a handshake failed, for people.
+[[nodiscard]] std::string_view reason_of(const wire::SocketEvent& failure);
 
 }  // namespace proofmass::coordinator

@@ -12,8 +12,12 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "coordinator/store/detail/integrity.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
+#include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/names.hpp"
@@ -87,6 +91,22 @@ void insert_budget_coefficients(Database& database, const Campaign& campaign) {
   }
 }
 
+/// Values of one drawn quantity, run by run; empty if the file has none.
+std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
+  Statement select = database.prepare(
+      "SELECT value, run_index FROM dispersion_value WHERE quantity = ? ORDER BY 2");
+  select.bind_all(drawn_name);
+  std::vector<double> values;
+  while (select.step()) {
+    if (select.count(1) != values.size()) {
+      database.refuse_as_damaged(fmt::format("dispersion_value of {}: run {} follows {} values",
+                                             drawn_name, select.count(1), values.size()));
+    }
+    values.push_back(select.real(0));
+  }
+  return values;
+}
+
 }  // namespace
 
 void insert_parameters(Database& database, const Campaign& campaign) {
@@ -127,68 +147,21 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
   write_table_digest(database, campaign.model());
 }
 
-std::vector<DataTable> read_data_tables(const Database& database, const Model& model) {
-  std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model.tables()) {
-    DataTable table{.key = std::string(schema.key),
-                    .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
-    Statement select = database.prepare(fmt::format("SELECT {} FROM {} ORDER BY position",
-                                                    fmt::join(schema.columns, ", "), schema.table));
-    while (select.step()) {
-      for (int column = 0; column < static_cast<int>(schema.columns.size()); ++column) {
-        table.values.push_back(select.real(column));
-      }
-    }
-    if (!table.values.empty()) tables.push_back(std::move(table));
-  }
-  return tables;
-}
-
-std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
-  Statement select = database.prepare(
-      "SELECT value, run_index FROM dispersion_value WHERE quantity = ? ORDER BY 2");
-  select.bind_all(drawn_name);
-  std::vector<double> values;
-  while (select.step()) {
-    if (select.count(1) != values.size()) {
-      database.refuse_as_damaged(fmt::format("dispersion_value of {}: run {} follows {} values",
-                                             drawn_name, select.count(1), values.size()));
-    }
-    values.push_back(select.real(0));
-  }
-  return values;
-}
-
-void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
-  const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
-  if (campaign.num_runs < num_runs) {
-    database.refuse(fmt::format("has {} runs, and was to have {}", num_runs, campaign.num_runs));
-  }
-  insert_dispersion_values(database, campaign, num_runs);
-  database.prepare("UPDATE campaign SET num_runs = ?, definition = ?")
-      .run(campaign.num_runs, definition);
-  fix_num_runs(database);
-  write_table_digest(database, campaign.model());
+std::uint64_t number_in(const Database& database, std::string_view column, const std::string& text,
+                        int base) {
+  std::uint64_t number = 0;
+  const char* const text_end = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), text_end, number, base);
+  if (error == std::errc() && end == text_end) return number;
+  database.refuse_as_damaged(fmt::format("{} = {}", column, text));
 }
 
 std::uint64_t read_seed(const Database& database) {
-  const std::string digits = database.text("SELECT seed FROM campaign");
-  std::uint64_t seed = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
-  if (error != std::errc() || end != digits.data() + digits.size()) {
-    database.refuse_as_damaged(fmt::format("seed = {}", digits));
-  }
-  return seed;
+  return number_in(database, "seed", database.text("SELECT seed FROM campaign"), 10);
 }
 
 std::uint64_t reference_digest_in(const Database& database, const std::string& text) {
-  std::uint64_t digest = 0;
-  const char* const end = text.data() + text.size();
-  const auto [read_end, error] = std::from_chars(text.data(), end, digest, 16);
-  if (!text.empty() && (error != std::errc() || read_end != end)) {
-    database.refuse_as_damaged(fmt::format("reference_digest = {}", text));
-  }
-  return digest;
+  return text.empty() ? 0 : number_in(database, "reference_digest", text, 16);
 }
 
 CampaignControl read_control(const Database& database) {
@@ -240,3 +213,48 @@ void replace_stop_check(const Database& database, std::uint64_t num_runs,
 }
 
 }  // namespace proofmass::coordinator::detail
+
+namespace proofmass::coordinator {
+
+std::vector<DataTable> Store::data_tables() const {
+  std::vector<DataTable> tables;
+  for (const DataTableSchema& schema : model().tables()) {
+    DataTable table{.key = std::string(schema.key),
+                    .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
+    detail::Statement select = impl_->database.prepare(fmt::format(
+        "SELECT {} FROM {} ORDER BY position", fmt::join(schema.columns, ", "), schema.table));
+    while (select.step()) {
+      for (int column = 0; column < select.num_columns(); ++column) {
+        table.values.push_back(select.real(column));
+      }
+    }
+    if (!table.values.empty()) tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+std::vector<std::vector<double>> Store::table_columns() const {
+  std::vector<std::vector<double>> columns;
+  for (const DrawnQuantity& quantity : model().drawn()) {
+    columns.push_back(detail::read_dispersion_values(impl_->database, quantity.name));
+    if (columns.back().empty()) columns.pop_back();
+  }
+  return columns;
+}
+
+void Store::extend(const Campaign& campaign, std::string_view definition) {
+  impl_->commit([&](detail::Database& database) {
+    const std::uint64_t num_before = num_runs();
+    if (campaign.num_runs < num_before) {
+      database.refuse(
+          fmt::format("has {} runs, and was to have {}", num_before, campaign.num_runs));
+    }
+    detail::insert_dispersion_values(database, campaign, num_before);
+    database.prepare("UPDATE campaign SET num_runs = ?, definition = ?")
+        .run(campaign.num_runs, definition);
+    detail::fix_num_runs(database);
+    detail::write_table_digest(database, campaign.model());
+  });
+}
+
+}  // namespace proofmass::coordinator

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
@@ -20,18 +19,11 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
 /// Fills the tables `parameter` and `budget_coefficient`.
 void insert_parameters(Database& database, const Campaign& campaign);
 
-/// The data that all runs share; none that has no rows.
-[[nodiscard]] std::vector<DataTable> read_data_tables(const Database& database, const Model& model);
-
-/// Values of one drawn quantity, run by run; empty if the file has none.
-[[nodiscard]] std::vector<double> read_dispersion_values(const Database& database,
-                                                         std::string_view drawn_name);
-
-/// Stores number of runs, definition and the table values of the new runs.
-/// @pre It is the stored campaign. @throws StoreError if that has more runs.
-void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition);
-
-/// @throws StoreError if the stored text is not a whole number below 2⁶⁴.
+/// A whole number below 2⁶⁴ that is stored as text.
+/// @param column  That it stands in, for messages.
+/// @throws StoreError if the text is none.
+[[nodiscard]] std::uint64_t number_in(const Database& database, std::string_view column,
+                                      const std::string& text, int base);
 [[nodiscard]] std::uint64_t read_seed(const Database& database);
 /// The number of campaign.reference_digest; 0 if it is empty.
 [[nodiscard]] std::uint64_t reference_digest_in(const Database& database, const std::string& text);

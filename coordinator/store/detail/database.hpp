@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/statistics/interval.hpp"
 
@@ -238,6 +239,18 @@ class StepLimit {
  private:
   const Database& database_;
 };
+
+/// What `make` makes of each row of a query.
+/// @param values  Of the parameters of the query, in order.
+template <typename Make, typename... Values>
+[[nodiscard]] auto rows_of(const Database& database, std::string_view sql, const Make& make,
+                           const Values&... values) {
+  Statement row = database.prepare(sql);
+  row.bind_all(values...);
+  std::vector<decltype(make(row))> rows;
+  while (row.step()) rows.push_back(make(row));
+  return rows;
+}
 
 /// `?, ?, ?`: places for so many values in a statement.
 [[nodiscard]] std::string places(int count);

@@ -87,9 +87,10 @@ std::string holder(const std::filesystem::path& path) {
   return line.empty() ? "another process" : line;
 }
 
-int open_lock_file(const std::filesystem::path& path) {
+wire::Descriptor open_lock_file(const std::filesystem::path& path) {
   try {
-    return wire::open_own_file("lock", path, wire::IfAbsent::make, wire::trusted_mode);
+    return wire::Descriptor(
+        wire::open_own_file("lock", path, wire::IfAbsent::make, wire::trusted_mode));
   } catch (const Error& error) {
     throw StoreError(error.what());
   }
@@ -103,13 +104,12 @@ bool is_file_at(int descriptor, const std::filesystem::path& path) {
          opened.st_dev == present.st_dev && opened.st_ino == present.st_ino;
 }
 
-int acquire(const std::filesystem::path& path, IfNoLocks if_no_locks) {
-  const int descriptor = open_lock_file(path);
-  const wire::Locked locked = wire::lock_file(descriptor);
+wire::Descriptor acquire(const std::filesystem::path& path, IfNoLocks if_no_locks) {
+  wire::Descriptor descriptor = open_lock_file(path);
+  const wire::Locked locked = wire::lock_file(descriptor.number());
   const bool is_enough = locked == wire::Locked::yes ||
                          (locked == wire::Locked::impossible && if_no_locks == IfNoLocks::go_on);
-  if (is_enough && is_file_at(descriptor, path)) return descriptor;
-  ::close(descriptor);
+  if (is_enough && is_file_at(descriptor.number(), path)) return descriptor;
   if (locked == wire::Locked::impossible) {
     throw StoreError(fmt::format("lock = {} ({})", path.string(), wire::no_locks_remedy));
   }
@@ -117,16 +117,15 @@ int acquire(const std::filesystem::path& path, IfNoLocks if_no_locks) {
                                path.string(), holder(path)));
 }
 
-int open_and_lock(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-  if (descriptor < 0) {
+wire::Descriptor open_and_lock(const std::filesystem::path& path) {
+  wire::Descriptor descriptor(::open(path.c_str(), O_RDWR | O_CLOEXEC));
+  if (descriptor.number() < 0) {
     const int error = errno;
     if (error == EACCES || error == EROFS) refuse_file(path, "is not writable");
     refuse_file(path, fmt::format("cannot be opened: {}", std::strerror(error)));
   }
-  const wire::Locked locked = wire::lock_file(descriptor);
+  const wire::Locked locked = wire::lock_file(descriptor.number());
   if (locked == wire::Locked::yes) return descriptor;
-  ::close(descriptor);
   refuse_file(path, locked == wire::Locked::impossible
                         ? wire::no_locks_remedy
                         : "another coordinator has it; a campaign has one coordinator at a time");
@@ -281,21 +280,17 @@ StoreLock::StoreLock(const std::filesystem::path& campaign_file, IfNoLocks if_no
     : path_(beside(canonical_path(campaign_file), ".lock")),
       descriptor_(acquire(path_, if_no_locks)) {
   // For people only: the lock holds even if this cannot be written.
-  if (::ftruncate(descriptor_, 0) != 0) return;
-  const std::string text = this_process() + '\n';
-  [[maybe_unused]] const ssize_t written = ::write(descriptor_, text.data(), text.size());
+  if (::ftruncate(descriptor_.number(), 0) != 0) return;
+  (void)wire::write_all(descriptor_.number(), this_process() + '\n');
 }
 
 // Somebody may have removed the file, and another process may have made one.
 StoreLock::~StoreLock() {
-  if (is_file_at(descriptor_, path_)) ::unlink(path_.c_str());
-  ::close(descriptor_);
+  if (is_file_at(descriptor_.number(), path_)) ::unlink(path_.c_str());
 }
 
 FilePlace::FilePlace(const std::filesystem::path& file)
     : path_(canonical_path(file)), descriptor_(open_and_lock(path_)), file_(identity_at(path_)) {}
-
-FilePlace::~FilePlace() { ::close(descriptor_); }
 
 FilePlace::Identity FilePlace::identity_at(const std::filesystem::path& path) {
   struct stat status {};
@@ -312,7 +307,7 @@ void FilePlace::remember_log() {
 std::string_view FilePlace::look() {
   if (is_lost()) return loss_;
   struct stat status {};
-  if (::fstat(descriptor_, &status) == 0) {
+  if (::fstat(descriptor_.number(), &status) == 0) {
     if (status.st_size < size_max_) return loss_ = truncated;
     size_max_ = status.st_size;
   }

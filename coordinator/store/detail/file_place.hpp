@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "proto/link/descriptor.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -74,7 +75,7 @@ class StoreLock {
 
  private:
   std::filesystem::path path_;
-  int descriptor_;
+  wire::Descriptor descriptor_;
 };
 
 /// Holds an open campaign database by the file itself, whatever becomes of its name: no two
@@ -87,9 +88,6 @@ class FilePlace {
  public:
   /// @throws StoreError if another coordinator has the file.
   explicit FilePlace(const std::filesystem::path& file);
-  ~FilePlace();
-  FilePlace(const FilePlace&) = delete;
-  FilePlace& operator=(const FilePlace&) = delete;
 
   /// To be called once the connection has opened the write-ahead log.
   void remember_log();
@@ -121,7 +119,7 @@ class FilePlace {
   [[nodiscard]] static Identity identity_at(const std::filesystem::path& path);
 
   std::filesystem::path path_;
-  int descriptor_;
+  wire::Descriptor descriptor_;
   Identity file_;
   Identity log_;
   Identity index_;

@@ -1,7 +1,6 @@
 #include "coordinator/store/detail/open_file.hpp"
 
 #include <algorithm>
-#include <exception>
 #include <iterator>
 #include <utility>
 #include <variant>
@@ -64,37 +63,6 @@ std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& conf
   const bool is_complete = file.waiting.num_results() >= config.commit_runs_max;
   if (is_complete || file.waiting.is_hurried()) return urgent_since;
   return std::min(due, *urgent_since + config.commit_after);
-}
-
-Attempted try_to_write(OpenFile& file) {
-  Attempted attempted;
-  try {
-    if (file.writing.empty()) {
-      file.store.check_place();
-    } else {
-      attempted.summary = file.store.write(file.writing);
-    }
-  } catch (const std::exception& error) {
-    attempted.failure = error.what();
-  }
-  attempted.log_size = file.store.log_size();
-  return attempted;
-}
-
-std::optional<std::string> try_to_rest(Store& store) {
-  try {
-    return store.rest();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-}
-
-std::vector<RunIndex> delivered_runs(const std::vector<Entry>& entries) {
-  std::vector<RunIndex> runs;
-  for (const Entry& entry : entries) {
-    if (const auto* delivery = std::get_if<Delivery>(&entry)) runs.push_back(delivery->result.run);
-  }
-  return runs;
 }
 
 }  // namespace proofmass::coordinator::detail

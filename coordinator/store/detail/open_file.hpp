@@ -70,20 +70,4 @@ struct OpenFile {
 /// When the file wants to be written to or brought to rest; nothing if nothing waits.
 [[nodiscard]] std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config);
 
-/// What came of one attempt to write.
-struct Attempted {
-  CommitSummary summary;
-  std::optional<std::string> failure;
-  std::uint64_t log_size = 0;  ///< Afterwards.
-};
-
-/// Tries to write what `writing` holds, to a file that has its name before and afterwards.
-[[nodiscard]] Attempted try_to_write(OpenFile& file);
-
-/// Tries to fold the log in; returns why it is still needed.
-[[nodiscard]] std::optional<std::string> try_to_rest(Store& store);
-
-/// The runs of all deliveries, in order.
-[[nodiscard]] std::vector<RunIndex> delivered_runs(const std::vector<Entry>& entries);
-
 }  // namespace proofmass::coordinator::detail

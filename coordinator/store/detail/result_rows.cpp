@@ -23,10 +23,6 @@ namespace {
 // Columns before the values: run_index, status, num_draws, num_rounds.
 constexpr int num_leading_columns = 4;
 
-bool is_of_standard_errors(const ValueColumn& column) {
-  return column.kind == ValueKind::standard_error || column.kind == ValueKind::fit;
-}
-
 std::string column_list(const ResultColumns& columns) {
   std::string list = "run_index, status, num_draws, num_rounds";
   for (const ValueColumn& column : columns.values) {
@@ -82,20 +78,19 @@ std::uint64_t digest_with(std::uint64_t digest, const std::vector<double>& value
   return digest;
 }
 
-// A column holds 64 bits.
-std::uint32_t read_number(const Statement& row, int column) {
-  const std::uint64_t value = row.count(column);
-  if (value <= std::numeric_limits<std::uint32_t>::max()) return static_cast<std::uint32_t>(value);
+/// A whole number of a column, in [min, max]; a column holds 64 bits.
+std::uint32_t read_number(const Statement& row, int column, std::int64_t min, std::int64_t max) {
+  const std::int64_t value = row.integer(column);
+  if (value >= min && value <= max) return static_cast<std::uint32_t>(value);
   row.refuse_as_damaged(
       fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
 }
 
+constexpr std::int64_t number_max = std::numeric_limits<std::uint32_t>::max();
+
 RunStatus read_status(const Statement& row) {
-  const std::int64_t status = row.integer(1);
-  const bool is_known = status >= static_cast<std::int64_t>(RunStatus::completed) &&
-                        status <= static_cast<std::int64_t>(RunStatus::lost);
-  if (is_known) return static_cast<RunStatus>(status);
-  row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
+  return static_cast<RunStatus>(read_number(row, 1, static_cast<std::int64_t>(RunStatus::completed),
+                                            static_cast<std::int64_t>(RunStatus::lost)));
 }
 
 // SQLite would read a missing number as 0.
@@ -128,15 +123,6 @@ std::vector<double> read_magnitudes(const Statement& row, int first, int count) 
   return values;
 }
 
-std::uint32_t read_choice(const Statement& row, int column, std::size_t count) {
-  const std::int64_t value = row.integer(column);
-  if (value >= 1 && value <= static_cast<std::int64_t>(count)) {
-    return static_cast<std::uint32_t>(value);
-  }
-  row.refuse_as_damaged(
-      fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
-}
-
 Loss read_loss(const Statement& row, const ResultColumns& at, RunStatus status) {
   if (status != RunStatus::lost) {
     for (const int column : {at.loss_cause, at.loss_session}) {
@@ -146,8 +132,11 @@ Loss read_loss(const Statement& row, const ResultColumns& at, RunStatus status) 
     }
     return {};
   }
-  return {.cause = read_choice(row, at.loss_cause, at.schema.loss_causes.size()),
-          .session = read_choice(row, at.loss_session, at.schema.loss_sessions.size())};
+  const auto choice = [&](int column, const std::vector<std::string_view>& names) {
+    return read_number(row, column, 1, static_cast<std::int64_t>(names.size()));
+  };
+  return {.cause = choice(at.loss_cause, at.schema.loss_causes),
+          .session = choice(at.loss_session, at.schema.loss_sessions)};
 }
 
 // The file is damaged if a number has another type than the schema gives it, or is out of the range
@@ -155,8 +144,8 @@ Loss read_loss(const Statement& row, const ResultColumns& at, RunStatus status) 
 RunResult read_result(const Statement& row, const ResultColumns& at) {
   RunResult result{.run = RunIndex{row.count(0)},
                    .status = read_status(row),
-                   .num_draws = read_number(row, 2),
-                   .num_rounds = read_number(row, 3)};
+                   .num_draws = read_number(row, 2, 0, number_max),
+                   .num_rounds = read_number(row, 3, 0, number_max)};
   if (result.has_truth()) result.truth = read_values(row, at.truth, at.num_quantities);
   if (result.has_estimate()) result.estimate = read_values(row, at.estimate, at.num_quantities);
   // A run without a draw has no health.

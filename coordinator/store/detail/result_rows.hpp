@@ -26,6 +26,11 @@ struct ResultColumns {
   int truth, estimate, health, loss_cause, loss_session, num_all;
 };
 
+/// Whether a column has standard errors or their fit.
+[[nodiscard]] inline bool is_of_standard_errors(const ValueColumn& column) {
+  return column.kind == ValueKind::standard_error || column.kind == ValueKind::fit;
+}
+
 /// Results as rows of `run_result`; the columns follow from the ResultSchema of the campaign.
 class ResultRows {
  public:

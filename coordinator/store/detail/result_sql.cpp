@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <vector>
 
+#include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
@@ -14,43 +16,46 @@ namespace {
 
 constexpr std::string_view next_column = ",\n  ";
 
-/// What `text_of` yields for each parameter, one a line.
-template <typename TextOf>
-std::string for_each_parameter(const ResultSchema& schema, std::string_view separator,
-                               const TextOf& text_of) {
+/// What `text_of` yields for each item, with the separator between them.
+template <typename Items, typename TextOf>
+std::string joined(const Items& items, std::string_view separator, const TextOf& text_of) {
   std::string text;
-  for (const Quantity& quantity : schema.quantities) {
+  for (const auto& item : items) {
     if (!text.empty()) text += separator;
-    text += text_of(quantity);
+    text += text_of(item);
   }
   return text;
+}
+
+/// Columns of run_result with the standard errors and their fit, if the campaign has them.
+std::vector<std::string> columns_of_standard_errors(const ResultSchema& schema) {
+  std::vector<std::string> names;
+  for (const ValueColumn& column : value_columns(schema)) {
+    if (is_of_standard_errors(column)) names.push_back(column.name);
+  }
+  return names;
 }
 
 /// Columns that are NULL where `is_absent` holds.
 std::string nullable_columns(const ResultSchema& schema, std::string_view prefix,
                              std::string_view is_absent) {
-  return for_each_parameter(schema, next_column, [&](const Quantity& quantity) {
+  return joined(schema.quantities, next_column, [&](const Quantity& quantity) {
     const std::string name = fmt::format("{}_{}", prefix, quantity.column());
     return fmt::format("{0} REAL CHECK (({0} IS NULL) = ({1}))", name, is_absent);
   });
 }
 
 std::string error_columns(const ResultSchema& schema) {
-  return for_each_parameter(schema, next_column, [](const Quantity& quantity) {
+  return joined(schema.quantities, next_column, [](const Quantity& quantity) {
     return fmt::format("error_{0} REAL AS (estimate_{0} - truth_{0})", quantity.column());
   });
 }
 
 /// The columns that the schema has from version 10.
 std::string added_columns(const ResultSchema& schema) {
-  std::string text;
-  const auto add = [&](std::string_view prefix, const std::string& column) {
-    text += fmt::format("ALTER TABLE run_result ADD COLUMN {}_{} REAL;\n", prefix, column);
-  };
-  for (const Quantity& quantity : schema.quantities) {
-    if (quantity.has_standard_error) add("standard_error", quantity.column());
-  }
-  for (const HealthQuantity& quantity : schema.fit) add("fit", quantity.column());
+  std::string text = joined(columns_of_standard_errors(schema), "", [](const std::string& column) {
+    return fmt::format("ALTER TABLE run_result ADD COLUMN {} REAL;\n", column);
+  });
   if (text.empty()) return text;
   if (num_correlations(schema) > 0) {
     text += "ALTER TABLE run_result ADD COLUMN correlations TEXT;\n";
@@ -63,75 +68,49 @@ std::string added_columns(const ResultSchema& schema) {
 
 /// NULL where no quantity has one.
 std::string standard_error_of_parameter(const ResultSchema& schema) {
-  std::string text;
   int position = 0;
-  for (const Quantity& quantity : schema.quantities) {
+  const std::string text = joined(schema.quantities, "", [&](const Quantity& quantity) {
     ++position;
-    if (!quantity.has_standard_error) continue;
-    text += fmt::format("\n         WHEN {} THEN r.standard_error_{}", position, quantity.column());
-  }
+    return quantity.has_standard_error ? fmt::format("\n         WHEN {} THEN r.standard_error_{}",
+                                                     position, quantity.column())
+                                       : std::string();
+  });
   return text.empty() ? "NULL" : "CASE p.position" + text + " END";
 }
 
-/// Columns of r that begin with fit_, as they are called.
-std::string fit_of_row(const ResultSchema& schema) {
-  std::string text;
-  for (const HealthQuantity& quantity : schema.fit) {
-    text += fmt::format(", r.fit_{0} AS {0}", quantity.column());
-  }
-  return text;
-}
-
-std::string health_columns(const ResultSchema& schema) {
-  std::string text;
-  for (const HealthQuantity& quantity : schema.health) {
-    text += fmt::format("health_{} REAL,\n  ", quantity.column());
-  }
-  return text;
-}
-
-std::string health_of_row(const ResultSchema& schema) {
-  std::string text;
-  for (const HealthQuantity& quantity : schema.health) {
-    text += fmt::format("r.health_{0} AS {0},\n       ", quantity.column());
-  }
-  return text;
-}
-
 std::string data_tables(const Model& model) {
-  std::string text;
-  for (const DataTableSchema& table : model.tables()) {
-    text += fmt::format("-- {}\nCREATE TABLE {} (\n  position INTEGER PRIMARY KEY", table.comment,
-                        table.table);
-    for (const std::string_view column : table.columns) {
-      text += fmt::format(",\n  {} REAL NOT NULL", column);
-    }
-    text += "\n) STRICT;\n";
-  }
-  return text;
+  return joined(model.tables(), "", [](const DataTableSchema& table) {
+    const std::string columns = joined(table.columns, "", [](std::string_view column) {
+      return fmt::format(",\n  {} REAL NOT NULL", column);
+    });
+    return fmt::format("-- {}\nCREATE TABLE {} (\n  position INTEGER PRIMARY KEY{}\n) STRICT;\n",
+                       table.comment, table.table, columns);
+  });
 }
 
 std::string digested_tables(const Model& model) {
-  std::string text;
-  for (const DataTableSchema& table : model.tables()) {
-    text += fmt::format("{}{}", text.empty() ? "" : ", ", table.table);
-  }
+  const std::string text = joined(model.tables(), ", ", std::mem_fn(&DataTableSchema::table));
   return text.empty() ? "dispersion_value" : text + " and dispersion_value";
+}
+
+/// The format for the column of each quantity of health or fit, one after the other.
+std::string columns_as(fmt::format_string<std::string> format,
+                       const std::vector<HealthQuantity>& quantities) {
+  return joined(quantities, "", [&](const HealthQuantity& quantity) {
+    return fmt::format(format, quantity.column());
+  });
 }
 
 std::string value_of_parameter(const ResultSchema& schema, std::string_view prefix) {
   int position = 0;
-  return "CASE p.position" +
-         for_each_parameter(schema, "",
-                            [&](const Quantity& quantity) {
-                              return fmt::format("\n         WHEN {} THEN r.{}_{}", ++position,
-                                                 prefix, quantity.column());
-                            }) +
-         " END";
+  const std::string text = joined(schema.quantities, "", [&](const Quantity& quantity) {
+    return fmt::format("\n         WHEN {} THEN r.{}_{}", ++position, prefix, quantity.column());
+  });
+  return "CASE p.position" + text + " END";
 }
 
 std::string budget_total(const ResultSchema& schema) {
-  return for_each_parameter(schema, "\n       + ", [](const Quantity& quantity) {
+  return joined(schema.quantities, "\n       + ", [](const Quantity& quantity) {
     return fmt::format(
         "abs(error_{}) * (SELECT ifnull(sum(value), 0.0) FROM budget_coefficient"
         " WHERE parameter = '{}')",
@@ -143,7 +122,7 @@ std::string budget_total(const ResultSchema& schema) {
 std::string budget_total_at_level(const ResultSchema& schema) {
   if (schema.budget_terms.empty()) return "NULL";
   const std::string level = schema.health.at(schema.budget_level).column();
-  return for_each_parameter(schema, "\n       + ", [&](const Quantity& quantity) {
+  return joined(schema.quantities, "\n       + ", [&](const Quantity& quantity) {
     return fmt::format(
         "abs(r.error_{0}) * (SELECT ifnull(sum(value), 0.0) FROM budget_coefficient"
         " WHERE parameter = '{1}' AND assumed_level IS NULL)\n"
@@ -158,12 +137,11 @@ std::string budget_total_at_level(const ResultSchema& schema) {
 /// The names of choices that are stored as 1, 2, ...
 std::string name_of_choice(std::string_view column, const std::vector<std::string_view>& names) {
   if (names.empty()) return "NULL";
-  std::string text = fmt::format("CASE r.{}", column);
   std::size_t number = 0;
-  for (const std::string_view name : names) {
-    text += fmt::format("\n         WHEN {} THEN '{}'", ++number, name);
-  }
-  return text + " END";
+  const std::string text = joined(names, "", [&](std::string_view name) {
+    return fmt::format("\n         WHEN {} THEN '{}'", ++number, name);
+  });
+  return fmt::format("CASE r.{}{} END", column, text);
 }
 
 std::vector<std::string_view> status_names() {
@@ -185,9 +163,9 @@ std::map<std::string_view, std::string> texts(const Model& model, const ResultSc
       {"standard_error_columns", ""},  // In version 8 no model had any.
       {"added_columns", added_columns(schema)},
       {"standard_error_of_parameter", standard_error_of_parameter(schema)},
-      {"fit_values", fit_of_row(schema)},
-      {"health_columns", health_columns(schema)},
-      {"health_values", health_of_row(schema)},
+      {"fit_values", columns_as(", r.fit_{0} AS {0}", schema.fit)},
+      {"health_columns", columns_as("health_{0} REAL,\n  ", schema.health)},
+      {"health_values", columns_as("r.health_{0} AS {0},\n       ", schema.health)},
       {"status_name", name_of_choice("status", status_names())},
       {"loss_cause_name", name_of_choice("loss_cause", schema.loss_causes)},
       {"loss_session_name", name_of_choice("loss_session", schema.loss_sessions)},
@@ -206,16 +184,9 @@ std::map<std::string_view, std::string> texts(const Model& model, const ResultSc
 }  // namespace
 
 std::string has_standard_errors_sql(const ResultSchema& schema) {
-  std::string text;
-  const auto add = [&](std::string_view prefix, const std::string& column) {
-    text += fmt::format("{}{}_{} IS NOT NULL", text.empty() ? "" : "\n   OR ", prefix, column);
-  };
-  for (const Quantity& quantity : schema.quantities) {
-    if (quantity.has_standard_error) add("standard_error", quantity.column());
-  }
-  for (const HealthQuantity& quantity : schema.fit) add("fit", quantity.column());
-  if (num_correlations(schema) > 0) text += "\n   OR correlations IS NOT NULL";
-  return text;
+  std::vector<std::string> columns = columns_of_standard_errors(schema);
+  if (num_correlations(schema) > 0) columns.emplace_back("correlations");
+  return joined(columns, "\n   OR ", [](const auto& column) { return column + " IS NOT NULL"; });
 }
 
 std::string with_quantities(std::string_view sql, const Model& model, const ResultSchema& schema) {

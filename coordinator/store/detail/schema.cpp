@@ -89,11 +89,10 @@ bool is_large(const Model& model, const std::string& table) {
 
 /// Names of the tables, those of SQLite's own among them.
 std::vector<std::string> table_names(const Database& database) {
-  Statement select = database.prepare(
-      "SELECT name FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 ORDER BY name");
-  std::vector<std::string> names;
-  while (select.step()) names.push_back(select.text(0));
-  return names;
+  return rows_of(
+      database,
+      "SELECT name FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 ORDER BY name",
+      [](const Statement& row) { return row.text(0); });
 }
 
 // Counting the rows of a table reads every page of its tree, and SQLite checks each that it reads.

@@ -21,7 +21,6 @@ void replace_statistics(Database& database, const ResultSchema& results,
 /// Replaces the row of `summary`.
 void replace_summary(const Database& database, const CampaignStatistics& statistics,
                      const ResultDigests& digests);
-[[nodiscard]] std::optional<Summary> read_summary(const Database& database);
 
 /// Replaces the rows of `run_warning`.
 void replace_warnings(Database& database, const ResultSchema& results,

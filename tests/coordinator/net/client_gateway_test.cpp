@@ -149,7 +149,7 @@ TEST(RequestParts, MakeARequestWhole) {
   EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 0, "abc"), start)), 3U);
   EXPECT_EQ(parts.size_held(), 6U);
   const auto outcome = parts.take("a", 1, test::part(6, 3, "def"), start);
-  EXPECT_EQ(std::get<RequestParts::Whole>(outcome).bytes, "abcdef");
+  EXPECT_EQ(std::get<std::string>(outcome), "abcdef");
   EXPECT_EQ(parts.size_held(), 6U);  // Until it has been read.
   parts.release(6);
   EXPECT_EQ(parts.size_held(), 0U);
@@ -159,10 +159,8 @@ TEST(RequestParts, OfSeveralConnectionsMayInterleave) {
   RequestParts parts;
   (void)parts.take("a", 1, test::part(4, 0, "ab"), start);
   (void)parts.take("b", 1, test::part(4, 0, "wx"), start);
-  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("a", 1, test::part(4, 2, "cd"), start)).bytes,
-            "abcd");
-  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("b", 1, test::part(4, 2, "yz"), start)).bytes,
-            "wxyz");
+  EXPECT_EQ(std::get<std::string>(parts.take("a", 1, test::part(4, 2, "cd"), start)), "abcd");
+  EXPECT_EQ(std::get<std::string>(parts.take("b", 1, test::part(4, 2, "yz"), start)), "wxyz");
 }
 
 TEST(RequestParts, OutOfOrderAreAskedForAgain) {
@@ -172,7 +170,7 @@ TEST(RequestParts, OutOfOrderAreAskedForAgain) {
   EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 0, "ab"), start)), 2U);  // Repeated.
   EXPECT_EQ(next_offset(parts.take("a", 1, test::part(6, 4, "ef"), start)), 2U);  // One is missing.
   const auto outcome = parts.take("a", 1, test::part(6, 2, "cdef"), start);
-  EXPECT_EQ(std::get<RequestParts::Whole>(outcome).bytes, "abcdef");
+  EXPECT_EQ(std::get<std::string>(outcome), "abcdef");
 }
 
 TEST(RequestParts, OfAnotherRequestTakeThePlaceOfTheFirst) {
@@ -198,8 +196,8 @@ TEST(RequestParts, TakeNoMoreMemoryThanTheyMay) {
   (void)parts.take("b", 1, test::part(4, 1, "bcd"), start);
   EXPECT_TRUE(is_refused(parts.take("c", 1, test::part(1, 0, "c"), start)));
   parts.release(4);
-  EXPECT_TRUE(std::holds_alternative<RequestParts::Whole>(
-      parts.take("c", 1, test::part(1, 0, "c"), start)));
+  EXPECT_TRUE(
+      std::holds_alternative<std::string>(parts.take("c", 1, test::part(1, 0, "c"), start)));
 }
 
 // Room is counted with the first part of a request.

@@ -40,10 +40,9 @@ class AuthenticatorTest : public ::testing::Test {
     for (const Domain domain : {Domain::workers, Domain::clients}) {
       routers_.emplace(domain, wire::make_router(context_, "bind", "tcp://127.0.0.1:*",
                                                  {.domain = domain, .keys = coordinator_}));
-      events_of_routers_.push_back(std::make_unique<wire::SocketEvents>(
-          context_, routers_.at(domain).handle(), failed_handshakes));
-      authenticator_->watch(domain,
-                            [source = events_of_routers_.back().get()] { return source->take(); });
+      events_of_routers_.emplace(
+          domain, std::make_unique<wire::SocketEvents>(context_, routers_.at(domain).handle(),
+                                                       failed_handshakes));
     }
   }
 
@@ -73,6 +72,9 @@ class AuthenticatorTest : public ::testing::Test {
                                          {routers_.at(Domain::workers).handle(), 0, ZMQ_POLLIN, 0},
                                          {routers_.at(Domain::clients).handle(), 0, ZMQ_POLLIN, 0}};
       zmq::poll(items, std::chrono::milliseconds(20));
+      for (const auto& [domain, events] : events_of_routers_) {
+        while (const auto event = events->take()) authenticator_->on_event(domain, *event, now_);
+      }
       authenticator_->serve(now_);
       peer.monitor.update(now_);
     }
@@ -115,7 +117,7 @@ class AuthenticatorTest : public ::testing::Test {
   zmq::context_t context_;
   std::unique_ptr<Authenticator> authenticator_;
   std::map<Domain, zmq::socket_t> routers_;
-  std::vector<std::unique_ptr<wire::SocketEvents>> events_of_routers_;
+  std::map<Domain, std::unique_ptr<wire::SocketEvents>> events_of_routers_;
 };
 
 std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const std::string& role) {
