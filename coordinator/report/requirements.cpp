@@ -67,6 +67,12 @@ std::string count_lines(const RequirementAnswer& answer) {
          missing_lines(answer);
 }
 
+// Tables may show the quantity in another unit than that of the requirement.
+std::string limit_line(const RequirementAnswer& answer) {
+  if (answer.is_joint() || answer.subject.unit == "1") return "";
+  return fmt::format("Limit        {:.6g} {}\n", answer.limit, answer.subject.unit);
+}
+
 std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
   if (answer.is_joint()) return "";
@@ -188,8 +194,8 @@ Tone tone_of(RequirementVerdict verdict) {
 }
 
 std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
-  return fmt::format("Requirement  {}\nAnswer       {}\nRule         {}\n{}{}{}",
-                     wire::visible_text(answer.stated.requirement),
+  return fmt::format("Requirement  {}\n{}Answer       {}\nRule         {}\n{}{}{}",
+                     wire::visible_text(answer.stated.requirement), limit_line(answer),
                      in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
                      rule_text(answer), count_lines(answer), bound_line(answer),
                      needed_line(answer));

@@ -41,8 +41,8 @@ pid_t start_program(const ProgramStart& start) {
   sigaddset(&defaulted, SIGPIPE);
   posix_spawnattr_setsigdefault(&attributes, &defaulted);
   const int group = start.has_own_group ? POSIX_SPAWN_SETPGROUP : 0;
-  posix_spawnattr_setflags(&attributes,
-                           static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | group));
+  posix_spawnattr_setflags(
+      &attributes, static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | group));
   const std::vector<char*> arguments = pointers_to(start.arguments);
   std::vector<char*> environment;
   if (start.environment) environment = pointers_to(*start.environment);

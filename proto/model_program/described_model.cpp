@@ -213,7 +213,14 @@ DescribedModel::DescribedModel(ProgramDescription description,
 
 std::string DescribedModel::why_no_runs() const {
   if (program_) return {};
-  if (!is_imported()) return "its program is not here; name it with --model-program";
+  if (!is_imported()) {
+    const auto other = std::ranges::find_if(models(), [this](const Model* model) {
+      return name_of_model(model->version()) == name_of_model(version());
+    });
+    const std::string version_here =
+        other == models().end() ? "" : fmt::format(" ({} is)", (*other)->version());
+    return fmt::format("its program is not here{}; name it with --model-program", version_here);
+  }
   return fmt::format("its results were imported from {}; no more can be computed",
                      parts_.imported_from);
 }

@@ -140,9 +140,12 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
 
 std::string check_text(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
                        const Outlook& outlook, const CostEstimate& cost) {
-  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {} of {} {}\n{}\n{}\n{}",
-                     options.file.string(), campaign.name, campaign.seed, campaign.num_runs,
-                     plan.num_steps(), campaign.model().step_name(),
+  // The steps of a model program are its own.
+  const std::string steps = plan.num_steps() == 1 ? std::string()
+                                                  : fmt::format(" of {} {}", plan.num_steps(),
+                                                                campaign.model().step_name());
+  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {}{}\n{}\n{}\n{}",
+                     options.file.string(), campaign.name, campaign.seed, campaign.num_runs, steps,
                      outlook_text(options, campaign, outlook), cost_text(cost),
                      differences_text(campaign));
 }
