@@ -11,9 +11,7 @@
 #include <utility>
 
 #include "core/campaign/law_keys.hpp"
-#include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
-#include "core/model.hpp"
 
 namespace proofmass {
 namespace {
@@ -187,14 +185,14 @@ void check_columns(const Definition& definition, TableColumns columns) {
       definition.table_columns.size()));
 }
 
-std::vector<std::vector<double>> read_table_columns(const LawSet& set, DataFiles& files,
-                                                    const Campaign& campaign) {
+std::vector<std::vector<double>> read_table_columns(
+    const LawSet& set, const Campaign& campaign,
+    const std::function<std::vector<double>(const Dispersion& law, const std::string& path)>&
+        rows_of) {
   std::vector<std::vector<double>> columns;
   const std::uint64_t realisations = campaign.num_realisations();
   for (const std::size_t element : table_elements(set.laws)) {
-    const Dispersion& law = set.laws[element];
-    std::vector<double> rows = parse_column(files.text_of(law.file, set.path_of(element) + ".file"),
-                                            files.name_of(law.file), law.column);
+    std::vector<double> rows = rows_of(set.laws[element], set.path_of(element));
     if (realisations == 1) {
       columns.push_back(std::move(rows));
       continue;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,6 @@
 
 namespace proofmass {
 
-class DataFiles;  // Those who have some include core/model.hpp.
 class Document;
 
 // What is wrong is remembered by the document, and found by Document::check().
@@ -40,9 +40,10 @@ void check_columns(const Definition& definition, TableColumns columns);
 
 /// The values of `table` laws for each run, as in Campaign::table_columns. A row of a file is the
 /// value of one draw.
-/// @throws DefinitionError naming file, line and reason.
-[[nodiscard]] std::vector<std::vector<double>> read_table_columns(const LawSet& set,
-                                                                  DataFiles& files,
-                                                                  const Campaign& campaign);
+/// @param rows_of  Reads the column of a law, whose table is at `path`; what it throws is thrown.
+[[nodiscard]] std::vector<std::vector<double>> read_table_columns(
+    const LawSet& set, const Campaign& campaign,
+    const std::function<std::vector<double>(const Dispersion& law, const std::string& path)>&
+        rows_of);
 
 }  // namespace proofmass

@@ -8,13 +8,19 @@
 set(PROOFMASS_SOURCES ${CMAKE_CURRENT_LIST_DIR}/../..)
 function(proofmass_add_programs)
   cmake_parse_arguments(PARSE_ARGV 0 programs "" "NAME;MODEL" "")
+  set(further_models ${CMAKE_CURRENT_BINARY_DIR}/${programs_NAME}/further_models.cpp)
+  file(CONFIGURE OUTPUT ${further_models} @ONLY CONTENT [[
+#include "core/microscope/microscope_model.hpp"
+
+std::vector<const proofmass::Model*> proofmass::further_models() { return {&microscope_model()}; }
+]])
   set(proofmass_main coordinator/cli/main.cpp)
   set(proofmass-coordinator_main coordinator/cli/coordinator_main.cpp)
   set(proofmass-worker_main worker/main.cpp)
   foreach(program proofmass proofmass-coordinator proofmass-worker)
     set(target ${programs_NAME}_${program})
     add_executable(${target} ${PROOFMASS_SOURCES}/${${program}_main}
-      ${PROOFMASS_SOURCES}/core/microscope/further_model.cpp)
+      ${further_models})
     set_target_properties(${target} PROPERTIES
       OUTPUT_NAME ${program} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${programs_NAME})
     target_link_libraries(${target} PRIVATE proofmass::cli proofmass::worker_program proofmass::microscope

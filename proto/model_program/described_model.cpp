@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/campaign/expression.hpp"
+#include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/entry.hpp"
 #include "core/definition/law_reader.hpp"
@@ -279,7 +280,11 @@ std::unique_ptr<Campaign> DescribedModel::read_campaign(Document& document,
   campaign->read(document);
   try {
     campaign->validate_without_columns();
-    campaign->table_columns = read_table_columns(campaign->law_set(), files, *campaign);
+    campaign->table_columns = read_table_columns(
+        campaign->law_set(), *campaign, [&](const Dispersion& law, const std::string& path) {
+          return parse_column(files.text_of(law.file, path + ".file"), files.name_of(law.file),
+                              law.column);
+        });
     campaign->validate();
     check_independence(campaign->law_set(), *campaign);
     program().check(*campaign);

@@ -31,9 +31,10 @@ bool matches(const std::string& text, const char* pattern) {
 constexpr std::array<std::string_view, 11> core_order{
     "error",    "runs",       "math",  "random",       "signal",    "statistics",
     "campaign", "definition", "model", "result_rules", "microscope"};
-constexpr std::array<std::string_view, 12> microscope_order{
-    "orbit",      "environment", "session",    "results",    "instrument", "control",
-    "estimation", "campaign",    "simulation", "definition", "planning",   "microscope_model"};
+constexpr std::array<std::string_view, 13> microscope_order{
+    "orbit",    "environment",      "session",       "results",    "instrument",
+    "control",  "estimation",       "campaign",      "simulation", "definition",
+    "planning", "microscope_model", "built_in_model"};
 
 // `signal` for `core/signal/window.hpp` in `core`, empty for what is not in the folder.
 std::string part_of(const std::string& path, std::string_view folder) {

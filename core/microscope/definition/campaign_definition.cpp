@@ -169,7 +169,11 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     document.check();
   }
   read_environment(campaign, files);
-  campaign.table_columns = read_table_columns(law_set(campaign.dispersions), files, campaign);
+  campaign.table_columns = read_table_columns(
+      law_set(campaign.dispersions), campaign, [&](const Dispersion& law, const std::string& path) {
+        return parse_column(files.text_of(law.file, path + ".file"), files.name_of(law.file),
+                            law.column);
+      });
   try {
     campaign.validate();
     check_magnitudes(campaign);

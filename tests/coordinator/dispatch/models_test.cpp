@@ -72,7 +72,7 @@ TEST_F(ModelsTest, MustComputeWhatTheyDidWhereTheCampaignBegan) {
   EXPECT_EQ(reject.reason(), proto::REJECT_REASON_INCOMPATIBLE);
   EXPECT_EQ(reject.text(), "reference_digest of " + std::string(model_version) +
                                " = 0000000000000123 (must be 0000000000abcdef, where its campaign "
-                               "began)");
+                               "began, unless that has tolerate_digest = true)");
   EXPECT_FALSE(state.workers.contains(first));
   (void)outbox.take_events();
   // The other campaign of this version began with it.

@@ -101,7 +101,7 @@ TEST(RecordedModel, IsOneForOneText) {
 /// As many quantities, each of which is the next one.
 std::string chain(int count) {
   std::string drawn = R"({"name": "scale", "law": "fixed", "value": 3})";
-  for (int i = count; i > 0; --i) {
+  for (int i = 1; i <= count; ++i) {
     const std::string next = i == count ? "scale" : fmt::format("x{}", i + 1);
     drawn += fmt::format(R"(,{{"name": "x{}", "law": "derived", "expression": "{}"}})", i, next);
   }
