@@ -32,8 +32,7 @@ int import_file(const ImportOptions& options) {
 
 void add_import(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ImportOptions>(
-      app, chosen, "import", "Make a database of results that another program computed",
-      import_file);
+      app, chosen, "import", "Make a database of another program's results", import_file);
   command.footer(exit_codes_text({exit_interrupted}));
   command.add_option("RESULTS", options.results, "CSV with truths and estimates, a line a run")
       ->required();
