@@ -185,7 +185,11 @@ class ResultColumns {
     if (column.may_be_missing && std::ranges::find(others, cell) != std::end(others)) {
       return std::numeric_limits<double>::quiet_NaN();
     }
-    return reader_.number(column.position, headings_[column.position]);
+    const std::string& heading = headings_[column.position];
+    const double value = reader_.number(column.position, heading);
+    if (column.may_be_missing || is_in_range(value)) return value;
+    reader_.refuse(fmt::format("{} = {} (must be in [-{:g}, {:g}])", heading, value, magnitude_max,
+                               magnitude_max));
   }
 
   CsvReader reader_;

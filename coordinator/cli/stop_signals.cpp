@@ -6,6 +6,7 @@
 #include <stop_token>
 
 #include "coordinator/cli/program.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
@@ -53,9 +54,11 @@ int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
   try {
     return work([&stop] { return stop != StopRequest::none; });
   } catch (const Interrupted&) {
-    wire::say("proofmass: interrupted\n");
-    return exit_interrupted;
+  } catch (const StoreError&) {  // As which an interruption leaves a database that is being made.
+    if (stop == StopRequest::none) throw;
   }
+  wire::say("proofmass: interrupted\n");
+  return exit_interrupted;
 }
 
 SignalThread::SignalThread() {

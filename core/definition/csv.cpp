@@ -38,8 +38,10 @@ std::size_t CsvReader::position_of(std::string_view heading) const {
   if (match == cells_.end()) {
     const std::optional<std::string> nearest =
         nearest_name(heading, std::set<std::string>(cells_.begin(), cells_.end()));
-    refuse(fmt::format("no column \"{}\"{}", heading,
-                       nearest ? "; nearest is \"" + *nearest + "\"" : ""));
+    const bool is_one = cells_.size() == 1;
+    refuse(fmt::format("no column \"{}\"{}{}", heading,
+                       nearest ? "; nearest is \"" + *nearest + "\"" : "",
+                       is_one ? "; commas separate columns" : ""));
   }
   if (std::ranges::count(cells_, heading) > 1) {
     refuse(fmt::format("two columns \"{}\"", heading));
@@ -48,8 +50,10 @@ std::size_t CsvReader::position_of(std::string_view heading) const {
 }
 
 double CsvReader::number(std::size_t position, std::string_view heading) const {
-  const std::string_view cell = cells_[position];
+  std::string_view cell = cells_[position];
   double value = 0.0;
+  if (cell.starts_with('+') && !cell.starts_with("+-"))
+    cell.remove_prefix(1);  // As other programs write it.
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (error != std::errc() || end != cell.data() + cell.size()) {
     refuse(fmt::format("{} = \"{}\" (must be a number)", heading, cell.substr(0, 40)));
@@ -60,6 +64,7 @@ double CsvReader::number(std::size_t position, std::string_view heading) const {
 
 void CsvReader::expect_cells(std::size_t num_cells) const {
   if (cells_.size() == num_cells) return;
+  if (cells_.size() == 1 && cells_.front().empty()) refuse("the line is empty");
   refuse(fmt::format("{} cells (must be {})", cells_.size(), num_cells));
 }
 
