@@ -312,8 +312,8 @@ bool check_publication(const path& archive, const VerifyOptions& options,
   campaign.name = "campaign";
   report(sums);
   report(campaign);
-  const bool hold = sums.verdict == CheckOutcome::holds && campaign.verdict == CheckOutcome::holds;
-  return verify(folder / database_name, options, report, is_stopped) && hold;
+  const bool fails = sums.verdict == CheckOutcome::fails || campaign.verdict == CheckOutcome::fails;
+  return verify(folder / database_name, options, report, is_stopped) && !fails;
 }
 
 }  // namespace proofmass::coordinator

@@ -30,8 +30,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t schema_size_max = std::size_t{1} << 20;
 constexpr std::size_t results_size_max = std::size_t{2} << 30;
-constexpr std::size_t inputs_max =
-    900;  // With the truths of all quantities, less than a model has.
+constexpr std::size_t inputs_max = 900;  // A model draws 1,000 at most, and the truths are of them.
 
 /// Columns of a quantity, by their headings.
 struct QuantityColumns {

@@ -54,7 +54,8 @@ int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
   try {
     return work([&stop] { return stop != StopRequest::none; });
   } catch (const Interrupted&) {
-  } catch (const StoreError&) {  // As which an interruption leaves a database that is being made.
+  } catch (const StoreError&) {
+    // A database that is being made says so of whatever ends its making.
     if (stop == StopRequest::none) throw;
   }
   wire::say("proofmass: interrupted\n");

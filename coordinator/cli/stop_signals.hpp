@@ -21,7 +21,8 @@ enum class OnTerminate : std::uint8_t { stop_now, drain };
 /// as long as the process.
 [[nodiscard]] const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate);
 
-/// Does what reads a database and may take long; SIGINT and SIGTERM end it in order.
+/// Does what reads or makes a database and may take long; SIGINT and SIGTERM end it in order: what
+/// they make it throw, an Interrupted or a StoreError, is no failure.
 /// @return The ExitCode of `work`, or exit_interrupted.
 [[nodiscard]] int run_until_stopped(const std::function<int(const IsStopped&)>& work);
 

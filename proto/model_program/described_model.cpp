@@ -18,6 +18,7 @@
 #include "core/math/hash.hpp"
 
 namespace proofmass::wire {
+
 DescribedCampaign::DescribedCampaign(const DescribedModel& of) : model_(&of) {
   name = name_of_model(of.version());
   for (const ProgramParameter& parameter : description().parameters) {
@@ -216,7 +217,8 @@ std::string DescribedModel::why_no_runs() const {
   if (program_) return {};
   if (!is_imported()) {
     const auto other = std::ranges::find_if(models(), [this](const Model* model) {
-      return name_of_model(model->version()) == name_of_model(version());
+      return name_of_model(model->version()) == name_of_model(version()) &&
+             model->version() != version();
     });
     const std::string version_here =
         other == models().end() ? "" : fmt::format(" ({} is)", (*other)->version());

@@ -11,6 +11,7 @@
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/worker_processes.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
@@ -131,6 +132,25 @@ TEST_F(SignalThreadTest, LeavesSignalsAsTheyWere) {
   const std::atomic<StopRequest>& request = catch_stop_signals(OnTerminate::drain);
   (void)raise(signal);
   _exit(static_cast<int>(request.load()));
+}
+
+/// Ends this process with the exit code of work that a database ends, after a signal or without
+/// one; 99 if its error is thrown.
+[[noreturn]] void exit_after_store_error(bool is_interrupted) {
+  try {
+    _exit(run_until_stopped([=](const IsStopped&) -> int {
+      if (is_interrupted) (void)raise(SIGINT);
+      throw StoreError("campaign database = a.db (interrupted)");
+    }));
+  } catch (const StoreError&) {
+    _exit(99);
+  }
+}
+
+TEST(StopSignalsDeathTest, MakeWhatADatabaseThenSaysAnInterruption) {
+  EXPECT_EXIT(exit_after_store_error(true), testing::ExitedWithCode(exit_interrupted),
+              "proofmass: interrupted");
+  EXPECT_EXIT(exit_after_store_error(false), testing::ExitedWithCode(99), "");
 }
 
 testing::ExitedWithCode ends_with(StopRequest request) {

@@ -13,6 +13,8 @@ namespace {
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
 
 /// A description of `ruler-1` in which one key is another one.
 std::string description(const std::string& instead = {}) {
@@ -112,6 +114,31 @@ TEST(RecordedModel, FollowsAChainOfExpressionsThatTheStackHolds) {
   EXPECT_THAT(example_of(ruler(description(chain(64))))->draw(RunIndex{0}).values, Each(3.0));
   EXPECT_THAT(refusal_of(description(chain(66))),
               HasSubstr("more than 64 need one another in a row"));
+}
+
+TEST(RecordedModel, HasNoDrawWhereAnExpressionHasNoValue) {
+  const std::string drawn =
+      R"("drawn": [{"name": "scale", "law": "fixed", "value": 3},)"
+      R"({"name": "x", "law": "derived", "expression": "1 / (scale - 3) + 0"}])";
+  EXPECT_THAT(example_of(ruler(description(drawn)))->draw(RunIndex{0}).values, IsEmpty());
+}
+
+// Sobol's sequence has no more dimensions.
+TEST(RecordedModel, HasADesignForAsManyQuantitiesAsThereAreDimensions) {
+  const auto validate = [](int count) {
+    std::string drawn = R"({"name": "scale", "law": "fixed", "value": 3})";
+    for (int i = 1; i < count; ++i) {
+      drawn += fmt::format(R"(,{{"name": "x{}", "law": "fixed", "value": 1}})", i);
+    }
+    const Model& model = ruler(description(R"("drawn": [)" + drawn + "]"));
+    DescribedCampaign campaign(static_cast<const DescribedModel&>(model));
+    campaign.num_runs = 64;
+    campaign.design = {.kind = DesignKind::sobol, .points = 32};
+    campaign.validate();
+  };
+  EXPECT_NO_THROW(validate(256));
+  EXPECT_THAT([&] { validate(257); },
+              ThrowsMessage<ConfigError>(HasSubstr("more than 256 drawn quantities")));
 }
 
 // Whoever reads a database of them need not have the file.
