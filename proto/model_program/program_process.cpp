@@ -76,8 +76,6 @@ std::string ProgramProcess::how_it_ended() {
 }
 
 void ProgramProcess::fail(std::string_view reason) const {
-  // Whoever ends by this error may do so without destructors.
-  if (process_id_ != 0) kill(process_id_, SIGKILL);
   throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
 }
 
