@@ -213,6 +213,7 @@ void Scenario::validate() const {
   estimation_method(estimation.method).check(sessions);
   check_test(*this);
   check_resonator(*this);
+  if (realism) realism->validate();
   gaps.validate(sessions, simulation.sample_period_s);
   check_transient(*this);
   check_band(*this);

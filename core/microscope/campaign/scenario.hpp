@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "core/campaign/field.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/control/control_config.hpp"
+#include "core/microscope/control/realism_config.hpp"
 #include "core/microscope/environment/environment_config.hpp"
 #include "core/microscope/estimation/estimation_config.hpp"
 #include "core/microscope/instrument/instrument_config.hpp"
@@ -30,7 +32,8 @@ struct Scenario {
   DragFreeConfig drag_free;
   AttitudeConfig attitude;
   SensorConfig sensor;
-  GapsConfig gaps;  ///< Of campaigns that test.
+  GapsConfig gaps;                       ///< Of campaigns that test.
+  std::optional<RealismConfig> realism;  ///< Of campaigns that have the table.
   EstimationConfig estimation;
   AcceptanceConfig acceptance;    ///< Bounds outside which an instrument is drawn again.
   BudgetConfig budget;            ///< Levels behind the error budget; the simulation uses none.
@@ -51,9 +54,9 @@ struct Scenario {
 };
 
 /// Calls visit(FieldInfo, value) for every number and choice of the scenario except its sessions,
-/// in file order; for those of a test only if the scenario has_tests(). `Config` is Scenario or
-/// const Scenario; the value is a (const) reference to double, std::int64_t or one of the
-/// enumerations above.
+/// in file order; for those of a test only if the scenario has_tests(), for those of its realism
+/// only if it has that. `Config` is Scenario or const Scenario; the value is a (const) reference to
+/// double, std::int64_t or one of the enumerations above.
 template <typename Config, typename Visitor>
 void for_each_field(Config& scenario, Visitor&& visit);
 

@@ -196,6 +196,50 @@ void visit_gaps(Config& gaps, Visitor& visit) {
 }
 
 template <typename Config, typename Visitor>
+void visit_realism(Config& realism, Visitor& visit) {
+  const auto number = [&](std::string_view path, std::string_view comment, auto& value,
+                          const Range& range = range::any) {
+    visit(FieldInfo{path, comment, range}, value);
+  };
+  const auto size = [&](std::string_view path, std::string_view comment, auto& value) {
+    visit(FieldInfo{path, comment, range::not_negative}, value);
+  };
+  size("realism.star_tracker_orbital_error_rad", "At f_orb, about each axis of S.",
+       realism.star_tracker_orbital_error_rad);
+  number("realism.star_tracker_orbital_phase_rad", "Sine from the campaign's start.",
+         realism.star_tracker_orbital_phase_rad);
+  number("realism.star_tracker_latency_samples", "Age of its angles.",
+         realism.star_tracker_latency_samples, range::between(0, 240));
+  size("realism.thrust_limit_m_s2", "Of an axis; 0 for none.", realism.thrust_limit_m_s2);
+  size("realism.thrust_quantum_m_s2", "Its step; 0 for none.", realism.thrust_quantum_m_s2);
+  size("realism.torque_limit_rad_s2", "Of an axis; 0 for none.", realism.torque_limit_rad_s2);
+  size("realism.torque_quantum_rad_s2", "Its step; 0 for none.", realism.torque_quantum_rad_s2);
+  size("realism.actuation_lag_s", "Time constant of thrust and torque.", realism.actuation_lag_s);
+  size("realism.mass_kg", "Of the satellite.", realism.mass_kg);
+  size("realism.inertia_xx_kg_m2", "0 for no dynamics of rotation.", realism.inertia_kg_m2[0]);
+  size("realism.inertia_yy_kg_m2", "Of the satellite.", realism.inertia_kg_m2[1]);
+  size("realism.inertia_zz_kg_m2", "Of the satellite.", realism.inertia_kg_m2[2]);
+  number("realism.inertia_xy_kg_m2", "Element of the tensor.", realism.inertia_products_kg_m2[0]);
+  number("realism.inertia_xz_kg_m2", "Element of the tensor.", realism.inertia_products_kg_m2[1]);
+  number("realism.inertia_yz_kg_m2", "Element of the tensor.", realism.inertia_products_kg_m2[2]);
+  number("realism.thrust_arm_x_m", "Place where thrust acts.", realism.thrust_arm_m[0]);
+  number("realism.thrust_arm_y_m", "From the centre of mass.", realism.thrust_arm_m[1]);
+  number("realism.thrust_arm_z_m", "In S.", realism.thrust_arm_m[2]);
+  const Range small = range::between(-0.5, 0.5);
+  number("realism.sensor_1_angular_scale_error", "Of its angular measurement.",
+         realism.angular_scale_error[0], small);
+  number("realism.sensor_2_angular_scale_error", "Of its angular measurement.",
+         realism.angular_scale_error[1], small);
+  number("realism.angular_alignment", "Part of a sensor's misalignment in it.",
+         realism.angular_alignment, range::between(0.0, 1.0));
+  const Range slow = range::between(-1e-9, 1e-9);
+  number("realism.sensor_1_bias_drift_m_s3", "On each axis.", realism.bias_drift_m_s3[0], slow);
+  number("realism.sensor_2_bias_drift_m_s3", "On each axis.", realism.bias_drift_m_s3[1], slow);
+  number("realism.sensor_1_scale_drift_per_s", "On each axis.", realism.scale_drift_per_s[0], slow);
+  number("realism.sensor_2_scale_drift_per_s", "On each axis.", realism.scale_drift_per_s[1], slow);
+}
+
+template <typename Config, typename Visitor>
 void visit_estimation(Config& estimation, Visitor& visit) {
   visit(FieldInfo{"estimation.method",
                   "\"hardy2013\": one parameter a session, iterated; \"joint\": all at once."},
@@ -271,6 +315,7 @@ void for_each_field(Config& scenario, Visitor&& visit) {
   detail::visit_control(scenario, visit);
   detail::visit_sensor(scenario.sensor, visit);
   if (scenario.has_tests()) detail::visit_gaps(scenario.gaps, visit);
+  if (scenario.realism) detail::visit_realism(*scenario.realism, visit);
   detail::visit_estimation(scenario.estimation, visit);
   detail::visit_tables(scenario, visit);
 }

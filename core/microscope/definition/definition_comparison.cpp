@@ -25,7 +25,9 @@ class Comparison {
   std::vector<DefinitionDifference> run() {
     compare_sampling();
     const bool have_tests = first_.scenario.has_tests() && second_.scenario.has_tests();
-    compare_entries("", fields_of(first_, have_tests), fields_of(second_, have_tests));
+    const bool is_any_realistic = first_.scenario.realism || second_.scenario.realism;
+    compare_entries("", fields_of(first_, have_tests, is_any_realistic),
+                    fields_of(second_, have_tests, is_any_realistic));
     compare_sessions();
     compare_environment();
     compare_dispersions();
@@ -51,7 +53,9 @@ class Comparison {
 
   // More runs extend a campaign; the values of data files are compared, not their names.
   // What one of them alone can have is left to the comparison of sessions.
-  static std::vector<Entry> fields_of(const MicroscopeCampaign& campaign, bool with_tests) {
+  static std::vector<Entry> fields_of(MicroscopeCampaign campaign, bool with_tests,
+                                      bool with_realism) {
+    if (with_realism && !campaign.scenario.realism) campaign.scenario.realism.emplace();
     std::vector<Entry> entries = detail::scenario_entries(campaign);
     std::erase_if(entries, [](const Entry& entry) {
       static constexpr std::array<std::string_view, 5> left_out{

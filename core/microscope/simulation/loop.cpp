@@ -1,16 +1,11 @@
 #include "core/microscope/simulation/loop.hpp"
 
+#include "core/math/eigen_vectors.hpp"
 #include "core/microscope/control/star_tracker.hpp"
 #include "core/microscope/instrument/stiffness.hpp"
 
 namespace proofmass {
 namespace {
-
-Vector3<double> vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-Matrix3<double> matrix(const Eigen::Matrix3d& m) {
-  return {{vector(m.row(0)), vector(m.row(1)), vector(m.row(2))}};
-}
 
 /// s of q(t) = [θ]ᵀ e_a s Δ_TM sin(2π f t) for each mass.
 std::array<double, 2> motion_factors(MassMotion motion) {
@@ -55,13 +50,13 @@ SensorModel<double> make_sensor_model(const Sensor& sensor,
   // measured_acceleration() applies [M] to Γ_App + p, so only the last two terms with p are
   // constant.
   const Eigen::Vector3d& p = sensor.parasitic_K_m_s2;
-  return {.rest_position_S_m = vector(rest_position_S_m),
-          .motion_direction_S = vector(directions_S[0]),
-          .second_direction_S = vector(directions_S[1]),
-          .parasitic_K_m_s2 = vector(p),
-          .offset_K_m_s2 = vector(sensor.read_out_bias_K_m_s2 - sensor.symmetric_part() * p),
-          .sensitivity_KS = matrix(sensor.sensitivity_KS()),
-          .quadratic_s2_m = vector(sensor.quadratic_s2_m)};
+  return {.rest_position_S_m = vector3(rest_position_S_m),
+          .motion_direction_S = vector3(directions_S[0]),
+          .second_direction_S = vector3(directions_S[1]),
+          .parasitic_K_m_s2 = vector3(p),
+          .offset_K_m_s2 = vector3(sensor.read_out_bias_K_m_s2 - sensor.symmetric_part() * p),
+          .sensitivity_KS = matrix3(sensor.sensitivity_KS()),
+          .quadratic_s2_m = vector3(sensor.quadratic_s2_m)};
 }
 
 std::array<double, 2> drag_free_weights(DragFreeSource source) {
@@ -98,13 +93,13 @@ LoopConstants<double> make_loop_constants(const Instrument& instrument, const Sc
   }
   constants.sensor_range_m_s2 = scenario.sensor.range_m_s2;
   constants.drag_free_weight = weights;
-  constants.subtracted_bias_S_m_s2 = vector(subtracted_bias);
-  constants.thrust_matrix = matrix(instrument.thrust_matrix);
-  constants.angular_bias_S_rad_s2 = vector(instrument.angular_bias_S_rad_s2);
+  constants.subtracted_bias_S_m_s2 = vector3(subtracted_bias);
+  constants.thrust_matrix = matrix3(instrument.thrust_matrix);
+  constants.angular_bias_S_rad_s2 = vector3(instrument.angular_bias_S_rad_s2);
   const StarTracker star_tracker =
       make_star_tracker(scenario.noise, scenario.simulation.sample_period_s);
   constants.star_tracker_bias_S_rad =
-      vector(star_tracker.fused_bias_S(instrument.star_tracker_bias_S_rad));
+      vector3(star_tracker.fused_bias_S(instrument.star_tracker_bias_S_rad));
   return constants;
 }
 

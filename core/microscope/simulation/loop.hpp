@@ -33,6 +33,7 @@ struct Observation {
   std::array<Vector3<T>, 2> measured_K;  ///< Γ_mes,k, each in its sensor's frame, m/s².
   std::array<T, 2> kinematic_S_x;        ///< Γ_App,k + p_k along X, m/s².
   Vector3<T> measured_omega_dot_IS_S;    ///< rad/s².
+  Vector3<T> star_tracker_RS_S;          ///< Fused angles with what the session adds to them, rad.
   AttitudeEstimator<T> attitude;         ///< With the commanded motion still in its angles.
 };
 
@@ -62,6 +63,25 @@ struct AsMeasured {
   }
 };
 
+/// Star tracker, thrusters and satellite as the paper has them: Loop::advance() says where each
+/// acts.
+struct Hardware {
+  template <typename T>
+  PROOFMASS_INLINE void begin_sample(const LoopConstants<T>& /*constants*/) const {}
+  template <typename T>
+  PROOFMASS_INLINE const Vector3<T>& seen(const Vector3<T>& angle_RS_S) const {
+    return angle_RS_S;
+  }
+  template <typename T>
+  PROOFMASS_INLINE const Vector3<T>& measured(const Vector3<T>& omega_dot_IS_S) const {
+    return omega_dot_IS_S;
+  }
+  template <typename T>
+  PROOFMASS_INLINE void actuate(const LoopConstants<T>& /*constants*/,
+                                const Vector3<T>& /*omega_IS_S*/, const Vector3<T>& /*thrust_S*/,
+                                const Vector3<T>& /*torque_S*/) const {}
+};
+
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
 /// section 5.1).
 ///
@@ -73,7 +93,7 @@ template <typename T>
 struct Loop {
   Quaternion<T> attitude_IS;    ///< True attitude.
   Vector3<T> omega_IS_S;        ///< Ω, rad/s.
-  Vector3<T> thrust_command_S;  ///< Γ_DF of the sample before, m/s².
+  Vector3<T> thrust_command_S;  ///< Γ_DF of the sample before, as it acts now, m/s².
   Vector3<T> torque_command_S;  ///< Angular acceleration of the sample before, rad/s².
   DragFreeController<T> drag_free;
   AttitudeEstimator<T> estimator;  ///< With the commanded motion in its angles.
@@ -125,31 +145,24 @@ struct Loop {
     return error_angles(conjugate(reference_IR) * attitude_IS);
   }
 
-  /// The fused angles that the star tracker reports, with what the session adds to them, rad.
-  template <typename Shared>
-  PROOFMASS_INLINE Vector3<T> star_tracker_RS_S(const LoopConstants<T>& constants,
-                                                const SharedSampleOf<Shared>& shared,
-                                                const SampleNoise<T>& noise) const {
-    return angle_RS_S(shared) + constants.star_tracker_bias_S_rad + noise.star_tracker_S +
-           broadcast<T>(shared.attitude_command_S_rad);
-  }
-
   /// Advances by one sample.
   ///
   /// @param shared  Of this sample; what all runs have in common, or each lane its own.
   /// @param noise   Of this sample; its scale is in it already.
   /// @param violation  NoViolation, or a Violation in a session that tests.
   /// @param shaping  Of what the drag-free controller gets: AsMeasured, or that of a Resonator.
+  /// @param hardware  Hardware, or a Realism.
   /// @tparam masses  `at_rest` only in a session that moves no test mass.
   /// @returns What instrument and estimator report at this sample.
   template <TestMasses masses = TestMasses::moving, typename Shared, typename Fall = NoViolation,
-            typename Shaping = AsMeasured>
+            typename Shaping = AsMeasured, typename Hardware = proofmass::Hardware>
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
                                           const SharedSampleOf<Shared>& shared,
                                           const SampleNoise<T>& noise, Watch watch = Watch::yes,
-                                          const Fall& violation = {}, const Shaping& shaping = {}) {
+                                          const Fall& violation = {}, const Shaping& shaping = {},
+                                          Hardware&& hardware = {}) {
     const SatelliteMotion<T> satellite = motion(constants, shared, noise);
 
     Observation<T> observation;
@@ -174,10 +187,13 @@ struct Loop {
       const T limit = limit_where_above(largest_acceleration, constants.sensor_range_m_s2);
       for (Vector3<T>& measured : observation.measured_K) measured = clamped(measured, limit);
     }
-    observation.measured_omega_dot_IS_S =
-        satellite.omega_dot_IS_S + constants.angular_bias_S_rad_s2 + noise.angular_S;
+    observation.measured_omega_dot_IS_S = hardware.measured(satellite.omega_dot_IS_S) +
+                                          constants.angular_bias_S_rad_s2 + noise.angular_S;
 
-    estimator.correct(attitude_gains, star_tracker_RS_S(constants, shared, noise));
+    observation.star_tracker_RS_S = hardware.seen(angle_RS_S(shared)) +
+                                    constants.star_tracker_bias_S_rad + noise.star_tracker_S +
+                                    broadcast<T>(shared.attitude_command_S_rad);
+    estimator.correct(attitude_gains, observation.star_tracker_RS_S);
     observation.attitude = estimator;
     if (watch == Watch::yes) largest_angle = largest_magnitude(estimator.angle_RS_S, largest_angle);
     torque_command_S = controller.advance(attitude_gains, estimator);
@@ -190,6 +206,7 @@ struct Loop {
                                          broadcast<T>(shared.drag_free_command_S_m_s2);
     thrust_command_S = drag_free.advance(drag_free_gains, shaping(drag_free_input_S));
     rotate(satellite.omega_dot_IS_S, attitude_gains.sample_period_s);
+    hardware.actuate(constants, omega_IS_S, thrust_command_S, torque_command_S);
     return observation;
   }
 

@@ -130,9 +130,8 @@ constexpr std::array attitude_rows{
 };
 
 constexpr std::array star_tracker_rows{
-    vector_row(
-        "angle_RS_S_", rad, "S", "fused angles as reported, with the commanded ones added",
-        [](const Sample& s) { return s.loop.star_tracker_RS_S(s.constants, s.shared, s.noise); }),
+    vector_row("angle_RS_S_", rad, "S", "fused angles as reported, with the commanded ones added",
+               [](const Sample& s) { return s.observation.star_tracker_RS_S; }),
 };
 
 constexpr std::array environment_rows{

@@ -16,6 +16,7 @@
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
 #include "core/microscope/simulation/gpu/device_simulation.hpp"
+#include "core/microscope/simulation/realism.hpp"
 #include "core/microscope/simulation/recorded_signals.hpp"
 #include "core/microscope/simulation/run_health.hpp"
 #include "core/microscope/simulation/run_parts.hpp"
@@ -104,15 +105,19 @@ struct RunPlan::Impl : RunParts {
     SessionSignals signals(scenario, session, orbit, environment);
     const LoopConstants<double> constants = make_loop_constants(instrument, scenario, session);
     SessionNoise session_noise(noise, campaign.seed, record.run, session.name);
+    Realism realism(scenario, instrument, constants, i, signals.num_settling());
     if (observer == nullptr) {
-      LaneGroup<double, SessionNoise> alone{.constants = constants, .noise = session_noise};
+      LaneGroup<double, SessionNoise, Realism> alone{.constants = constants,
+                                                     .noise = session_noise};
       alone.eotvos_parameter = instrument.eotvos_parameter;
+      alone.hardware = std::move(realism);
       record_session_alone(i, signals, alone, NoObserver{}, progress, record);
       return;
     }
-    LaneGroup<double, ObservedNoise> alone{.constants = constants,
-                                           .noise = ObservedNoise(std::move(session_noise))};
+    LaneGroup<double, ObservedNoise, Realism> alone{
+        .constants = constants, .noise = ObservedNoise(std::move(session_noise))};
     alone.eotvos_parameter = instrument.eotvos_parameter;
+    alone.hardware = std::move(realism);
     const double period_s = scenario.simulation.sample_period_s;
     const SessionObserver session_observer{.observe = *observer,
                                            .session = i,
@@ -126,9 +131,9 @@ struct RunPlan::Impl : RunParts {
   }
 
   template <typename Noise, typename Observer>
-  void record_session_alone(std::size_t i, SessionSignals& signals, LaneGroup<double, Noise>& alone,
-                            const Observer& observer, const SessionProgress& progress,
-                            RunRecord& record) const {
+  void record_session_alone(std::size_t i, SessionSignals& signals,
+                            LaneGroup<double, Noise, Realism>& alone, const Observer& observer,
+                            const SessionProgress& progress, RunRecord& record) const {
     Readers readers(*this, i);
     const std::vector<float> of_windows = window_weights(i, record.run);
     if (!of_windows.empty()) alone.test.window_weights.runs[0] = of_windows.data();
@@ -318,7 +323,7 @@ std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> reque
                                                const std::function<void(int)>& progress) const {
   PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunResult> results;
-  if (set == InstructionSet::scalar) {
+  if (set == InstructionSet::scalar || impl_->campaign.scenario.realism) {
     const int num_orbits_a_run = num_orbits();
     const auto num_runs = static_cast<int>(requests.size());
     for (int i = 0; i < num_runs; ++i) {

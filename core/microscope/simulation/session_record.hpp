@@ -245,7 +245,8 @@ PROOFMASS_INLINE void add_further(const std::array<T, num_signals>& values,
 }
 
 /// The runs that one T holds, in one session.
-template <typename T, typename Noise>
+/// @tparam Hardware  Of the loop.
+template <typename T, typename Noise, typename Hardware = proofmass::Hardware>
 struct LaneGroup {
   LoopConstants<T> constants;
   Noise noise;  ///< next() yields the SampleNoise<T> of each sample, settling included.
@@ -256,6 +257,7 @@ struct LaneGroup {
   T eotvos_parameter{};  ///< Acts in test sessions alone, as what follows.
   Resonator<T> resonator{};
   TestSums<T> test{};
+  [[no_unique_address]] Hardware hardware{};
 };
 
 /// What a session leaves of a run.
@@ -345,13 +347,14 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   const SignalSet recorded = kind.signals == SignalSet::all ? setup.signals : SignalSet::common;
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
-    for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, resonator, test] :
-         groups) {
+    for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, resonator, test,
+                hardware] : groups) {
+      hardware.begin_sample(constants);
       if constexpr (Observer::is_active) observer.begin_sample(loop);
       const auto observation = loop.template advance<kind.masses>(
           constants, setup.drag_free, setup.attitude, shared, noise.next(),
           k % 4 == 0 ? Watch::yes : Watch::no, violation_of<kind>(eotvos_parameter, setup, shared),
-          shaping_of<kind>(resonator, setup.resonator));
+          shaping_of<kind>(resonator, setup.resonator), hardware);
       if constexpr (Observer::is_active) {
         observer(shared, observation, ground_signals(observation, shared, setup.product));
       }
