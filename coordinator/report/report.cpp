@@ -14,13 +14,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// Lines as those of summary_text().
-std::string note_text(const Campaign& campaign) {
-  const std::string note = campaign.note();
-  if (note.empty()) return {};
-  return wire::visible_lines("Note      " + wrapped(note, 10, 10) + "\n");
-}
-
 std::string report_of_one_state(const Store& store, const Campaign& campaign, Paint paint) {
   const auto [results, check, given_up] = read_checked_results(store, campaign);
   const ResultSchema& schema = store.schema();
@@ -51,6 +44,12 @@ std::string report_text(const Store& store, const Campaign& campaign, Paint pain
   std::string text;
   store.read_one_state([&] { text = report_of_one_state(store, campaign, paint); });
   return text;
+}
+
+std::string note_text(const Campaign& campaign) {
+  const std::string note = campaign.note();
+  if (note.empty()) return {};
+  return wire::visible_lines("Note      " + wrapped(note, 10, 10) + "\n");
 }
 
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,

@@ -32,6 +32,9 @@ namespace proofmass::coordinator {
                                        std::string_view digest,
                                        DigestCheck check = DigestCheck::holds);
 
+/// Campaign::note() under its name, as lines of summary_text(); empty if there is none.
+[[nodiscard]] std::string note_text(const Campaign& campaign);
+
 /// The line that names the runs that were given up; empty if there are none.
 /// @param given_up  Ascending.
 [[nodiscard]] std::string given_up_text(std::span<const RunRange> given_up,

@@ -1,14 +1,18 @@
 #include "core/microscope/microscope_model.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <charconv>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
 
 #include "core/error.hpp"
 #include "core/microscope/campaign/budget.hpp"
+#include "core/microscope/campaign/loop_margins.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -57,6 +61,10 @@ ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
     schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
                              test_quantities().end());
   }
+  if (!scenario.has_plain_loops()) {
+    schema.health.insert(schema.health.end(), margin_quantities().begin(),
+                         margin_quantities().end());
+  }
   for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
   schema.budget_level = budget_level();
   if (has_errors && has_session_fits) add_session_fits(scenario.sessions, schema);
@@ -66,6 +74,16 @@ ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
 }  // namespace
 
 ResultSchema MicroscopeCampaign::results() const { return scenario_results(scenario, true); }
+
+std::string MicroscopeCampaign::note() const {
+  if (scenario.has_plain_loops()) return {};
+  const Margins margins = least(loop_margins(scenario, make_instrument({})));
+  return fmt::format(
+      "loops of the campaign file: with a perfect instrument, the least gain margin "
+      "of an axis is {:.3g}, the least phase margin {:.3g}°; each run has its own, "
+      "gain_margin and phase_margin_rad",
+      margins.gain, margins.phase_rad * 180.0 / std::numbers::pi);
+}
 
 std::vector<double> MicroscopeCampaign::objectives() const {
   std::vector<double> objectives(scenario.objectives.begin(), scenario.objectives.end());

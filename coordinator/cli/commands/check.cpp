@@ -14,6 +14,7 @@
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/shared_options.hpp"
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
@@ -119,6 +120,7 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
                  {"campaign", campaign.name},
                  {"seed", std::to_string(campaign.seed)},
                  {"num_runs", campaign.num_runs},
+                 {"note", campaign.note()},
                  {"num_steps", plan.num_steps()},
                  {"step_name", campaign.model().step_name()},
                  {"one_core_s", cost.one_core_s},
@@ -144,9 +146,9 @@ std::string check_text(const CheckOptions& options, const Campaign& campaign, co
   const std::string steps = plan.num_steps() == 1 ? std::string()
                                                   : fmt::format(" of {} {}", plan.num_steps(),
                                                                 campaign.model().step_name());
-  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {}{}\n{}\n{}\n{}",
+  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {}{}\n{}{}\n{}\n{}",
                      options.file.string(), campaign.name, campaign.seed, campaign.num_runs, steps,
-                     outlook_text(options, campaign, outlook), cost_text(cost),
+                     note_text(campaign), outlook_text(options, campaign, outlook), cost_text(cost),
                      differences_text(campaign));
 }
 

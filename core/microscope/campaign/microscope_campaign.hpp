@@ -50,6 +50,7 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] std::uint64_t num_realisations() const override { return realisations; }
   [[nodiscard]] SamplingDesign sampling_design() const override { return design; }
   [[nodiscard]] Interpretation interpretation() const override;
+  [[nodiscard]] std::string note() const override;
   [[nodiscard]] std::optional<ErrorBudget> error_budget() const override;
   [[nodiscard]] Warner warner() const override;
 };

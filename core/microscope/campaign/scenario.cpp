@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/microscope/campaign/loop_margins.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/session/session.hpp"
 
@@ -196,6 +197,42 @@ void check_resonator(const Scenario& scenario) {
   }
 }
 
+void check_controllers(const Scenario& scenario) {
+  const std::vector<ControllerConfig>& controllers = scenario.controllers;
+  for (std::size_t i = 0; i < controllers.size(); ++i) {
+    const std::string path = fmt::format("controller[{}]", i);
+    controllers[i].validate(path, scenario.simulation.sample_period_s);
+    for (std::size_t k = 0; k < i; ++k) {
+      if (controllers[k].loop != controllers[i].loop ||
+          controllers[k].axis != controllers[i].axis) {
+        continue;
+      }
+      throw ConfigError(path, names_of(controllers[i].axis)[index(controllers[i].axis)],
+                        fmt::format("that axis of the loop has one, controller[{}]", k));
+    }
+  }
+}
+
+// The paper's loops are judged by check_loop().
+void check_stability(const Scenario& scenario) {
+  if (scenario.has_plain_loops()) return;
+  for (const AxisMargins& of : loop_margins(scenario, make_instrument({}))) {
+    if (of.margins.gain > 0.0) continue;
+    std::string path = "realism.actuation_lag_s", value = "with the other terms";
+    for (std::size_t i = 0; i < scenario.controllers.size(); ++i) {
+      const ControllerConfig& controller = scenario.controllers[i];
+      if (controller.loop != of.loop || controller.axis != of.axis) continue;
+      path = fmt::format("controller[{}].gain", i);
+      value = fmt::format("{}", controller.gain);
+    }
+    throw ConfigError(path, value,
+                      fmt::format("makes the {} loop of axis {} unstable, even with a perfect "
+                                  "instrument",
+                                  names_of(of.loop)[static_cast<std::size_t>(of.loop) - 1],
+                                  names_of(of.axis)[index(of.axis)]));
+  }
+}
+
 }  // namespace
 
 void Scenario::validate() const {
@@ -214,6 +251,8 @@ void Scenario::validate() const {
   check_test(*this);
   check_resonator(*this);
   if (realism) realism->validate();
+  check_controllers(*this);
+  check_stability(*this);
   gaps.validate(sessions, simulation.sample_period_s);
   check_transient(*this);
   check_band(*this);

@@ -9,6 +9,7 @@
 #include "core/campaign/field.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/control/control_config.hpp"
+#include "core/microscope/control/controller.hpp"
 #include "core/microscope/control/realism_config.hpp"
 #include "core/microscope/environment/environment_config.hpp"
 #include "core/microscope/estimation/estimation_config.hpp"
@@ -32,8 +33,9 @@ struct Scenario {
   DragFreeConfig drag_free;
   AttitudeConfig attitude;
   SensorConfig sensor;
-  GapsConfig gaps;                       ///< Of campaigns that test.
-  std::optional<RealismConfig> realism;  ///< Of campaigns that have the table.
+  GapsConfig gaps;                            ///< Of campaigns that test.
+  std::optional<RealismConfig> realism;       ///< Of campaigns that have the table.
+  std::vector<ControllerConfig> controllers;  ///< Of an axis of a loop each; nominal where none is.
   EstimationConfig estimation;
   AcceptanceConfig acceptance;    ///< Bounds outside which an instrument is drawn again.
   BudgetConfig budget;            ///< Levels behind the error budget; the simulation uses none.
@@ -45,6 +47,9 @@ struct Scenario {
 
   /// True if a session tests the equivalence principle.
   [[nodiscard]] bool has_tests() const { return std::ranges::any_of(sessions, is_test); }
+
+  /// True if satellite and loops are the paper's, for which there are compiled kernels.
+  [[nodiscard]] bool has_plain_loops() const { return !realism && controllers.empty(); }
 
   /// Checks each number against its range, and what has to hold between several: the loops against
   /// the sample rate, the sessions' lines against the Nyquist frequency, the sessions against the

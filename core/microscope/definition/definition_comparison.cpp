@@ -29,6 +29,7 @@ class Comparison {
     compare_entries("", fields_of(first_, have_tests, is_any_realistic),
                     fields_of(second_, have_tests, is_any_realistic));
     compare_sessions();
+    compare_controllers();
     compare_environment();
     compare_dispersions();
     return std::move(differences_);
@@ -119,6 +120,19 @@ class Comparison {
       if (first[i].excitations != second[i].excitations) {
         differ(prefix + "excitations", excitations_text(first[i]), excitations_text(second[i]));
       }
+    }
+  }
+
+  void compare_controllers() {
+    const std::vector<ControllerConfig>& first = first_.scenario.controllers;
+    const std::vector<ControllerConfig>& second = second_.scenario.controllers;
+    if (first.size() != second.size()) {
+      differ("controller", fmt::format("{}", first.size()), fmt::format("{}", second.size()));
+      return;
+    }
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      compare_entries(fmt::format("controller[{}].", i), detail::controller_entries(first[i]),
+                      detail::controller_entries(second[i]));
     }
   }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -78,6 +79,19 @@ std::vector<Entry> session_entries(const Session& session) {
   };
 }
 
+std::vector<Entry> controller_entries(const ControllerConfig& controller) {
+  const auto root_text = [](const std::complex<double>& root) {
+    return fmt::format("[{}, {}]", real_entry("", root.real()).text,
+                       real_entry("", root.imag()).text);
+  };
+  return {choice_entry("loop", controller.loop),
+          choice_entry("axis", controller.axis),
+          real_entry("gain", controller.gain),
+          list_entry("zeros_rad_s", controller.zeros_rad_s, root_text),
+          list_entry("poles_rad_s", controller.poles_rad_s, root_text),
+          whole_entry("delay_samples", controller.delay_samples)};
+}
+
 std::vector<Entry> excitation_entries(const Excitation& excitation) {
   std::vector<Entry> entries{choice_entry("kind", excitation.kind),
                              choice_entry("axis", excitation.axis)};
@@ -127,6 +141,10 @@ std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign)
       append(items, fmt::format("session[{}].excitations[{}].", i, j),
              detail::excitation_entries(sessions[i].excitations[j]));
     }
+  }
+  const std::vector<ControllerConfig>& controllers = campaign.scenario.controllers;
+  for (std::size_t i = 0; i < controllers.size(); ++i) {
+    append(items, fmt::format("controller[{}].", i), detail::controller_entries(controllers[i]));
   }
   for (const DrawGroup& group : draw_groups()) {
     if (detail::is_left_out(campaign, group)) continue;

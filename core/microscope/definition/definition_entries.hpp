@@ -17,6 +17,9 @@ namespace proofmass::detail {
 [[nodiscard]] std::vector<Entry> session_entries(const Session& session);
 
 /// All keys of one excitation.
+/// `loop` to `delay_samples`.
+[[nodiscard]] std::vector<Entry> controller_entries(const ControllerConfig& controller);
+
 [[nodiscard]] std::vector<Entry> excitation_entries(const Excitation& excitation);
 
 /// `{ kind = "drag_free", axis = "x", ... }`.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <complex>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -55,6 +56,7 @@ void read_scenario(Document& document, Scenario& scenario) {
 constexpr std::size_t sessions_max = 64;
 constexpr std::size_t excitations_max = 16;
 constexpr std::size_t lines_max = 64;
+constexpr std::size_t controllers_max = 6;
 
 constexpr ExcitationKind excitation_kinds[] = {ExcitationKind::attitude, ExcitationKind::drag_free,
                                                ExcitationKind::test_mass};
@@ -176,6 +178,42 @@ std::vector<Session> read_sessions(Document& document) {
   return sessions;
 }
 
+void read_roots(Document& document, const std::string& path,
+                std::vector<std::complex<double>>& roots) {
+  const toml::node* const found = document.find(path);
+  if (found == nullptr) return;
+  const toml::array* const list = found->as_array();
+  constexpr std::string_view rule = "must be a list such as [[-0.3, 0], [-0.1, 0.2], [-0.1, -0.2]]";
+  if (list == nullptr || list->size() > controller_order_max) return document.refuse(path, rule);
+  for (const toml::node& entry : *list) {
+    const toml::array* const parts = entry.as_array();
+    double real = 0.0, imaginary = 0.0;
+    if (parts == nullptr || parts->size() != 2 || !read_multiple((*parts)[0], real) ||
+        !read_multiple((*parts)[1], imaginary)) {
+      return document.refuse(path, rule);
+    }
+    roots.emplace_back(real, imaginary);
+  }
+}
+
+/// The list `controller`.
+std::vector<ControllerConfig> read_controllers(Document& document) {
+  std::vector<ControllerConfig> controllers;
+  const std::size_t num_controllers =
+      document.num_tables("controller", controllers_max).value_or(0);
+  for (std::size_t i = 0; i < num_controllers; ++i) {
+    const std::string path = fmt::format("controller[{}]", i);
+    ControllerConfig& controller = controllers.emplace_back();
+    read_needed(document, path + ".loop", controller.loop);
+    read_needed(document, path + ".axis", controller.axis);
+    read_needed(document, path + ".gain", controller.gain);
+    read_roots(document, path + ".zeros_rad_s", controller.zeros_rad_s);
+    read_roots(document, path + ".poles_rad_s", controller.poles_rad_s);
+    document.read(path + ".delay_samples", controller.delay_samples, range::between(0, 240));
+  }
+  return controllers;
+}
+
 /// Laws of `[dispersion.<group>]` and, over them, of `[dispersion.<group>.<element>]`.
 DispersionSet read_dispersions(Document& document) {
   DispersionSet dispersions = nominal_dispersions();
@@ -212,6 +250,7 @@ MicroscopeCampaign read_definition(Document& document) {
   document.read("environment.file", campaign.environment_file);
   campaign.scenario.sessions = read_sessions(document);  // Some fields are those of tests.
   read_scenario(document, campaign.scenario);
+  campaign.scenario.controllers = read_controllers(document);
   campaign.dispersions = read_dispersions(document);
   return campaign;
 }

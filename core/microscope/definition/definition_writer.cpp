@@ -46,6 +46,15 @@ std::string excitations_text(const std::vector<Excitation>& excitations) {
   return text + "]\n";
 }
 
+std::string controllers_text(const MicroscopeCampaign& campaign) {
+  std::string text;
+  for (const ControllerConfig& controller : campaign.scenario.controllers) {
+    text += "[[controller]]\n";
+    for (const Entry& entry : detail::controller_entries(controller)) text += assignment(entry);
+  }
+  return text;
+}
+
 std::string_view element_of(std::size_t drawn) {
   const std::string_view name = drawn_names()[drawn];
   return name.substr(name.find('.') + 1);
@@ -66,6 +75,7 @@ class CommentedWriter {
     write_head();
     for (const Table& table : tables_of(detail::scenario_entries(campaign_))) write_table(table);
     write_sessions();
+    text_ += controllers_text(campaign_);
     write_dispersions();
     return std::move(text_);
   }
@@ -266,6 +276,7 @@ std::string canonical_definition(const MicroscopeCampaign& campaign) {
     for (const Entry& entry : detail::session_entries(session)) text += assignment(entry);
     text += excitations_text(session.excitations);
   }
+  text += controllers_text(campaign);
   for (const DrawGroup& group : draw_groups()) {
     if (detail::is_left_out(campaign, group)) continue;
     text += fmt::format("[dispersion.{}]\n", group.name);

@@ -21,6 +21,12 @@ LoopHealth health_of(std::span<const double> values) {
   return health;
 }
 
+const std::array<HealthQuantity, 2>& margin_quantities() {
+  static const std::array<HealthQuantity, 2> quantities{
+      {{"gain_margin", "", "1"}, {"phase_margin", "_rad", "rad"}}};
+  return quantities;
+}
+
 std::string_view name_of(LossCause cause) {
   switch (cause) {
     case LossCause::none:

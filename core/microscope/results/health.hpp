@@ -41,11 +41,15 @@ struct HealthValue {
 inline constexpr std::size_t num_health_values = 5;
 
 /// The health that a RunResult holds.
-/// @param values  num_health_values of them.
+/// @param values  num_health_values of them, or more.
 [[nodiscard]] LoopHealth health_of(std::span<const double> values);
 
 /// All of them, in the order of LoopHealth.
 [[nodiscard]] const std::array<HealthValue, num_health_values>& health_values();
+
+/// What a RunResult holds of loops that are not the paper's, behind its LoopHealth: the least
+/// Margins of the satellite that was drawn.
+[[nodiscard]] const std::array<HealthQuantity, 2>& margin_quantities();
 
 /// Why a run is lost: a sensor reached the end of its range, or something may have moved an
 /// estimate by more than its objective (ShiftBounds). The values are stored and sent: never

@@ -50,6 +50,19 @@ enum class MassMotion : std::uint8_t {
 /// The measurement that the drag-free loop nulls: the half sum of both sensors, or one of them.
 enum class DragFreeSource : std::uint8_t { common = 1, sensor_1 = 2, sensor_2 = 3 };
 
+/// Of each sensor's measurement in the loop's input.
+[[nodiscard]] constexpr std::array<double, 2> drag_free_weights(DragFreeSource source) {
+  switch (source) {
+    case DragFreeSource::sensor_1:
+      return {1.0, 0.0};
+    case DragFreeSource::sensor_2:
+      return {0.0, 1.0};
+    case DragFreeSource::common:
+      break;
+  }
+  return {0.5, 0.5};
+}
+
 /// A sine a·sin(2π f t), with t = 0 at the session's start.
 struct Excitation {
   ExcitationKind kind = ExcitationKind::drag_free;

@@ -59,18 +59,6 @@ SensorModel<double> make_sensor_model(const Sensor& sensor,
           .quadratic_s2_m = vector3(sensor.quadratic_s2_m)};
 }
 
-std::array<double, 2> drag_free_weights(DragFreeSource source) {
-  switch (source) {
-    case DragFreeSource::sensor_1:
-      return {1.0, 0.0};
-    case DragFreeSource::sensor_2:
-      return {0.0, 1.0};
-    case DragFreeSource::common:
-      break;
-  }
-  return {0.5, 0.5};
-}
-
 }  // namespace
 
 LoopConstants<double> make_loop_constants(const Instrument& instrument, const Scenario& scenario,

@@ -80,6 +80,10 @@ struct Hardware {
   PROOFMASS_INLINE void actuate(const LoopConstants<T>& /*constants*/,
                                 const Vector3<T>& /*omega_IS_S*/, const Vector3<T>& /*thrust_S*/,
                                 const Vector3<T>& /*torque_S*/) const {}
+  template <typename T>
+  PROOFMASS_INLINE void steer(const Vector3<T>& /*input_S*/, const Vector3<T>& /*angle_RS_S*/,
+                              const Vector3<T>& /*thrust_S*/,
+                              const Vector3<T>& /*torque_S*/) const {}
 };
 
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
@@ -204,7 +208,10 @@ struct Loop {
                                          constants.drag_free_weight[1] * observation.measured_K[1] -
                                          constants.subtracted_bias_S_m_s2 +
                                          broadcast<T>(shared.drag_free_command_S_m_s2);
-    thrust_command_S = drag_free.advance(drag_free_gains, shaping(drag_free_input_S));
+    const Vector3<T>& shaped_input_S = shaping(drag_free_input_S);
+    thrust_command_S = drag_free.advance(drag_free_gains, shaped_input_S);
+    hardware.steer(shaped_input_S, observation.attitude.angle_RS_S, thrust_command_S,
+                   torque_command_S);
     rotate(satellite.omega_dot_IS_S, attitude_gains.sample_period_s);
     hardware.actuate(constants, omega_IS_S, thrust_command_S, torque_command_S);
     return observation;

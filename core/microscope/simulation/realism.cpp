@@ -33,6 +33,10 @@ Realism::Realism(const Scenario& scenario, const Instrument& instrument,
                  const LoopConstants<double>& constants, std::size_t session,
                  std::int64_t num_settling)
     : is_on_(scenario.realism.has_value()), next_(-num_settling) {
+  for (const ControllerConfig& config : scenario.controllers) {
+    controllers_.push_back(
+        {config.loop, index(config.axis), {config, scenario.simulation.sample_period_s}});
+  }
   if (!is_on_) return;
   config_ = *scenario.realism;
   at_start_ = constants;
@@ -90,6 +94,17 @@ Vector3<double> Realism::seen(const Vector3<double>& angle_RS_S) {
   const Vector3<double> old = std::exchange(seen_S_rad_[oldest_], angle_RS_S);
   oldest_ = (oldest_ + 1) % seen_S_rad_.size();
   return old;
+}
+
+void Realism::steer(const Vector3<double>& input_S, const Vector3<double>& angle_RS_S,
+                    Vector3<double>& thrust_S, Vector3<double>& torque_S) {
+  for (auto& [loop, axis, law] : controllers_) {
+    if (loop == ControlLoop::drag_free) {
+      thrust_S[axis] = law.advance(input_S[axis]);
+    } else {
+      torque_S[axis] = -law.advance(angle_RS_S[axis]);
+    }
+  }
 }
 
 void Realism::actuate(const LoopConstants<double>& constants, const Vector3<double>& omega_IS_S,

@@ -24,9 +24,9 @@ struct Actuator {
   const Vector3<double>& advance(const Vector3<double>& command);
 };
 
-/// The Hardware of a scenario with `[realism]`: what the paper's simulator leaves out, for one run
-/// in one session. t is continuous over a run's sessions, each of which begins where the one before
-/// ended; its settling is counted backwards from there.
+/// The Hardware of a scenario: its controllers and, with `[realism]`, what the paper's simulator
+/// leaves out, for one run in one session. t is continuous over a run's sessions, each of which
+/// begins where the one before ended; its settling is counted backwards from there.
 ///
 ///     star tracker        angles of m samples before, + A sin(2π t/T_orb + φ) about each axis
 ///     thrust, torque      an Actuator each
@@ -60,12 +60,25 @@ class Realism {
     return is_on_ ? angular_sensitivity_ * omega_dot_IS_S : omega_dot_IS_S;
   }
 
+  /// Replaces the commands of the axes that have a controller of their own.
+  /// @param input_S     Of the drag-free controller.
+  /// @param angle_RS_S  Of the attitude controller, θ̂.
+  void steer(const Vector3<double>& input_S, const Vector3<double>& angle_RS_S,
+             Vector3<double>& thrust_S, Vector3<double>& torque_S);
+
   /// Makes of the commands what acts in the next sample.
   /// @param omega_IS_S  Ω then.
   void actuate(const LoopConstants<double>& constants, const Vector3<double>& omega_IS_S,
                Vector3<double>& thrust_S, Vector3<double>& torque_S);
 
  private:
+  struct Controller {
+    ControlLoop loop;
+    std::size_t axis;
+    SampledController law;
+  };
+
+  std::vector<Controller> controllers_;
   bool is_on_ = false;
   RealismConfig config_;
   LoopConstants<double> at_start_;                       ///< t = 0.

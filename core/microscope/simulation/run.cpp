@@ -323,7 +323,7 @@ std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> reque
                                                const std::function<void(int)>& progress) const {
   PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunResult> results;
-  if (set == InstructionSet::scalar || impl_->campaign.scenario.realism) {
+  if (set == InstructionSet::scalar || !impl_->campaign.scenario.has_plain_loops()) {
     const int num_orbits_a_run = num_orbits();
     const auto num_runs = static_cast<int>(requests.size());
     for (int i = 0; i < num_runs; ++i) {
@@ -386,6 +386,7 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   for (const HealthValue& value : health_values()) {
     result.health.push_back(finding.health.*value.member);
   }
+  result.health.insert(result.health.end(), record.margins.begin(), record.margins.end());
   if (finding.loss.cause != LossCause::none) {
     result.status = RunStatus::lost;
     result.loss = {.cause = static_cast<std::uint32_t>(finding.loss.cause),

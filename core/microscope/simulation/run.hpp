@@ -34,6 +34,7 @@ struct RunRecord {
   double eotvos_parameter = 0.0;  ///< δ of the draw.
   RunPhasors phasors{};           ///< With the lines and signals that the method needs.
   HealthRecord health{};          ///< For judge_health().
+  std::vector<double> margins{};  ///< Of margin_quantities(), of loops that are not the paper's.
 };
 
 /// True value of each quantity of the results: of the ten parameters, and of those of a test if the

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.hpp"
+#include "core/microscope/campaign/loop_margins.hpp"
 #include "core/microscope/instrument/stiffness.hpp"
 #include "core/microscope/session/gaps.hpp"
 #include "core/microscope/simulation/line_fit.hpp"
@@ -153,6 +154,10 @@ RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {
   if (draw.instrument) {
     record.truth = true_parameters(*draw.instrument, common_offset_x(scenario, *draw.instrument));
     record.eotvos_parameter = draw.instrument->eotvos_parameter;
+    if (!scenario.has_plain_loops()) {
+      const Margins margins = least(loop_margins(scenario, *draw.instrument));
+      record.margins = {std::min(margins.gain, magnitude_max), margins.phase_rad};
+    }
   }
   return record;
 }

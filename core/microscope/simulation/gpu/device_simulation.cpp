@@ -65,9 +65,9 @@ bool can_simulate(const RunParts& parts) {
     return filter.num_real <= num_device_poles_max;
   };
   return *program() != '\0' && !parts.campaign.scenario.has_tests() && !parts.has_stiffness() &&
-         !parts.campaign.scenario.realism &&
-         are_alike(parts.campaign.scenario.noise) && is_short(parts.noise.linear_x[0]) &&
-         is_short(parts.noise.linear_yz[0]) && is_short(parts.noise.angular) &&
+         parts.campaign.scenario.has_plain_loops() && are_alike(parts.campaign.scenario.noise) &&
+         is_short(parts.noise.linear_x[0]) && is_short(parts.noise.linear_yz[0]) &&
+         is_short(parts.noise.angular) &&
          std::ranges::all_of(parts.groups, [](const auto& further) { return further.empty(); });
 }
 

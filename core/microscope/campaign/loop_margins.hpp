@@ -1,0 +1,33 @@
+#pragma once
+
+#include <vector>
+
+#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/control/controller.hpp"
+#include "core/microscope/control/margins.hpp"
+#include "core/microscope/instrument/instrument.hpp"
+
+namespace proofmass {
+
+struct AxisMargins {
+  ControlLoop loop = ControlLoop::drag_free;
+  Axis axis = Axis::x;
+  Margins margins;
+};
+
+/// Margins of a satellite's loops, axis by axis, each by itself as sampled, with z⁻¹ until a
+/// command acts; of the drag-free loop in every session that has another source:
+///
+///     drag-free    L = z⁻¹ C(z) y(z) [M_DF]_aa Σ_k w_k [M_k]_aa
+///     attitude     L = z⁻¹ (C θ̂)(z) y(z) [J]⁻¹_aa J_aa,    θ̂ for θ = ½T² z⁻¹(1 + z⁻¹)/(1 − z⁻¹)²
+///
+/// C is nominal or of `[[controller]]`, y the lag of Realism, and θ̂ that of AttitudeEstimator,
+/// which sees θ by the star tracker with its latency and Ω̇ by the angular measurement. Resonators
+/// of tests are left out: they keep their distance (README.md of core/microscope/control).
+[[nodiscard]] std::vector<AxisMargins> loop_margins(const Scenario& scenario,
+                                                    const Instrument& instrument);
+
+/// The smaller of each number.
+[[nodiscard]] Margins least(const std::vector<AxisMargins>& of_axes);
+
+}  // namespace proofmass

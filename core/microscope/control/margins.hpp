@@ -1,0 +1,23 @@
+#pragma once
+
+#include <complex>
+#include <functional>
+
+namespace proofmass {
+
+/// An open loop L of z⁻¹, so that 1/(1 + L) is left of a disturbance. L vanishes for z → ∞ and has
+/// no pole outside the unit circle.
+using OpenLoop = std::function<std::complex<double>(const std::complex<double>& z_inverse)>;
+
+/// How far a closed loop is from instability.
+struct Margins {
+  double gain = 0.0;       ///< The least factor above 1 that L may grow by; 0: it is unstable.
+  double phase_rad = 0.0;  ///< The least phase that L may lose or gain where |L| is 1; 0 likewise.
+};
+
+/// Margins from L along the unit circle, from 1e-8 of a turn on, where loops with an integral are
+/// far above 1. A closed loop counts as unstable if 1 + L has a zero at |z| > 1 + 1e-6, that is, if
+/// something grows by e within some days; 1 + L then winds about 0 along that circle.
+[[nodiscard]] Margins margins_of(const OpenLoop& open_loop);
+
+}  // namespace proofmass
