@@ -150,6 +150,11 @@ bool Document::is_assigned(const std::string& path) const {
   return std::ranges::find(assignments_, path, &Assignment::path) != assignments_.end();
 }
 
+bool Document::has_table(const std::string& path) const {
+  const auto is_below = [&](const Assignment& of) { return of.path.starts_with(path + "."); };
+  return value_at(path) != nullptr || std::ranges::any_of(assignments_, is_below);
+}
+
 std::optional<std::size_t> Document::num_tables(const std::string& path, std::size_t count_max) {
   const toml::node* const found = value_at(path);
   const toml::array* const list = found == nullptr ? nullptr : found->as_array();

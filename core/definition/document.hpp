@@ -42,6 +42,10 @@ class Document {
 
   [[nodiscard]] bool is_assigned(const std::string& path) const;
 
+  /// Whether the file has something at a path, or an assignment below it; which of it are keys is
+  /// left to who reads them.
+  [[nodiscard]] bool has_table(const std::string& path) const;
+
   /// Entries of a list of tables such as `session`; nothing if absent, or if there are more than
   /// `count_max`, which is refused.
   [[nodiscard]] std::optional<std::size_t> num_tables(const std::string& path,

@@ -79,7 +79,7 @@ std::string MicroscopeCampaign::note() const {
   if (scenario.has_plain_loops()) return {};
   const Margins margins = least(loop_margins(scenario, make_instrument({})));
   return fmt::format(
-      "loops of the campaign file: with a perfect instrument, the least gain margin "
+      "loops that are not the paper's: with a perfect instrument, the least gain margin "
       "of an axis is {:.3g}, the least phase margin {:.3g}°; each run has its own, "
       "gain_margin and phase_margin_rad",
       margins.gain, margins.phase_rad * 180.0 / std::numbers::pi);

@@ -207,8 +207,10 @@ void check_controllers(const Scenario& scenario) {
           controllers[k].axis != controllers[i].axis) {
         continue;
       }
-      throw ConfigError(path, names_of(controllers[i].axis)[index(controllers[i].axis)],
-                        fmt::format("that axis of the loop has one, controller[{}]", k));
+      throw ConfigError(
+          path + ".axis",
+          fmt::format("\"{}\"", names_of(controllers[i].axis)[index(controllers[i].axis)]),
+          fmt::format("that axis of the loop has one, controller[{}]", k));
     }
   }
 }
@@ -218,14 +220,15 @@ void check_stability(const Scenario& scenario) {
   if (scenario.has_plain_loops()) return;
   for (const AxisMargins& of : loop_margins(scenario, make_instrument({}))) {
     if (of.margins.gain > 0.0) continue;
-    std::string path = "realism.actuation_lag_s", value = "with the other terms";
+    std::string path = "realism.actuation_lag_s";
+    double value = scenario.realism ? scenario.realism->actuation_lag_s : 0.0;
     for (std::size_t i = 0; i < scenario.controllers.size(); ++i) {
       const ControllerConfig& controller = scenario.controllers[i];
       if (controller.loop != of.loop || controller.axis != of.axis) continue;
       path = fmt::format("controller[{}].gain", i);
-      value = fmt::format("{}", controller.gain);
+      value = controller.gain;
     }
-    throw ConfigError(path, value,
+    throw ConfigError(path, fmt::format("{}", value),
                       fmt::format("makes the {} loop of axis {} unstable, even with a perfect "
                                   "instrument",
                                   names_of(of.loop)[static_cast<std::size_t>(of.loop) - 1],

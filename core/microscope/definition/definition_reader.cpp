@@ -46,7 +46,7 @@ void read_scenario(Document& document, Scenario& scenario) {
   NoisePreset preset = scenario.noise.preset;
   document.read("noise.preset", preset);
   scenario.noise = noise_preset(preset);
-  if (document.find("realism") != nullptr) scenario.realism.emplace();
+  if (document.has_table("realism")) scenario.realism.emplace();
   for_each_field(scenario, FieldReader{document});
   if (document.find("health") == nullptr) return;
   document.refuse("health", "delete this table: what loses a run follows from its objectives");
