@@ -2,17 +2,17 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <complex>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
+#include "core/math/complex.hpp"
 #include "core/math/elementary.hpp"
 #include "core/microscope/control/control_loops.hpp"
 
 namespace proofmass {
 namespace {
-
-using Complex = std::complex<double>;
 
 constexpr std::array axes{Axis::x, Axis::y, Axis::z};
 
@@ -27,7 +27,7 @@ std::optional<SampledController> controller_of(const Scenario& scenario, Control
 }
 
 /// y/u of an Actuator in its linear range.
-Complex actuator_response(const Scenario& scenario, const Complex& z_inverse) {
+ComplexDouble actuator_response(const Scenario& scenario, ComplexDouble z_inverse) {
   if (!scenario.realism || scenario.realism->actuation_lag_s == 0.0) return 1.0;
   const double memory =
       exponential(-scenario.simulation.sample_period_s / scenario.realism->actuation_lag_s);
@@ -45,9 +45,9 @@ AxisMargins drag_free_margins(const Scenario& scenario, const Instrument& instru
     factor += drag_free_weights(source)[k] * instrument.sensors[k].sensitivity_KS()(a, a);
   }
   factor *= instrument.thrust_matrix(a, a);
-  const auto open_loop = [&](const Complex& z_inverse) {
-    const Complex sum = 1.0 / (1.0 - z_inverse);
-    const Complex controller =
+  const auto open_loop = [&](ComplexDouble z_inverse) {
+    const ComplexDouble sum = 1.0 / (1.0 - z_inverse);
+    const ComplexDouble controller =
         own ? own->response(z_inverse) : gains.proportional * sum * (1.0 + gains.integral * sum);
     return factor * z_inverse * controller * actuator_response(scenario, z_inverse);
   };
@@ -56,29 +56,36 @@ AxisMargins drag_free_margins(const Scenario& scenario, const Instrument& instru
 
 /// What AttitudeEstimator makes of an angular acceleration α, over α.
 struct EstimatedMotion {
-  Complex angle_s2;  ///< θ̂.
-  Complex rate_s;    ///< Its rate.
+  ComplexDouble angle_s2;  ///< θ̂.
+  ComplexDouble rate_s;    ///< Its rate.
 };
 
-/// @param seen_s2   The star tracker's angle over α.
-/// @param measured  The measured acceleration over α.
-EstimatedMotion estimated_motion(const AttitudeGains& gains, const Complex& z_inverse,
-                                 const Complex& seen_s2, double measured) {
-  const double period = gains.sample_period_s, half_square = 0.5 * period * period;
-  Eigen::Matrix3d predict;
-  predict << 1.0, period, -half_square, 0.0, 1.0, -period, 0.0, 0.0, 1.0;
-  const Eigen::Vector3d correct(gains.blend_angle, gains.blend_rate_per_s,
-                                -gains.blend_bias_per_s2);
-  Eigen::Matrix3d remains = Eigen::Matrix3d::Identity();
-  remains.col(0) -= correct;
-  const Eigen::Vector3cd drive = (predict * correct).cast<Complex>() * seen_s2 +
-                                 Eigen::Vector3cd(half_square, period, 0.0) * measured;
-  const Eigen::Matrix3cd system = Eigen::Matrix3cd(Eigen::Matrix3cd::Identity()) / z_inverse -
-                                  (predict * remains).cast<Complex>();
-  const Eigen::Vector3cd predicted = system.partialPivLu().solve(drive);
-  const Eigen::Vector3cd estimate =
-      remains.cast<Complex>() * predicted + correct.cast<Complex>() * seen_s2;
-  return {estimate[0], estimate[1]};
+/// The estimator's recursion solved for its innovation ν: with D = z − 1 and P what two sums make
+/// of a measured α,
+///
+///     ν = (seen − P·measured)/(1 + (g + h T z/D)/D + k P z/D),    θ̂ = seen − (1 − g) ν
+///
+/// @param seen_s2      The star tracker's angle over α.
+/// @param measured     The measured acceleration over α.
+/// @param integral_s2  P.
+EstimatedMotion estimated_motion(const AttitudeGains& gains, ComplexDouble z_inverse,
+                                 ComplexDouble seen_s2, double measured,
+                                 ComplexDouble integral_s2) {
+  const double period = gains.sample_period_s;
+  const ComplexDouble next = 1.0 / (1.0 - z_inverse);  // z/D.
+  const ComplexDouble past = z_inverse * next;         // 1/D.
+  const ComplexDouble weight = 1.0 +
+                               past * (gains.blend_angle + gains.blend_rate_per_s * period * next) +
+                               gains.blend_bias_per_s2 * (integral_s2 * next);
+  const ComplexDouble innovation = (seen_s2 - measured * integral_s2) / weight;
+  const ComplexDouble bias = gains.blend_bias_per_s2 * (next * innovation);
+  return {seen_s2 - (1.0 - gains.blend_angle) * innovation,
+          gains.blend_rate_per_s * (next * innovation) + period * (past * (measured + bias))};
+}
+
+ComplexDouble delayed(ComplexDouble value, ComplexDouble z_inverse, std::int64_t num_samples) {
+  for (std::int64_t i = 0; i < num_samples; ++i) value = value * z_inverse;
+  return value;
 }
 
 AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
@@ -87,7 +94,6 @@ AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
   const AttitudeGains gains = attitude_gains(scenario.attitude, period);
   const auto own = controller_of(scenario, ControlLoop::attitude, axis);
   const RealismConfig realism = scenario.realism.value_or(RealismConfig{});
-  const auto latency = static_cast<int>(realism.star_tracker_latency_samples);
   const double measured =
       1.0 + 0.5 * (realism.angular_scale_error[0] + realism.angular_scale_error[1]);
   double factor = 1.0;
@@ -95,15 +101,15 @@ AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
     const Eigen::Matrix3d inertia = realism.inertia_tensor_kg_m2();
     factor = Eigen::Matrix3d(inertia.inverse())(a, a) * inertia(a, a);
   }
-  const auto open_loop = [&](const Complex& z_inverse) {
-    const Complex sum = 1.0 / (1.0 - z_inverse);
-    const Complex angle = 0.5 * period * period * z_inverse * (1.0 + z_inverse) * sum * sum;
-    const auto [angle_s2, rate_s] =
-        estimated_motion(gains, z_inverse, angle * std::pow(z_inverse, latency), measured);
-    const Complex nominal =
+  const auto open_loop = [&](ComplexDouble z_inverse) {
+    const ComplexDouble sum = 1.0 / (1.0 - z_inverse);
+    const ComplexDouble angle = 0.5 * period * period * (z_inverse * (1.0 + z_inverse) * sum * sum);
+    const ComplexDouble seen = delayed(angle, z_inverse, realism.star_tracker_latency_samples);
+    const auto [angle_s2, rate_s] = estimated_motion(gains, z_inverse, seen, measured, angle);
+    const ComplexDouble nominal =
         (gains.stiffness_per_s2 + gains.integral_per_s3 * period * sum) * angle_s2 +
         gains.damping_per_s * rate_s;
-    const Complex command = own ? own->response(z_inverse) * angle_s2 : nominal;
+    const ComplexDouble command = own ? own->response(z_inverse) * angle_s2 : nominal;
     return factor * z_inverse * command * actuator_response(scenario, z_inverse);
   };
   return {ControlLoop::attitude, axis, margins_of(open_loop)};

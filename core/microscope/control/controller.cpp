@@ -37,10 +37,21 @@ std::vector<Quadratic> quadratics(const Roots& roots) {
   return all;
 }
 
-/// z of s by the bilinear transform; s is not 2/T.
+/// z of s by the bilinear transform; |s| is below 2/T.
 std::complex<double> sampled(const std::complex<double>& s, double period_s) {
   const double rate = 2.0 / period_s;
-  return (rate + s) / (rate - s);
+  const ComplexDouble z =
+      ComplexDouble(rate + s.real(), s.imag()) / ComplexDouble(rate - s.real(), -s.imag());
+  return {z.real(), z.imag()};
+}
+
+/// Π (2/T − root), which is real.
+double rate_product(const Roots& roots, double period_s) {
+  ComplexDouble product = 1.0;
+  for (const std::complex<double>& root : roots) {
+    product = product * ComplexDouble(2.0 / period_s - root.real(), -root.imag());
+  }
+  return product.real();
 }
 
 void check_pairs(const std::string& path, const Roots& roots) {
@@ -85,14 +96,13 @@ void ControllerConfig::validate(const std::string& path, double sample_period_s)
 
 SampledController::SampledController(const ControllerConfig& config, double sample_period_s)
     : delayed_(static_cast<std::size_t>(config.delay_samples)) {
-  std::complex<double> gain = config.gain;
   const auto transformed = [&](const Roots& roots) {
     Roots all;
     for (const std::complex<double>& root : roots) all.push_back(sampled(root, sample_period_s));
     return all;
   };
-  for (const std::complex<double>& zero : config.zeros_rad_s) gain *= 2.0 / sample_period_s - zero;
-  for (const std::complex<double>& pole : config.poles_rad_s) gain /= 2.0 / sample_period_s - pole;
+  const double gain = config.gain * rate_product(config.zeros_rad_s, sample_period_s) /
+                      rate_product(config.poles_rad_s, sample_period_s);
   Roots zeros = transformed(config.zeros_rad_s);
   zeros.resize(config.poles_rad_s.size(), -1.0);  // Those at infinity.
   const std::vector<Quadratic> numerators = quadratics(zeros);
@@ -106,7 +116,7 @@ SampledController::SampledController(const ControllerConfig& config, double samp
   }
   if (sections_.empty()) sections_.push_back({1.0, 0.0, 0.0, 0.0, 0.0});
   Biquad& first = sections_.front();
-  for (double* const b : {&first.b0, &first.b1, &first.b2}) *b *= gain.real();
+  for (double* const b : {&first.b0, &first.b1, &first.b2}) *b *= gain;
   states_.resize(sections_.size());
 }
 
@@ -118,11 +128,15 @@ double SampledController::advance(double input) {
   return command;
 }
 
-std::complex<double> SampledController::response(const std::complex<double>& z_inverse) const {
-  std::complex<double> product = std::pow(z_inverse, static_cast<int>(delayed_.size()));
+ComplexDouble SampledController::response(ComplexDouble z_inverse) const {
+  ComplexDouble product = 1.0;
+  for (std::size_t i = 0; i < delayed_.size(); ++i) product = product * z_inverse;
   for (const Biquad& section : sections_) {
-    product *= (section.b0 + z_inverse * (section.b1 + z_inverse * section.b2)) /
-               (1.0 + z_inverse * (section.a1 + z_inverse * section.a2));
+    const auto polynomial = [&](double c0, double c1, double c2) {
+      return c0 + z_inverse * (c1 + c2 * z_inverse);
+    };
+    product = product * (polynomial(section.b0, section.b1, section.b2) /
+                         polynomial(1.0, section.a1, section.a2));
   }
   return product;
 }

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/math/complex.hpp"
 #include "core/microscope/session/session.hpp"
 #include "core/signal/band_pass.hpp"
 
@@ -48,7 +49,7 @@ class SampledController {
   [[nodiscard]] double advance(double input);
 
   /// C(z), without memory.
-  [[nodiscard]] std::complex<double> response(const std::complex<double>& z_inverse) const;
+  [[nodiscard]] ComplexDouble response(ComplexDouble z_inverse) const;
 
  private:
   std::vector<Biquad> sections_;

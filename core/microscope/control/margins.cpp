@@ -4,24 +4,27 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <utility>
+
+#include "core/math/elementary.hpp"
 
 namespace proofmass {
 namespace {
-
-using Complex = std::complex<double>;
 
 constexpr double pi = std::numbers::pi;
 constexpr double first_angle = 2e-8 * pi;
 constexpr int num_angles = 4000;  // 500 a decade: L turns by some degrees from one to the next.
 
-double angle(int i) { return first_angle * std::pow(pi / first_angle, double(i) / num_angles); }
-
-Complex at(const OpenLoop& loop, double angle, double radius = 1.0) {
-  return loop(std::polar(1.0 / radius, -angle));
+double grid_angle(int i) {
+  if (i == num_angles) return pi;
+  return first_angle * exponential(logarithm(pi / first_angle) * i / num_angles);
 }
 
-/// Where a function of the angle that changes its sign is 0.
+ComplexDouble at(const OpenLoop& loop, double angle, double radius = 1.0) {
+  const SineCosine turn = sincos(angle);
+  return loop({turn.cosine / radius, -turn.sine / radius});
+}
+
+/// Where a function that changes its sign does so; the higher end if it does not.
 template <typename Function>
 double root(const Function& function, double low, double high) {
   const bool is_low_positive = function(low) > 0.0;
@@ -29,35 +32,47 @@ double root(const Function& function, double low, double high) {
     const double middle = 0.5 * (low + high);
     ((function(middle) > 0.0) == is_low_positive ? low : high) = middle;
   }
-  return 0.5 * (low + high);
+  return high;
 }
 
-/// Half of the turns of 1 + L about 0 along the circle, in radians: the other half is its mirror
-/// image. It begins on the real axis.
+/// Middle of a number's quadrant, in quarters of a turn.
+double quadrant(ComplexDouble number) {
+  if (number.imag() >= 0.0) return number.real() >= 0.0 ? 0.5 : 1.5;
+  return number.real() < 0.0 ? 2.5 : 3.5;
+}
+
+/// Along half of the circle, of which the other half is the mirror image, 1 + L begins and ends on
+/// the real axis. A zero outside makes it turn by half a turn at least.
 bool is_stable(const OpenLoop& loop) {
   constexpr double radius = 1.0 + 1e-6;
-  Complex last = 1.0 + at(loop, 0.0, radius);
-  double turned = 0.0;
-  for (int i = 0; i <= num_angles; ++i) {
-    const Complex next = 1.0 + at(loop, angle(i), radius);
-    turned += std::arg(next / last);
+  const auto on_axis = [&](double angle) {
+    return 1.0 + at(loop, angle, radius).real() >= 0.0 ? 0.0 : 2.0;
+  };
+  double last = on_axis(0.0), num_quarters = 0.0;
+  const auto turn_to = [&](double next) {
+    const double step = next - last;  // A quarter at most, or the same less or more a whole turn.
+    num_quarters += step - 4.0 * std::round(step / 4.0);
     last = next;
-  }
-  return std::abs(turned) < 0.5 * pi;
+  };
+  for (int i = 0; i < num_angles; ++i) turn_to(quadrant(1.0 + at(loop, grid_angle(i), radius)));
+  turn_to(on_axis(pi));
+  return num_quarters == 0.0;
 }
 
 }  // namespace
 
 Margins margins_of(const OpenLoop& open_loop) {
   if (!is_stable(open_loop)) return {};
-  const auto size = [&](double at_angle) { return std::abs(at(open_loop, at_angle)) - 1.0; };
-  const auto height = [&](double at_angle) { return at(open_loop, at_angle).imag(); };
+  const auto excess = [&](double angle) { return norm(at(open_loop, angle)) - 1.0; };
+  const auto height = [&](double angle) { return at(open_loop, angle).imag(); };
   Margins margins{std::numeric_limits<double>::infinity(), pi};
   for (int i = 0; i < num_angles; ++i) {
-    const double low = angle(i), high = angle(i + 1);
-    if ((size(low) > 0.0) != (size(high) > 0.0)) {
-      const Complex there = at(open_loop, root(size, low, high));
-      margins.phase_rad = std::min(margins.phase_rad, std::abs(std::arg(-there)));
+    const double low = grid_angle(i), high = grid_angle(i + 1);
+    if ((excess(low) > 0.0) != (excess(high) > 0.0)) {
+      const double there = at(open_loop, root(excess, low, high)).real();
+      // |L| is 1, so −L has the cosine −Re L.
+      const auto above = [&](double phase) { return sincos(phase).cosine + there; };
+      margins.phase_rad = std::min(margins.phase_rad, root(above, 0.0, pi));
     }
     // At half the sample rate L is real: its phase reaches the axis there, or crosses it before.
     if ((height(low) > 0.0) != (height(high) > 0.0) || i + 1 == num_angles) {

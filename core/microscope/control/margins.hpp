@@ -1,13 +1,14 @@
 #pragma once
 
-#include <complex>
 #include <functional>
+
+#include "core/math/complex.hpp"
 
 namespace proofmass {
 
 /// An open loop L of z⁻¹, so that 1/(1 + L) is left of a disturbance. L vanishes for z → ∞ and has
 /// no pole outside the unit circle.
-using OpenLoop = std::function<std::complex<double>(const std::complex<double>& z_inverse)>;
+using OpenLoop = std::function<ComplexDouble(ComplexDouble z_inverse)>;
 
 /// How far a closed loop is from instability.
 struct Margins {

@@ -65,7 +65,7 @@ struct AsMeasured {
 
 /// Star tracker, thrusters and satellite as the paper has them: Loop::advance() says where each
 /// acts.
-struct Hardware {
+struct PaperHardware {
   template <typename T>
   PROOFMASS_INLINE void begin_sample(const LoopConstants<T>& /*constants*/) const {}
   template <typename T>
@@ -155,11 +155,11 @@ struct Loop {
   /// @param noise   Of this sample; its scale is in it already.
   /// @param violation  NoViolation, or a Violation in a session that tests.
   /// @param shaping  Of what the drag-free controller gets: AsMeasured, or that of a Resonator.
-  /// @param hardware  Hardware, or a Realism.
+  /// @param hardware  PaperHardware, or a Realism.
   /// @tparam masses  `at_rest` only in a session that moves no test mass.
   /// @returns What instrument and estimator report at this sample.
   template <TestMasses masses = TestMasses::moving, typename Shared, typename Fall = NoViolation,
-            typename Shaping = AsMeasured, typename Hardware = proofmass::Hardware>
+            typename Shaping = AsMeasured, typename Hardware = PaperHardware>
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,

@@ -24,7 +24,7 @@ struct Actuator {
   const Vector3<double>& advance(const Vector3<double>& command);
 };
 
-/// The Hardware of a scenario: its controllers and, with `[realism]`, what the paper's simulator
+/// Hardware of a Loop: its controllers and, with `[realism]`, what the paper's simulator
 /// leaves out, for one run in one session. t is continuous over a run's sessions, each of which
 /// begins where the one before ended; its settling is counted backwards from there.
 ///
@@ -40,7 +40,7 @@ struct Actuator {
 /// t = 0.
 class Realism {
  public:
-  /// Without any of it: Hardware{}, but chosen while a program runs.
+  /// Without any of it: PaperHardware, but chosen while a program runs.
   Realism() = default;
 
   /// @param constants     Of the drawn instrument in this session.

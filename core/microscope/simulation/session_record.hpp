@@ -246,7 +246,7 @@ PROOFMASS_INLINE void add_further(const std::array<T, num_signals>& values,
 
 /// The runs that one T holds, in one session.
 /// @tparam Hardware  Of the loop.
-template <typename T, typename Noise, typename Hardware = proofmass::Hardware>
+template <typename T, typename Noise, typename Hardware = PaperHardware>
 struct LaneGroup {
   LoopConstants<T> constants;
   Noise noise;  ///< next() yields the SampleNoise<T> of each sample, settling included.
