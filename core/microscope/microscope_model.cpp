@@ -78,11 +78,13 @@ ResultSchema MicroscopeCampaign::results() const { return scenario_results(scena
 std::string MicroscopeCampaign::note() const {
   if (scenario.has_plain_loops()) return {};
   const Margins margins = least(loop_margins(scenario, make_instrument({})));
+  const std::string_view of_realism =
+      scenario.realism ? "; errors have what [realism] adds, standard errors and plans do not" : "";
   return fmt::format(
-      "loops that are not the paper's: with a perfect instrument, the least gain margin "
-      "of an axis is {:.3g}, the least phase margin {:.3g}°; each run has its own, "
-      "gain_margin and phase_margin_rad",
-      margins.gain, margins.phase_rad * 180.0 / std::numbers::pi);
+      "loops that are not the paper's: with a perfect instrument, the least gain margin of an axis "
+      "is {:.3g}, the least phase margin {:.3g}°; each run has its own, gain_margin and "
+      "phase_margin_rad{}",
+      margins.gain, margins.phase_rad * 180.0 / std::numbers::pi, of_realism);
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {

@@ -51,6 +51,7 @@ struct Planned {
   std::size_t num_instruments;
   std::size_t num_probed;
   std::string method;
+  std::string note;                   ///< Campaign::note().
   std::vector<std::string> remedies;  ///< Of each quantity, see PlanStudy::remedy().
 };
 
@@ -74,6 +75,7 @@ Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<in
           .num_instruments = study.num_instruments(),
           .num_probed = study.num_probed(),
           .method = study.method(),
+          .note = campaign.note(),
           .remedies = std::move(remedies)};
 }
 
@@ -145,6 +147,7 @@ Table bound_table(const Planned& plan) {
       plan.method, plan.num_instruments));
   add_undetermined(plan, table);
   add_losses(plan, table);
+  if (!plan.note.empty()) table.notes.push_back(plan.note);
   return table;
 }
 
@@ -174,6 +177,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
   using Json = nlohmann::ordered_json;
   Json json{{"file", options.file.string()},
             {"method", plan.method},
+            {"note", plan.note},
             {"num_steps", plan.num_steps_in_all},
             {"step_name", built_in_model().step_name()},
             {"num_instruments", plan.num_instruments},
