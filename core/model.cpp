@@ -1,5 +1,7 @@
 #include "core/model.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -24,6 +26,14 @@ std::span<const Model* const> models() { return all_models(); }
 const Model* find_model(std::string_view version) {
   const auto found = std::ranges::find(all_models(), version, &Model::version);
   return found == all_models().end() ? nullptr : *found;
+}
+
+std::string model_versions() {
+  std::string text;
+  for (const Model* const model : models()) {
+    text = fmt::format("{}{}{}", model->version(), text.empty() ? "" : " and ", text);
+  }
+  return text;
 }
 
 std::string_view name_of_model(std::string_view version) {

@@ -43,9 +43,11 @@ class Verification {
  private:
   void run_result_checks() {
     make("results", [this] { return check_results(); });
-    make("digest", [this] { return check_digest(); });
-    make("statistics", [this] { return check_statistics(); });
-    make("stop_checks", [this] { return check_stop_checks(); });
+    make_of_results("digest", [this] { return check_digest(); });
+    make_of_results("statistics",
+                    [this] { return check_stored_statistics(*store_, *campaign_, *scan_); });
+    make_of_results("stop_checks",
+                    [this] { return check_stored_stop_checks(*store_, *campaign_, *scan_); });
     make("audit", [this] { return check_contradictions(*store_); });
     make("draws", [this] { return check_draws(); });
   }
@@ -65,6 +67,12 @@ class Verification {
     check.name = name;
     holds_ = holds_ && check.verdict != CheckOutcome::fails;
     report_(check);
+  }
+
+  template <typename Make>
+  void make_of_results(std::string_view name, const Make& make_check) {
+    make(name,
+         [&] { return scan_ ? make_check() : Check::not_checked("the results cannot be read"); });
   }
 
   Check check_file() {
@@ -123,7 +131,6 @@ class Verification {
 
   // A coordinator stores the digest when it ends; until then there are newer results.
   Check check_digest() {
-    if (!scan_) return Check::not_checked("the results cannot be read");
     const std::optional<Summary> summary = store_->summary();
     if (!summary) {
       return Check::not_checked("none is stored: a coordinator has the file, or was killed");
@@ -153,16 +160,6 @@ class Verification {
     check.details = {"stored", "  " + (is_of_health ? stored.health : stored.results), "computed",
                      "  " + (is_of_health ? computed.health : computed.results)};
     return check;
-  }
-
-  Check check_statistics() {
-    if (!scan_) return Check::not_checked("the results cannot be read");
-    return check_stored_statistics(*store_, *campaign_, *scan_);
-  }
-
-  Check check_stop_checks() {
-    if (!scan_) return Check::not_checked("the results cannot be read");
-    return check_stored_stop_checks(*store_, *campaign_, *scan_);
   }
 
   Check check_draws() {

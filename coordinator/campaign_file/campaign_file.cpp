@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -70,18 +71,15 @@ class DataFilesIn final : public DataFiles {
 /// A mistake that is made easily. Nothing is read from a pipe: it would be missing afterwards.
 bool is_database(const std::filesystem::path& file) {
   constexpr std::string_view format{"SQLite format 3\0", 16};
+  std::string beginning(format.size(), '\0');
   std::error_code error;
   return std::filesystem::is_regular_file(file, error) &&
-         detail::read_beginning(file, format.size(), detail::Pipes::refused) == format;
+         std::ifstream(file).read(beginning.data(), 16) && beginning == format;
 }
 
 std::string read_campaign_text(const std::filesystem::path& file) {
-  try {
-    if (!is_database(file)) {
-      return detail::read_text_file(file, campaign_file_size_max, detail::Pipes::accepted);
-    }
-  } catch (const detail::UnreadableFile& error) {
-    throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
+  if (!is_database(file)) {
+    return detail::read_definition_text(file, campaign_file_size_max, detail::Pipes::accepted);
   }
   throw DefinitionError(fmt::format(
       "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
@@ -92,15 +90,13 @@ const Model* named_model(Document& document) {
   const std::string path = "campaign.model";
   std::string name;
   if (!document.read(path, name)) return nullptr;
-  std::string others;
   for (const Model* const known : models()) {
-    const std::string_view version = known->version();
-    if (name == version || name == name_of_model(version)) return known;
-    others = fmt::format("{}{}{}", version, others.empty() ? "" : " and ", others);
+    if (name == known->version() || name == name_of_model(known->version())) return known;
   }
-  throw document.located(ConfigError(
-      path, fmt::format("\"{}\"", name),
-      fmt::format("this program has {}; --model-program names that of another model", others)));
+  throw document.located(
+      ConfigError(path, fmt::format("\"{}\"", name),
+                  fmt::format("this program has {}; --model-program names that of another model",
+                              model_versions())));
 }
 
 std::unique_ptr<Campaign> read_campaign(Document& document, DataFiles& files) {
@@ -136,7 +132,8 @@ std::string environment_file(const std::filesystem::path& file, const Overrides&
   Document campaign(file.string(), read_campaign_text(file), assignments_of(overrides));
   std::string text;
   if (!request.physics.empty()) {
-    text = detail::read_toml_text(request.physics, campaign_file_size_max);
+    text = detail::read_definition_text(request.physics, campaign_file_size_max,
+                                        detail::Pipes::refused);
   }
   Document physics(request.physics.string(), text, {});
   const Model* const named = named_model(campaign);

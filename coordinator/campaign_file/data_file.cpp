@@ -3,77 +3,52 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 
 #include "core/campaign/definition.hpp"
+#include "proto/link/descriptor.hpp"
 #include "proto/text/byte_order_mark.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
-/// Closes a file at the end of a scope.
-class OpenFile {
- public:
+[[noreturn]] void fail() {
+  throw UnreadableFile(fmt::format("cannot be read: {}", std::strerror(errno)));
+}
+
+/// So many bytes of a file, or all if it has fewer.
+std::string read_beginning(const std::filesystem::path& file, std::size_t size_max, Pipes pipes) {
   // Opening a pipe must not wait for its other end.
-  explicit OpenFile(const std::filesystem::path& file)
-      : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)) {
-    if (descriptor_ < 0) fail();
+  const wire::Descriptor opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  struct stat status {};
+  if (opened.number() < 0 || ::fstat(opened.number(), &status) != 0) fail();
+  if (S_ISDIR(status.st_mode)) throw UnreadableFile("is a directory");
+  if (S_ISREG(status.st_mode)) {
+    // What the kernel makes up, as in /proc, says that it has no bytes: reading it might wait for
+    // ever.
+    size_max = std::min(size_max, static_cast<std::size_t>(status.st_size));
+  } else if (pipes == Pipes::refused) {
+    throw UnreadableFile("is a pipe, a socket or a device");
+  } else if (::fcntl(opened.number(), F_SETFL, 0) != 0) {  // Reading waits for who writes.
+    fail();
   }
-  ~OpenFile() { ::close(descriptor_); }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-
-  [[nodiscard]] struct stat status() const {
-    struct stat status {};
-    if (::fstat(descriptor_, &status) != 0) fail();
-    return status;
+  std::string text(size_max, '\0');
+  std::size_t size = 0;
+  while (size < size_max) {
+    const ssize_t num_read = ::read(opened.number(), text.data() + size, size_max - size);
+    if (num_read < 0 && errno == EINTR) continue;
+    if (num_read < 0) fail();
+    if (num_read == 0) break;
+    size += static_cast<std::size_t>(num_read);
   }
-
-  /// A pipe to which nobody writes has ended.
-  void wait_for_bytes() const {
-    if (::fcntl(descriptor_, F_SETFL, 0) != 0) fail();
-  }
-
-  [[nodiscard]] std::string read(std::size_t size_max) const {
-    std::string text(size_max, '\0');
-    std::size_t size = 0;
-    while (size < size_max) {
-      const ssize_t num_read = ::read(descriptor_, text.data() + size, size_max - size);
-      if (num_read < 0 && errno == EINTR) continue;
-      if (num_read < 0) fail();
-      if (num_read == 0) break;
-      size += static_cast<std::size_t>(num_read);
-    }
-    text.resize(size);
-    return text;
-  }
-
- private:
-  [[noreturn]] static void fail() {
-    throw UnreadableFile(fmt::format("cannot be read: {}", std::strerror(errno)));
-  }
-
-  int descriptor_;
-};
+  text.resize(size);
+  return text;
+}
 
 }  // namespace
-
-// What the kernel makes up, as in /proc, says that it has no bytes: reading it might wait for ever.
-std::string read_beginning(const std::filesystem::path& file, std::size_t size_max, Pipes pipes) {
-  const OpenFile opened(file);
-  const struct stat status = opened.status();
-  if (S_ISREG(status.st_mode)) {
-    return opened.read(std::min(size_max, static_cast<std::size_t>(status.st_size)));
-  }
-  if (S_ISDIR(status.st_mode)) throw UnreadableFile("is a directory");
-  if (pipes == Pipes::refused) throw UnreadableFile("is a pipe, a socket or a device");
-  opened.wait_for_bytes();
-  return opened.read(size_max);
-}
 
 // One byte more than allowed tells a file that is too large, also one without a known size.
 std::string read_text_file(const std::filesystem::path& file, std::size_t size_max, Pipes pipes) {
@@ -89,9 +64,10 @@ std::string read_text_file(const std::filesystem::path& file, std::size_t size_m
   return text;
 }
 
-std::string read_toml_text(const std::filesystem::path& file, std::size_t size_max) {
+std::string read_definition_text(const std::filesystem::path& file, std::size_t size_max,
+                                 Pipes pipes) {
   try {
-    return read_text_file(file, size_max, Pipes::refused);
+    return read_text_file(file, size_max, pipes);
   } catch (const UnreadableFile& error) {
     throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
   }

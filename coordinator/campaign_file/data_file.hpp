@@ -21,18 +21,14 @@ enum class Pipes : std::uint8_t {
   accepted,  ///< For a file that a user names: `<(make_campaign)`.
 };
 
-/// So many bytes of a file, or all if it has fewer.
-/// @throws UnreadableFile
-[[nodiscard]] std::string read_beginning(const std::filesystem::path& file, std::size_t size_max,
-                                         Pipes pipes);
-
 /// All bytes of a file.
 /// @throws UnreadableFile
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& file, std::size_t size_max,
                                          Pipes pipes);
 
-/// read_text_file() of a file that is no pipe, for files in TOML.
+/// read_text_file() of a file that a user names.
 /// @throws DefinitionError `file: reason`.
-[[nodiscard]] std::string read_toml_text(const std::filesystem::path& file, std::size_t size_max);
+[[nodiscard]] std::string read_definition_text(const std::filesystem::path& file,
+                                               std::size_t size_max, Pipes pipes);
 
 }  // namespace proofmass::coordinator::detail

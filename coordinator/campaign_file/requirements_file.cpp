@@ -57,7 +57,9 @@ void check_requirement_of(const std::filesystem::path& file, std::size_t positio
 
 std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file,
                                                  const ResultSchema& results) {
-  Document document(file.string(), detail::read_toml_text(file, requirements_file_size_max), {});
+  Document document(
+      file.string(),
+      detail::read_definition_text(file, requirements_file_size_max, detail::Pipes::refused), {});
   const std::optional<std::size_t> count =
       document.num_tables("requirements", num_requirements_max);
   if (!count) document.refuse_absence("requirements", "must be a list of tables [[requirements]]");

@@ -160,17 +160,38 @@ void make_directory(const std::filesystem::path& directory) {
 }
 
 /// Kept until the process ends, however it does; the file stays and means nothing by itself.
-int lock(const std::filesystem::path& directory) {
+wire::Descriptor lock(const std::filesystem::path& directory) {
   const std::filesystem::path file = directory / "coordinator.lock";
-  const int descriptor = wire::open_own_file("lock", file, wire::IfAbsent::make);
-  const wire::Locked locked = wire::lock_file(descriptor);
-  if (locked == wire::Locked::yes) return descriptor;
-  close(descriptor);
+  wire::Descriptor opened(wire::open_own_file("lock", file, wire::IfAbsent::make));
+  const wire::Locked locked = wire::lock_file(opened.number());
+  if (locked == wire::Locked::yes) return opened;
   refuse(directory, locked == wire::Locked::by_another ? "another coordinator serves it"
                                                        : wire::no_locks_remedy);
 }
 
-ServedCampaign load_file(const std::filesystem::path& file) {
+}  // namespace
+
+CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std::move(directory)) {
+  make_directory(directory_);
+  lock_ = lock(directory_);
+  // What a process left that was killed.
+  std::error_code ignored;
+  std::filesystem::remove_all(answers(), ignored);
+}
+
+std::vector<std::filesystem::path> CampaignFolder::list() const {
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  std::filesystem::directory_iterator item(directory_, error);
+  for (; !error && item != std::filesystem::directory_iterator(); item.increment(error)) {
+    if (item->path().extension() == ".db") files.push_back(item->path());
+  }
+  if (error) refuse(directory_, error.message());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
   Store store = Store::open(file);
   const Model& model = store.model();
   if (!model.can_simulate() && store.reference_digest() == 0) {
@@ -188,34 +209,6 @@ ServedCampaign load_file(const std::filesystem::path& file) {
     throw Error(fmt::format("{}: {}", file.string(), error.what()));
   }
   return {.file = file, .store = std::move(store), .definition = std::move(definition)};
-}
-
-}  // namespace
-
-CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std::move(directory)) {
-  make_directory(directory_);
-  lock_ = lock(directory_);
-  // What a process left that was killed.
-  std::error_code ignored;
-  std::filesystem::remove_all(answers(), ignored);
-}
-
-CampaignFolder::~CampaignFolder() { close(lock_); }
-
-std::vector<std::filesystem::path> CampaignFolder::list() const {
-  std::vector<std::filesystem::path> files;
-  std::error_code error;
-  std::filesystem::directory_iterator item(directory_, error);
-  for (; !error && item != std::filesystem::directory_iterator(); item.increment(error)) {
-    if (item->path().extension() == ".db") files.push_back(item->path());
-  }
-  if (error) refuse(directory_, error.message());
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
-  return load_file(file);
 }
 
 std::filesystem::path CampaignFolder::archive(const std::filesystem::path& file) const {

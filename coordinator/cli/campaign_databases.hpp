@@ -13,6 +13,7 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
+#include "proto/link/descriptor.hpp"
 
 namespace proofmass::coordinator {
 
@@ -57,9 +58,6 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
   /// Takes the directory, making it if it is not there, for this user only.
   /// @throws Error if it cannot be made or written, or if another coordinator has it.
   explicit CampaignFolder(std::filesystem::path directory);
-  ~CampaignFolder() override;
-  CampaignFolder(const CampaignFolder&) = delete;
-  CampaignFolder& operator=(const CampaignFolder&) = delete;
 
   /// All files NAME.db, by name.
   [[nodiscard]] std::vector<std::filesystem::path> list() const override;
@@ -85,7 +83,7 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
   [[nodiscard]] std::filesystem::path file_of(const Campaign& campaign) const;
 
   std::filesystem::path directory_;
-  int lock_;  ///< Descriptor.
+  wire::Descriptor lock_;
 };
 
 }  // namespace proofmass::coordinator

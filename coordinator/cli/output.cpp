@@ -54,6 +54,11 @@ TerminalStyle style_of(std::FILE* stream) {
 
 void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
 
+void print_written(const std::filesystem::path& file, OutputFormat format) {
+  if (format == OutputFormat::json) return print_json({{"file", file.string()}});
+  print_lines(fmt::format("wrote {}\n", file.string()));
+}
+
 void print_json(const nlohmann::ordered_json& json) {
   print_lines(dumped(json, JsonLayout::indented));
 }

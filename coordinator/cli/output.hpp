@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
@@ -26,6 +27,12 @@ struct ScreenSize {
 /// or any number if the stream is a file or a pipe. A terminal that obeys control sequences is
 /// painted unless NO_COLOR is set and not empty (https://no-color.org).
 [[nodiscard]] TerminalStyle style_of(std::FILE* stream);
+
+/// How a command prints what it found.
+enum class OutputFormat : std::uint8_t { text, json };
+
+/// Says that a file was written.
+void print_written(const std::filesystem::path& file, OutputFormat format);
 
 /// Prints lines, which may hold text of a file from elsewhere, as wire::visible_lines().
 /// @throws Error `standard output: No space left on device`.

@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 
-#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/program.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
@@ -49,10 +48,6 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
       .add_option("--failures", options.failures_max,
                   "Cancel when more runs than this lack an estimate")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
-}
-
-void check_stop_rule(const std::string& rule, const Campaign& campaign) {
-  check_until(campaign, rule);
 }
 
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {

@@ -30,11 +30,6 @@ struct StopOptions {
 /// @param options  Lives as long as the command.
 void add_stop_options(CLI::App& command, StopOptions& options);
 
-/// Refuses a rule that is none about the campaign, or of draws that may depend on one another.
-///
-/// @throws UsageError or ConfigError `until = RULE (what is wrong)`
-void check_stop_rule(const std::string& rule, const Campaign& campaign);
-
 /// Declares --audit.
 /// @param audit_fraction  Lives as long as the command.
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction);

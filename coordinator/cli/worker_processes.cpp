@@ -59,9 +59,7 @@ void WorkerProcesses::start(const std::string& name) {
                                      name == first_name ? gpus_ : "none",
                                      "--parent",
                                      std::to_string(getpid())};
-  for (std::string& argument : wire::model_program_arguments()) {
-    arguments.push_back(std::move(argument));
-  }
+  wire::add_model_programs(arguments);
   const pid_t process_id = wire::start_program(
       {.arguments = std::move(arguments), .environment = wire::environment_without_settings()});
   processes_.push_back({.name = name, .process_id = process_id});

@@ -99,9 +99,7 @@ Order order_for(const proto::AnswerRequest& request, const ServiceConfig& config
     require_option(command, option);
     order.arguments.push_back(option);
   }
-  for (std::string& argument : wire::model_program_arguments()) {
-    order.arguments.push_back(std::move(argument));
-  }
+  wire::add_model_programs(order.arguments);
   order.arguments.insert(order.arguments.end(),
                          {"--", std::filesystem::absolute(database).string()});
   if (request.question() == proto::QUESTION_QUERY) order.arguments.push_back(request.statement());

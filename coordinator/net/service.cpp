@@ -83,7 +83,7 @@ class Service::Impl final : public Outbox {
                              .num_leases = state_.leases.size(),
                              .num_sockets_reset = sockets_.num_resets(),
                              .num_messages_unsent = worker_gateway_.num_unsent()};
-    add_workers(state_, now(), depth, snapshot);
+    take_workers(state_, now(), depth, snapshot);
     paths_.hide_in(snapshot.status);
     for (CampaignRecord& campaign : snapshot.campaigns) paths_.hide_in(campaign.status);
     return snapshot;

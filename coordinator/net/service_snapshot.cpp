@@ -46,8 +46,8 @@ RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker
           .registered_s = seconds(now - worker.registered_at)};
 }
 
-void add_workers(const State& state, TimePoint now, SnapshotDepth depth,
-                 ServiceSnapshot& snapshot) {
+void take_workers(const State& state, TimePoint now, SnapshotDepth depth,
+                  ServiceSnapshot& snapshot) {
   const bool is_listed = depth == SnapshotDepth::with_workers;
   if (is_listed) snapshot.workers.reserve(state.workers.size());
   for (const auto& [id, worker] : state.workers) {

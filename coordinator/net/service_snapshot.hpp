@@ -54,6 +54,7 @@ enum class SnapshotDepth : std::uint8_t { without_workers, with_workers };
                                          TimePoint now);
 
 /// Counts the workers by activity and, if they are asked for, copies them.
-void add_workers(const State& state, TimePoint now, SnapshotDepth depth, ServiceSnapshot& snapshot);
+void take_workers(const State& state, TimePoint now, SnapshotDepth depth,
+                  ServiceSnapshot& snapshot);
 
 }  // namespace proofmass::coordinator

@@ -1,18 +1,13 @@
 #include "coordinator/page/page_access.hpp"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <sodium.h>
 #include <strings.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
 #include <system_error>
 
 #include "core/error.hpp"
@@ -60,23 +55,6 @@ std::string hexadecimal(const TokenDigest& digest) {
   std::string text;
   for (const unsigned char byte : digest) text += fmt::format("{:02x}", byte);
   return text;
-}
-
-[[noreturn]] void refuse_token_file(const std::filesystem::path& file, std::string_view rule) {
-  throw Error(fmt::format("page token file = {} ({})", file.string(), rule));
-}
-
-/// Closes a descriptor at the end of a scope.
-struct TokenFile {
-  int descriptor;
-  ~TokenFile() { ::close(descriptor); }
-};
-
-void check_token_file(const std::filesystem::path& file, int descriptor) {
-  struct stat status {};
-  if (::fstat(descriptor, &status) != 0) refuse_token_file(file, std::strerror(errno));
-  if (!S_ISREG(status.st_mode)) refuse_token_file(file, "must be a regular file");
-  wire::check_reach("page token file", file, status, wire::Reach::private_to_owner);
 }
 
 /// The value of our cookie in a header `a=b; c=d`; empty if it is not there.
@@ -131,21 +109,17 @@ std::string url_of(const PageAddress& address) {
 }
 
 PageToken PageToken::read(const std::filesystem::path& file) {
-  const TokenFile opened{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
-  if (opened.descriptor < 0) refuse_token_file(file, std::strerror(errno));
-  check_token_file(file, opened.descriptor);
-  std::string text(token_size_max + 2, '\0');
-  const ssize_t size = ::read(opened.descriptor, text.data(), text.size());
-  if (size < 0) refuse_token_file(file, std::strerror(errno));
-  text.resize(static_cast<std::size_t>(size));
+  constexpr std::string_view what = "page token file";
+  constexpr std::size_t file_size_max = 4096;  // Of one that is worth saying what a token is.
+  std::string text =
+      wire::read_within_reach(what, file, wire::Reach::private_to_owner, file_size_max);
   if (text.ends_with('\n')) text.pop_back();
   const bool is_visible = std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
-  if (!is_visible || text.size() < token_size_min || text.size() > token_size_max) {
-    refuse_token_file(file, fmt::format("must hold {} to {} visible ASCII characters and nothing "
-                                        "else",
-                                        token_size_min, token_size_max));
+  if (is_visible && text.size() >= token_size_min && text.size() <= token_size_max) {
+    return PageToken(text);
   }
-  return PageToken(text);
+  throw Error(fmt::format("{} = {} (must hold {} to {} visible ASCII characters and nothing else)",
+                          what, file.string(), token_size_min, token_size_max));
 }
 
 PageToken::PageToken(std::string_view text)

@@ -23,18 +23,17 @@ std::span<const std::string_view> names_of(Law) {
 namespace {
 
 /// Checks one law; `path` is that of its table in a campaign file.
-class DispersionCheck {
+class LawCheck {
  public:
-  DispersionCheck(const Dispersion& dispersion, std::string_view path)
-      : dispersion_(dispersion), path_(path) {}
+  LawCheck(const Dispersion& law, std::string_view path) : law_(law), path_(path) {}
 
   void run() const {
-    check_finite("minimum", dispersion_.minimum);
-    check_finite("maximum", dispersion_.maximum);
-    check_finite("mean", dispersion_.mean);
-    check_finite("standard_deviation", dispersion_.standard_deviation);
-    check_finite("value", dispersion_.value);
-    switch (dispersion_.law) {
+    check_finite("minimum", law_.minimum);
+    check_finite("maximum", law_.maximum);
+    check_finite("mean", law_.mean);
+    check_finite("standard_deviation", law_.standard_deviation);
+    check_finite("value", law_.value);
+    switch (law_.law) {
       case Law::uniform:
         return check_interval();
       case Law::normal:
@@ -50,89 +49,85 @@ class DispersionCheck {
       case Law::truncated:
         return check_bounds();
       case Law::derived:
-        return check_expression();
+        return check_length("expression", law_.expression, expression_size_max);
       case Law::correlated:
         return check_correlations();
     }
-    refuse("law", fmt::format("{}", static_cast<int>(dispersion_.law)), "unknown law");
+    refuse("law", static_cast<int>(law_.law), "unknown law");
   }
 
  private:
-  [[noreturn]] void refuse(std::string_view key, std::string_view value,
-                           std::string_view rule) const {
-    throw ConfigError(fmt::format("{}.{}", path_, key), value, rule);
+  template <typename Value>
+  [[noreturn]] void refuse(std::string_view key, const Value& value, std::string_view rule) const {
+    throw ConfigError(fmt::format("{}.{}", path_, key), fmt::format("{}", value), rule);
   }
 
   void check_finite(std::string_view key, double value) const {
-    if (!std::isfinite(value)) refuse(key, fmt::format("{}", value), "must be finite");
+    if (!std::isfinite(value)) refuse(key, value, "must be finite");
   }
 
   void check_interval() const {
-    if (dispersion_.minimum < dispersion_.maximum) {
-      // The width is a number that the draw computes with.
-      check_finite("maximum", dispersion_.maximum - dispersion_.minimum);
-      return;
+    if (law_.minimum >= law_.maximum) {
+      refuse("maximum", law_.maximum, fmt::format("must be > minimum, {}", law_.minimum));
     }
-    refuse("maximum", fmt::format("{}", dispersion_.maximum),
-           fmt::format("must be > minimum, {}", dispersion_.minimum));
+    // The width is a number that the draw computes with.
+    check_finite("maximum", law_.maximum - law_.minimum);
   }
 
   void check_spread() const {
-    if (dispersion_.standard_deviation > 0.0) return;
-    refuse("standard_deviation", fmt::format("{}", dispersion_.standard_deviation), "must be > 0");
+    if (law_.standard_deviation > 0.0) return;
+    refuse("standard_deviation", law_.standard_deviation, "must be > 0");
   }
 
   // Far tails and slivers would make a draw by rejection endless.
   void check_truncation() const {
     check_spread();
     check_interval();
-    if (dispersion_.mean < dispersion_.minimum || dispersion_.mean > dispersion_.maximum) {
-      refuse("mean", fmt::format("{}", dispersion_.mean),
-             fmt::format("must be in [{}, {}]", dispersion_.minimum, dispersion_.maximum));
+    if (law_.mean < law_.minimum || law_.mean > law_.maximum) {
+      refuse("mean", law_.mean, fmt::format("must be in [{}, {}]", law_.minimum, law_.maximum));
     }
-    const double width = dispersion_.maximum - dispersion_.minimum;
-    if (dispersion_.standard_deviation > 100.0 * width) {
-      refuse("standard_deviation", fmt::format("{}", dispersion_.standard_deviation),
-             fmt::format("must be <= 100 (maximum - minimum), {}", 100.0 * width));
-    }
+    check_slimness(100.0);
   }
 
   // The inverse of the distribution function reaches as far as a double holds probabilities.
   void check_bounds() const {
-    constexpr double deviations_max = 30.0, slimness_max = 1e6;
+    constexpr double deviations_max = 30.0;
     check_spread();
     check_interval();
-    const double nearest =
-        std::fmax(dispersion_.minimum - dispersion_.mean, dispersion_.mean - dispersion_.maximum);
-    if (nearest > deviations_max * dispersion_.standard_deviation) {
-      refuse("mean", fmt::format("{}", dispersion_.mean),
+    const double nearest = std::fmax(law_.minimum - law_.mean, law_.mean - law_.maximum);
+    if (nearest > deviations_max * law_.standard_deviation) {
+      refuse("mean", law_.mean,
              fmt::format("must be at most {} standard deviations beyond [{}, {}]", deviations_max,
-                         dispersion_.minimum, dispersion_.maximum));
+                         law_.minimum, law_.maximum));
     }
-    const double widest = slimness_max * (dispersion_.maximum - dispersion_.minimum);
-    if (dispersion_.standard_deviation > widest) {
-      refuse("standard_deviation", fmt::format("{}", dispersion_.standard_deviation),
-             fmt::format("must be <= {:g} (maximum - minimum), {}", slimness_max, widest));
-    }
+    check_slimness(1e6);
+  }
+
+  void check_slimness(double slimness_max) const {
+    const double widest = slimness_max * (law_.maximum - law_.minimum);
+    if (law_.standard_deviation <= widest) return;
+    refuse("standard_deviation", law_.standard_deviation,
+           fmt::format("must be <= {:g} (maximum - minimum), {}", slimness_max, widest));
   }
 
   void check_choices() const {
-    check_list("values", dispersion_.values);
-    check_list("probabilities", dispersion_.probabilities);
-    const std::size_t num_values = dispersion_.values.size();
-    if (dispersion_.probabilities.size() != num_values) {
-      refuse("probabilities", fmt::format("{} of them", dispersion_.probabilities.size()),
-             fmt::format("must be {}, one for each value", num_values));
-    }
+    check_list("values", law_.values);
+    check_list("probabilities", law_.probabilities);
+    check_size("probabilities", law_.probabilities.size(), law_.values.size(), "value");
     double sum = 0.0;
-    for (const double probability : dispersion_.probabilities) {
-      if (probability < 0.0)
-        refuse("probabilities", fmt::format("{}", probability), "must be >= 0");
+    for (const double probability : law_.probabilities) {
+      if (probability < 0.0) refuse("probabilities", probability, "must be >= 0");
       sum += probability;
     }
     if (std::abs(sum - 1.0) > 1e-9) {
       refuse("probabilities", fmt::format("{} together", sum), "must be 1, to 1e-9");
     }
+  }
+
+  void check_correlations() const {
+    check_spread();
+    check_list("correlations", law_.correlations);
+    check_size("correlations", law_.correlations.size(), law_.with.size(), "quantity of `with`");
   }
 
   void check_list(std::string_view key, const std::vector<double>& list) const {
@@ -143,40 +138,32 @@ class DispersionCheck {
     for (const double value : list) check_finite(key, value);
   }
 
-  void check_expression() const {
-    if (dispersion_.expression.size() <= expression_size_max) return;
-    refuse("expression", fmt::format("{} bytes", dispersion_.expression.size()),
-           fmt::format("must be at most {}", expression_size_max));
-  }
-
-  void check_correlations() const {
-    check_spread();
-    check_list("correlations", dispersion_.correlations);
-    if (dispersion_.correlations.size() == dispersion_.with.size()) return;
-    refuse("correlations", fmt::format("{} of them", dispersion_.correlations.size()),
-           fmt::format("must be {}, one for each quantity of `with`", dispersion_.with.size()));
+  void check_size(std::string_view key, std::size_t size, std::size_t wanted,
+                  std::string_view each) const {
+    if (size == wanted) return;
+    refuse(key, fmt::format("{} of them", size),
+           fmt::format("must be {}, one for each {}", wanted, each));
   }
 
   void check_source() const {
-    if (dispersion_.file.empty()) refuse("file", "\"\"", "must name a file");
-    if (dispersion_.column.empty()) refuse("column", "\"\"", "must name a column");
-    check_length("file", dispersion_.file);
-    check_length("column", dispersion_.column);
+    if (law_.file.empty()) refuse("file", "\"\"", "must name a file");
+    if (law_.column.empty()) refuse("column", "\"\"", "must name a column");
+    check_length("file", law_.file, data_name_size_max);
+    check_length("column", law_.column, data_name_size_max);
   }
 
-  void check_length(std::string_view key, const std::string& name) const {
-    if (name.size() <= data_name_size_max) return;
-    refuse(key, fmt::format("{} bytes", name.size()),
-           fmt::format("must be at most {}", data_name_size_max));
+  void check_length(std::string_view key, const std::string& text, std::size_t size_max) const {
+    if (text.size() <= size_max) return;
+    refuse(key, fmt::format("{} bytes", text.size()), fmt::format("must be at most {}", size_max));
   }
 
-  const Dispersion& dispersion_;
+  const Dispersion& law_;
   std::string_view path_;
 };
 
 }  // namespace
 
-void Dispersion::validate(std::string_view path) const { DispersionCheck(*this, path).run(); }
+void Dispersion::validate(std::string_view path) const { LawCheck(*this, path).run(); }
 
 namespace {
 

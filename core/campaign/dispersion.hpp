@@ -44,8 +44,8 @@ struct Dispersion {
   double mean = 0.0;
   double standard_deviation = 0.0;
   double value = 0.0;
-  std::string file;    ///< For `table`: path as written in the campaign file.
-  std::string column;  ///< For `table`: heading of the column.
+  std::string file = {};    ///< For `table`: path as written in the campaign file.
+  std::string column = {};  ///< For `table`: heading of the column.
   /// For `table`: the values are independent draws of one law, and not those of a design.
   bool is_independent = false;
   std::vector<double> values = {};         ///< For `discrete`: what may be drawn.

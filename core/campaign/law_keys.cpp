@@ -40,31 +40,19 @@ std::span<const std::string_view> keys_of(Law law) {
   return {};
 }
 
-double* number_at(Dispersion& dispersion, std::string_view key) {
-  if (key == "minimum") return &dispersion.minimum;
-  if (key == "maximum") return &dispersion.maximum;
-  if (key == "mean") return &dispersion.mean;
-  if (key == "standard_deviation") return &dispersion.standard_deviation;
-  if (key == "value") return &dispersion.value;
-  return nullptr;
-}
-
-std::string* text_at(Dispersion& dispersion, std::string_view key) {
-  if (key == "file") return &dispersion.file;
-  if (key == "column") return &dispersion.column;
-  if (key == "expression") return &dispersion.expression;
-  return nullptr;
-}
-
-std::vector<double>* numbers_at(Dispersion& dispersion, std::string_view key) {
-  if (key == "values") return &dispersion.values;
-  if (key == "probabilities") return &dispersion.probabilities;
-  if (key == "correlations") return &dispersion.correlations;
-  return nullptr;
-}
-
-std::vector<std::string>* texts_at(Dispersion& dispersion, std::string_view key) {
-  return key == "with" ? &dispersion.with : nullptr;
+LawField field_of(Dispersion& law, std::string_view key) {
+  if (key == "minimum") return &law.minimum;
+  if (key == "maximum") return &law.maximum;
+  if (key == "mean") return &law.mean;
+  if (key == "standard_deviation") return &law.standard_deviation;
+  if (key == "value") return &law.value;
+  if (key == "file") return &law.file;
+  if (key == "column") return &law.column;
+  if (key == "expression") return &law.expression;
+  if (key == "values") return &law.values;
+  if (key == "probabilities") return &law.probabilities;
+  if (key == "correlations") return &law.correlations;
+  return &law.with;
 }
 
 std::string_view name_of(Law law) { return names_of(law)[static_cast<std::size_t>(law) - 1]; }

@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "core/campaign/dispersion.hpp"
@@ -12,14 +13,12 @@ namespace proofmass {
 /// Keys that a law has in a campaign file beside `law`, each named like its field of Dispersion.
 [[nodiscard]] std::span<const std::string_view> keys_of(Law law);
 
-/// The field of a key, null unless the key has a number.
-[[nodiscard]] double* number_at(Dispersion& dispersion, std::string_view key);
-/// The field of a key, null unless the key has a text.
-[[nodiscard]] std::string* text_at(Dispersion& dispersion, std::string_view key);
-/// The field of a key, null unless the key has a list of numbers.
-[[nodiscard]] std::vector<double>* numbers_at(Dispersion& dispersion, std::string_view key);
-/// The field of a key, null unless the key has a list of texts.
-[[nodiscard]] std::vector<std::string>* texts_at(Dispersion& dispersion, std::string_view key);
+/// A field of a Dispersion, of the type that its key has in a campaign file.
+using LawField =
+    std::variant<double*, std::string*, std::vector<double>*, std::vector<std::string>*>;
+
+/// The field of one of keys_of() any law.
+[[nodiscard]] LawField field_of(Dispersion& law, std::string_view key);
 
 /// `uniform`.
 [[nodiscard]] std::string_view name_of(Law law);

@@ -137,19 +137,16 @@ class ExpressionCheck {
   void run(std::size_t quantity) {
     if (set_.laws[quantity].law != Law::derived || states_[quantity] == State::sound) return;
     states_[quantity] = State::open;
-    const std::string path = set_.path_of(quantity) + ".expression";
-    const std::string value = fmt::format("\"{}\"", set_.laws[quantity].expression);
+    const auto refuse = [&](const std::string& rule) {
+      throw ConfigError(set_.path_of(quantity) + ".expression",
+                        fmt::format("\"{}\"", set_.laws[quantity].expression), rule);
+    };
     const auto follow = [&](std::string_view name) {
       const std::size_t next = set_.index_of(name);
-      if (next == set_.laws.size()) {
-        throw ConfigError(path, value, fmt::format("{} is no drawn quantity", name));
-      }
-      if (states_[next] == State::open) {
-        throw ConfigError(path, value, fmt::format("{} depends on it in turn", name));
-      }
+      if (next == set_.laws.size()) refuse(fmt::format("{} is no drawn quantity", name));
+      if (states_[next] == State::open) refuse(fmt::format("{} depends on it in turn", name));
       if (depth_ == chain_size_max) {
-        throw ConfigError(path, value,
-                          fmt::format("more than {} need one another in a row", chain_size_max));
+        refuse(fmt::format("more than {} need one another in a row", chain_size_max));
       }
       ++depth_;
       run(next);
@@ -159,7 +156,7 @@ class ExpressionCheck {
     try {
       (void)evaluate_expression(set_.laws[quantity].expression, follow);
     } catch (const InvalidArgument& error) {
-      throw ConfigError(path, value, error.what());
+      refuse(error.what());
     }
     states_[quantity] = State::sound;
   }

@@ -190,19 +190,30 @@ bool Document::read(const std::string& path, double& value, const Range& range) 
   return true;
 }
 
-bool Document::read(const std::string& path, std::int64_t& value, const Range& range) {
+template <typename Value>
+const toml::value<Value>* Document::find_value(const std::string& path, std::string_view rule) {
   const toml::node* const found = find(path);
+  const toml::value<Value>* const value = found == nullptr ? nullptr : found->as<Value>();
+  if (found != nullptr && value == nullptr) refuse(path, rule);
+  return value;
+}
+
+bool Document::read(const std::string& path, std::int64_t& value, const Range& range) {
+  const auto* const found =
+      find_value<std::int64_t>(path, "must be a whole number without point or exponent");
   if (found == nullptr) return false;
-  const auto* const integer = found->as_integer();
-  if (integer == nullptr) {
-    refuse(path, "must be a whole number without point or exponent");
-    return false;
-  }
-  if (!range.contains(static_cast<double>(integer->get()))) {
+  if (!range.contains(static_cast<double>(found->get()))) {
     refuse(path, range.rule());
     return false;
   }
-  value = integer->get();
+  value = found->get();
+  return true;
+}
+
+bool Document::read(const std::string& path, std::uint64_t& value, const Range& range) {
+  std::int64_t wide = 0;
+  if (!read(path, wide, range)) return false;
+  value = static_cast<std::uint64_t>(wide);
   return true;
 }
 
@@ -215,25 +226,15 @@ bool Document::read(const std::string& path, int& value) {
 }
 
 bool Document::read(const std::string& path, bool& value) {
-  const toml::node* const found = find(path);
-  if (found == nullptr) return false;
-  if (!found->is_boolean()) {
-    refuse(path, "must be true or false");
-    return false;
-  }
-  value = found->as_boolean()->get();
-  return true;
+  const auto* const found = find_value<bool>(path, "must be true or false");
+  if (found != nullptr) value = found->get();
+  return found != nullptr;
 }
 
 bool Document::read(const std::string& path, std::string& value) {
-  const toml::node* const found = find(path);
-  if (found == nullptr) return false;
-  if (!found->is_string()) {
-    refuse(path, "must be a text");
-    return false;
-  }
-  value = found->as_string()->get();
-  return true;
+  const auto* const found = find_value<std::string>(path, "must be a text");
+  if (found != nullptr) value = found->get();
+  return found != nullptr;
 }
 
 std::optional<std::size_t> Document::read_choice(const std::string& path,

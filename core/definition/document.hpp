@@ -55,6 +55,7 @@ class Document {
   // refused: then the refusal is remembered.
   bool read(const std::string& path, double& value, const Range& range = range::any);
   bool read(const std::string& path, std::int64_t& value, const Range& range = range::any);
+  bool read(const std::string& path, std::uint64_t& value, const Range& range);  ///< Not below 0.
   bool read(const std::string& path, int& value);
   bool read(const std::string& path, bool& value);
   bool read(const std::string& path, std::string& value);
@@ -96,6 +97,10 @@ class Document {
 
   [[nodiscard]] std::optional<std::size_t> read_choice(const std::string& path,
                                                        std::span<const std::string_view> names);
+  /// The value at a path, which becomes a key; null if absent, or if it is of another type: then it
+  /// is refused with the rule.
+  template <typename Value>
+  const toml::value<Value>* find_value(const std::string& path, std::string_view rule);
   [[nodiscard]] const toml::node* value_at(const std::string& path) const;
   [[nodiscard]] Place place_of(std::string path) const;
   [[nodiscard]] std::string prefix(const Place& place) const;

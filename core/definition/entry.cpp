@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+#include <variant>
+
 #include "core/campaign/law_keys.hpp"
 #include "core/definition/definition_text.hpp"
 
@@ -19,15 +23,63 @@ Entry whole_entry(std::string_view path, std::int64_t value, std::string comment
   return {std::string(path), fmt::format("{}", value), std::move(comment), value};
 }
 
+std::vector<DefinitionItem> items_of(std::vector<Entry> entries) {
+  std::vector<DefinitionItem> items;
+  for (auto& [path, text, comment, value] : entries) {
+    items.push_back({std::move(path), std::move(value)});
+  }
+  return items;
+}
+
+std::string text_of(const std::vector<Entry>& entries, std::string_view between_tables) {
+  std::string text, table;
+  for (const Entry& entry : entries) {
+    const std::size_t dot = entry.path.rfind('.');
+    const std::string of = entry.path.substr(0, dot);
+    if (std::exchange(table, of) != of) {
+      text += fmt::format("{}[{}]\n", text.empty() ? "" : between_tables, of);
+    }
+    text += fmt::format("{} = {}\n", entry.path.substr(dot + 1), entry.text);
+  }
+  return text;
+}
+
+std::vector<DefinitionDifference> differences_between(const std::vector<Entry>& first,
+                                                      const std::vector<Entry>& second) {
+  std::vector<DefinitionDifference> differences;
+  const auto differ = [&](std::string path, const std::string& text, const std::string& other) {
+    if (path == "campaign.runs" || text == other) return;
+    constexpr std::string_view table = "campaign.";
+    if (path.starts_with(table)) path.erase(0, table.size());
+    differences.push_back({std::move(path), text, other});
+  };
+  const auto is_source = [](std::string_view path) {
+    return path.starts_with("drawn.") && (path.ends_with(".file") || path.ends_with(".column"));
+  };
+  for (const Entry& entry : first) {
+    const auto same = std::ranges::find(second, entry.path, &Entry::path);
+    if (same == second.end()) {
+      differ(entry.path, entry.text, "none");
+    } else if (!is_source(entry.path)) {
+      differ(entry.path, entry.text, same->text);
+    }
+  }
+  for (const Entry& entry : second) {
+    const auto same = std::ranges::find(first, entry.path, &Entry::path);
+    if (same == first.end()) differ(entry.path, "none", entry.text);
+  }
+  return differences;
+}
+
 namespace {
 
-Entry law_entry(std::string_view key, Dispersion& law) {
-  if (const double* const number = number_at(law, key)) return real_entry(key, *number);
-  if (const auto* const numbers = numbers_at(law, key)) {
-    return list_entry(key, *numbers, number_text);
-  }
-  if (const auto* const texts = texts_at(law, key)) return list_entry(key, *texts, quoted_text);
-  return text_entry(key, *text_at(law, key));
+Entry law_entry(std::string_view key, double value) { return real_entry(key, value); }
+Entry law_entry(std::string_view key, const std::string& text) { return text_entry(key, text); }
+Entry law_entry(std::string_view key, const std::vector<double>& values) {
+  return list_entry(key, values, number_text);
+}
+Entry law_entry(std::string_view key, const std::vector<std::string>& texts) {
+  return list_entry(key, texts, quoted_text);
 }
 
 }  // namespace
@@ -35,7 +87,10 @@ Entry law_entry(std::string_view key, Dispersion& law) {
 std::vector<Entry> law_entries(const Dispersion& law) {
   Dispersion fields = law;
   std::vector<Entry> entries{choice_entry("law", law.law)};
-  for (const std::string_view key : keys_of(law.law)) entries.push_back(law_entry(key, fields));
+  for (const std::string_view key : keys_of(law.law)) {
+    entries.push_back(std::visit([key](const auto* field) { return law_entry(key, *field); },
+                                 field_of(fields, key)));
+  }
   if (law.is_independent) entries.push_back({"independent", "true", "", "true"});
   return entries;
 }

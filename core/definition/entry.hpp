@@ -46,6 +46,18 @@ template <typename Item, typename TextOf>
   return {std::string(path), text, "", text};
 }
 
+/// Keys and values, as Campaign::items() has them.
+[[nodiscard]] std::vector<DefinitionItem> items_of(std::vector<Entry> entries);
+
+/// The entries as TOML, with a table for each part of the paths before their last dot.
+[[nodiscard]] std::string text_of(const std::vector<Entry>& entries,
+                                  std::string_view between_tables = "\n");
+
+/// What differs but for the number of runs, as Campaign::differences_from() has it. A key that one
+/// side lacks is a difference, too; the names of data files and of their columns are none.
+[[nodiscard]] std::vector<DefinitionDifference> differences_between(
+    const std::vector<Entry>& first, const std::vector<Entry>& second);
+
 /// The law and its own keys.
 [[nodiscard]] std::vector<Entry> law_entries(const Dispersion& law);
 

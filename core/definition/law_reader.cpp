@@ -8,7 +8,9 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "core/campaign/law_keys.hpp"
 #include "core/definition/document.hpp"
@@ -17,32 +19,26 @@ namespace proofmass {
 namespace {
 
 void read_design(Document& document, SamplingDesign& design) {
-  constexpr std::int64_t nominal_points = 32;
+  constexpr std::uint64_t nominal_points = 32;
   document.read("campaign.design", design.kind);
   if (design.kind == DesignKind::random) {
     if (document.find("campaign.points") == nullptr) return;
     document.refuse("campaign.points", "only with campaign.design, which is \"random\"");
     return;
   }
-  std::int64_t points = nominal_points;
-  document.read("campaign.points", points,
+  design.points = nominal_points;
+  document.read("campaign.points", design.points,
                 range::between(2, static_cast<double>(design_points_max)));
-  design.points = static_cast<std::uint64_t>(points);
 }
 
 }  // namespace
 
 void read_identity(Document& document, Campaign& campaign, std::uint64_t& realisations,
                    SamplingDesign& design) {
-  const auto read = [&](const std::string& path, std::uint64_t& value, const Range& range) {
-    auto whole = static_cast<std::int64_t>(value);
-    if (document.read(path, whole, range)) value = static_cast<std::uint64_t>(whole);
-  };
   document.read("campaign.name", campaign.name);
-  read("campaign.seed", campaign.seed, range::not_negative);
-  read("campaign.runs", campaign.num_runs, range::between(1, static_cast<double>(num_runs_max)));
-  read("campaign.realisations", realisations,
-       range::between(1, static_cast<double>(realisations_max)));
+  document.read("campaign.seed", campaign.seed, range::not_negative);
+  document.read("campaign.runs", campaign.num_runs, range::between(1, double{num_runs_max}));
+  document.read("campaign.realisations", realisations, range::between(1, double{realisations_max}));
   read_design(document, design);
 }
 
@@ -55,10 +51,9 @@ constexpr std::array<std::string_view, 14> all_keys{
     "column",        "values",       "with", "probabilities",      "correlations", "expression",
     independent_key, covariances_key};
 
-/// Reads a list of numbers or of texts.
+/// Reads a list of numbers or of names.
 template <typename Item>
-bool read_list(Document& document, const std::string& path, std::string_view rule,
-               std::vector<Item>& items) {
+bool read_field(Document& document, const std::string& path, std::vector<Item>& items) {
   const toml::node* const found = document.find(path);
   if (found == nullptr) return false;
   const toml::array* const list = found->as_array();
@@ -70,23 +65,24 @@ bool read_list(Document& document, const std::string& path, std::string_view rul
     if (is_list) read.push_back(*item);
   }
   if (!is_list) {
-    document.refuse(path, fmt::format("must be a list of at most {} {}", law_list_size_max, rule));
+    document.refuse(
+        path, fmt::format("must be a list of at most {} {}", law_list_size_max,
+                          std::is_same_v<Item, double> ? "numbers" : "names of drawn quantities"));
     return false;
   }
   items = std::move(read);
   return true;
 }
 
+template <typename Value>
+bool read_field(Document& document, const std::string& path, Value& value) {
+  return document.read(path, value);
+}
+
 bool read_key(Document& document, const std::string& path, std::string_view key,
               Dispersion& dispersion) {
-  if (double* const number = number_at(dispersion, key)) return document.read(path, *number);
-  if (auto* const numbers = numbers_at(dispersion, key)) {
-    return read_list(document, path, "numbers", *numbers);
-  }
-  if (auto* const texts = texts_at(dispersion, key)) {
-    return read_list(document, path, "names of drawn quantities", *texts);
-  }
-  return document.read(path, *text_at(dispersion, key));
+  return std::visit([&](auto* field) { return read_field(document, path, *field); },
+                    field_of(dispersion, key));
 }
 
 /// Centre of the law that an assignment replaces: by its keys in the file, or else that of `law`.
@@ -125,7 +121,7 @@ bool read_covariances(Document& document, const std::string& path, Dispersion& d
   if (document.find(path + ".correlations") != nullptr) {
     document.refuse(key_path, "stands in place of correlations: leave out one of them");
   } else {
-    (void)read_list(document, key_path, "numbers", dispersion.correlations);
+    (void)read_field(document, key_path, dispersion.correlations);
   }
   return true;
 }
@@ -150,7 +146,7 @@ Dispersion read_law(Document& document, const std::string& path, const Dispersio
     if (document.find(key_path) != nullptr || law == base.law) {
       read_key(document, key_path, key, dispersion);
     } else if (is_assigned && (key == "value" || key == "mean") && base.law != Law::table) {
-      *number_at(dispersion, key) = replaced_centre(document, path, base);
+      *std::get<double*>(field_of(dispersion, key)) = replaced_centre(document, path, base);
     } else {
       document.refuse_absence(
           key_path, fmt::format("law {} needs it{}", name_of(law),

@@ -17,12 +17,11 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/recording.hpp"
-#include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
+#include "core/definition/entry.hpp"
 #include "core/math/elementary.hpp"
 #include "core/model.hpp"
 #include "core/random/normal_deviates.hpp"
@@ -71,12 +70,10 @@ const std::array<Field, 11> fields{{
 }};
 
 Dispersion around(double centre, double half_width) {
-  Dispersion dispersion;
-  dispersion.law = half_width == 0.0 ? Law::fixed : Law::uniform;
-  dispersion.value = centre;
-  dispersion.minimum = centre - half_width;
-  dispersion.maximum = centre + half_width;
-  return dispersion;
+  return {.law = half_width == 0.0 ? Law::fixed : Law::uniform,
+          .minimum = centre - half_width,
+          .maximum = centre + half_width,
+          .value = centre};
 }
 
 class OscillatorCampaign final : public Campaign {
@@ -95,31 +92,17 @@ class OscillatorCampaign final : public Campaign {
     return std::make_unique<OscillatorCampaign>(*this);
   }
   [[nodiscard]] std::unique_ptr<const Plan> prepare() const override;
-  [[nodiscard]] Definition definition(TableColumns) const override { return {.text = text()}; }
+  /// All of the campaign as TOML, in the one form that campaign_of() takes.
+  [[nodiscard]] Definition definition(TableColumns) const override {
+    return {.text = detail::text_of(entries(), "")};
+  }
   [[nodiscard]] std::vector<DefinitionItem> items() const override {
-    std::vector<DefinitionItem> items{{"campaign.name", name},
-                                      {"campaign.seed", static_cast<std::int64_t>(seed)},
-                                      {"campaign.runs", static_cast<std::int64_t>(num_runs)}};
-    for (const Field& field : fields) {
-      if (field.value == &Oscillator::amplitude_objective_m_s2 && !has_amplitude()) continue;
-      items.push_back({std::string(field.info.path), oscillator.*field.value});
-    }
-    return items;
+    return detail::items_of(entries());
   }
   [[nodiscard]] std::vector<DefinitionDifference> differences_from(
       const Campaign& other) const override {
-    const std::vector<DefinitionItem> mine = items(), others = other.items();
-    std::vector<DefinitionDifference> differences;
-    for (std::size_t i = 0; i < std::max(mine.size(), others.size()); ++i) {
-      const std::string& key = i < mine.size() ? mine[i].key : others[i].key;
-      const DefinitionValue value = i < mine.size() ? mine[i].value : 0.0;
-      const DefinitionValue other_value = i < others.size() ? others[i].value : 0.0;
-      if (value == other_value || key == "campaign.runs") continue;
-      const bool is_identity = key.starts_with("campaign.");
-      differences.push_back(
-          {key.substr(is_identity ? 9 : 0), value_text(value), value_text(other_value)});
-    }
-    return differences;
+    return detail::differences_between(entries(),
+                                       dynamic_cast<const OscillatorCampaign&>(other).entries());
   }
   [[nodiscard]] bool has_amplitude() const { return oscillator.amplitude_objective_m_s2 > 0.0; }
   [[nodiscard]] ResultSchema results() const override;
@@ -156,24 +139,15 @@ class OscillatorCampaign final : public Campaign {
     return values;
   }
 
-  /// All of the campaign as TOML, in the one form that campaign_of() takes.
-  [[nodiscard]] std::string text() const {
-    std::string text, table;
-    for (const DefinitionItem& item : items()) {
-      const std::size_t dot = item.key.find('.');
-      if (std::exchange(table, item.key.substr(0, dot)) != item.key.substr(0, dot)) {
-        text += fmt::format("[{}]\n", table);
-      }
-      text += fmt::format("{} = {}\n", item.key.substr(dot + 1), value_text(item.value));
-    }
-    return text;
-  }
-
  private:
-  [[nodiscard]] static std::string value_text(const DefinitionValue& value) {
-    if (const auto* const whole = std::get_if<std::int64_t>(&value)) return fmt::to_string(*whole);
-    if (const auto* const number = std::get_if<double>(&value)) return detail::number_text(*number);
-    return detail::quoted_text(std::get<std::string>(value));
+  /// The keys of its campaign file.
+  [[nodiscard]] std::vector<detail::Entry> entries() const {
+    std::vector<detail::Entry> entries = detail::campaign_entries(*this);
+    for (const Field& field : fields) {
+      if (field.value == &Oscillator::amplitude_objective_m_s2 && !has_amplitude()) continue;
+      entries.push_back(detail::real_entry(field.info.path, oscillator.*field.value));
+    }
+    return entries;
   }
 };
 
@@ -268,41 +242,31 @@ std::unique_ptr<const Plan> OscillatorCampaign::prepare() const {
 }
 
 ResultSchema OscillatorCampaign::results() const {
-  ResultSchema schema{.quantities = {{"in_phase", "_m_s2", "P", "m/s²", 1e-9, "nm/s²",
-                                      std::numeric_limits<double>::infinity(),
-                                      PublishedAccuracy{3e-11, 1e-11, 1e-11}},
-                                     {.name = "quadrature",
-                                      .unit_suffix = "_m_s2",
-                                      .symbol = "Q",
-                                      .unit = "m/s²",
-                                      .display_scale = 1e-9,
-                                      .display_unit = "nm/s²",
-                                      .has_standard_error = true}},
+  const auto quantity = [](const char* quantity_name, std::string_view symbol) {
+    return Quantity{.name = quantity_name,
+                    .unit_suffix = "_m_s2",
+                    .symbol = symbol,
+                    .unit = "m/s²",
+                    .display_scale = 1e-9,
+                    .display_unit = "nm/s²"};
+  };
+  ResultSchema schema{.quantities = {quantity("in_phase", "P"), quantity("quadrature", "Q")},
                       .health = {{"peak_reading", "_m_s2", "m/s²"}},
                       .loss_causes = {"out_of_range"},
                       .loss_sessions = {"steady_state"},
                       .num_draws_max = 1,
                       .published_source = "made up for tests"};
-  if (has_amplitude()) {
-    schema.quantities.push_back({.name = "amplitude",
-                                 .unit_suffix = "_m_s2",
-                                 .symbol = "√(P² + Q²)",
-                                 .unit = "m/s²",
-                                 .display_scale = 1e-9,
-                                 .display_unit = "nm/s²"});
-  }
+  schema.quantities[0].published = PublishedAccuracy{3e-11, 1e-11, 1e-11};
+  schema.quantities[1].has_standard_error = true;
+  if (has_amplitude()) schema.quantities.push_back(quantity("amplitude", "√(P² + Q²)"));
   return schema;
 }
 
 std::unique_ptr<OscillatorCampaign> read(Document& document) {
   auto campaign = std::make_unique<OscillatorCampaign>();
-  auto seed = static_cast<std::int64_t>(campaign->seed);
-  auto num_runs = static_cast<std::int64_t>(campaign->num_runs);
   document.read("campaign.name", campaign->name);
-  document.read("campaign.seed", seed, range::not_negative);
-  document.read("campaign.runs", num_runs, range::between(1, double{num_runs_max}));
-  campaign->seed = static_cast<std::uint64_t>(seed);
-  campaign->num_runs = static_cast<std::uint64_t>(num_runs);
+  document.read("campaign.seed", campaign->seed, range::not_negative);
+  document.read("campaign.runs", campaign->num_runs, range::between(1, double{num_runs_max}));
   for (const Field& field : fields) {
     document.read(std::string(field.info.path), campaign->oscillator.*field.value,
                   field.info.range);
@@ -354,7 +318,9 @@ class OscillatorModel final : public Model {
                                                         DataFiles&) const override {
     return read(document);
   }
-  [[nodiscard]] std::string example() const override { return OscillatorCampaign().text(); }
+  [[nodiscard]] std::string example() const override {
+    return OscillatorCampaign().definition({}).text;
+  }
   [[nodiscard]] std::string_view example_file() const override { return "oscillator.toml"; }
 };
 

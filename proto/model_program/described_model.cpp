@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -19,13 +20,13 @@
 
 namespace proofmass::wire {
 
-DescribedCampaign::DescribedCampaign(const DescribedModel& of) : model_(&of) {
+DescribedCampaign::DescribedCampaign(const DescribedModel& of)
+    : laws(of.parts().laws), model_(&of) {
   name = name_of_model(of.version());
-  for (const ProgramParameter& parameter : description().parameters) {
+  for (const ProgramParameter& parameter : of.parts().parameters) {
     parameters.push_back(parameter.value);
   }
-  for (const ProgramDraw& draw : description().drawn) laws.push_back(draw.law);
-  for (const ProgramQuantity& quantity : description().quantities) {
+  for (const ProgramQuantity& quantity : of.parts().quantities) {
     objectives_.push_back(quantity.objective);
   }
 }
@@ -34,9 +35,7 @@ const Model& DescribedCampaign::model() const { return *model_; }
 
 const ProgramDescription& DescribedCampaign::description() const { return model_->parts(); }
 
-std::unique_ptr<const Plan> DescribedCampaign::prepare() const {
-  return model_->program().prepare(*this);
-}
+std::unique_ptr<const Plan> DescribedCampaign::prepare() const { return model_->prepare(*this); }
 
 std::string DescribedCampaign::note() const {
   if (model_->is_imported()) {
@@ -48,9 +47,7 @@ std::string DescribedCampaign::note() const {
          "run computes may depend on its machine";
 }
 
-LawSet DescribedCampaign::law_set() const {
-  return {.names = model_->drawn_names(), .laws = laws, .table = "drawn"};
-}
+LawSet DescribedCampaign::law_set() const { return description().law_set(laws); }
 
 std::vector<detail::Entry> DescribedCampaign::entries() const {
   const ProgramDescription& of = description();
@@ -72,62 +69,27 @@ std::vector<detail::Entry> DescribedCampaign::entries() const {
   return entries;
 }
 
-std::vector<DefinitionItem> DescribedCampaign::items() const {
-  std::vector<DefinitionItem> items;
-  for (detail::Entry& entry : entries()) {
-    items.push_back({std::move(entry.path), std::move(entry.value)});
-  }
-  return items;
-}
+std::vector<DefinitionItem> DescribedCampaign::items() const { return detail::items_of(entries()); }
 
 Definition DescribedCampaign::definition(TableColumns columns) const {
-  Definition definition{.text = {}, .model = std::string(model_->version())};
-  std::string table;
-  for (const detail::Entry& entry : entries()) {
-    const std::size_t dot = entry.path.rfind('.');
-    const std::string of = entry.path.substr(0, dot);
-    if (std::exchange(table, of) != of) {
-      definition.text += fmt::format("{}[{}]\n", definition.text.empty() ? "" : "\n", of);
-    }
-    definition.text += fmt::format("{} = {}\n", entry.path.substr(dot + 1), entry.text);
-  }
+  Definition definition{.text = detail::text_of(entries()),
+                        .model = std::string(model_->version())};
   if (columns == TableColumns::included) definition.table_columns = table_columns;
   return definition;
 }
 
 std::vector<DefinitionDifference> DescribedCampaign::differences_from(const Campaign& other) const {
-  const auto* const described = dynamic_cast<const DescribedCampaign*>(&other);
-  if (described == nullptr) return {};
-  const DescribedCampaign& second = *described;
-  // Laws may have different keys: a key that one campaign lacks is a difference, too. The name of a
-  // data file, or of a column, is none.
-  std::vector<detail::Entry> others = second.entries();
-  const auto is_source = [](std::string_view key) {
-    return key.starts_with("drawn.") && (key.ends_with(".file") || key.ends_with(".column"));
-  };
+  const auto* const second = dynamic_cast<const DescribedCampaign*>(&other);
+  if (second == nullptr) return {};
   std::vector<DefinitionDifference> differences;
-  const auto differ = [&](const std::string& key, std::string first, std::string second_text) {
-    if (key == "campaign.runs" || first == second_text) return;
-    const std::string_view prefix = "campaign.";
-    differences.push_back({key.starts_with(prefix) ? key.substr(prefix.size()) : key,
-                           std::move(first), std::move(second_text)});
-  };
-  const bool are_same_drawn = model_->drawn_names() == second.model_->drawn_names();
+  const bool are_same_drawn = description().drawn_names == second->description().drawn_names;
   for (std::size_t i = 0; are_same_drawn && i < laws.size(); ++i) {
-    if (laws[i].law != Law::table || second.laws[i].law != Law::table) continue;
-    const auto difference = table_difference({*this, law_set()}, {second, second.law_set()}, i);
+    if (laws[i].law != Law::table || second->laws[i].law != Law::table) continue;
+    const auto difference = table_difference({*this, law_set()}, {*second, second->law_set()}, i);
     if (difference) differences.push_back(*difference);
   }
-  for (const detail::Entry& entry : entries()) {
-    const auto same = std::ranges::find(others, entry.path, &detail::Entry::path);
-    if (same == others.end()) {
-      differ(entry.path, entry.text, "none");
-    } else {
-      if (!is_source(entry.path)) differ(entry.path, entry.text, same->text);
-      others.erase(same);
-    }
-  }
-  for (const detail::Entry& entry : others) differ(entry.path, "none", entry.text);
+  std::ranges::copy(detail::differences_between(entries(), second->entries()),
+                    std::back_inserter(differences));
   return differences;
 }
 
@@ -198,38 +160,35 @@ ResultSchema DescribedCampaign::results() const {
   return schema;
 }
 
-DescribedModel::DescribedModel(ProgramDescription description, std::uint64_t reference_digest)
-    : DescribedModel(std::move(description), nullptr) {
-  reference_digest_ = reference_digest;
-}
-
 DescribedModel::DescribedModel(ProgramDescription description,
-                               std::unique_ptr<const RunnableProgram> program)
-    : parts_(std::move(description)), program_(std::move(program)) {
-  for (const ProgramDraw& draw : parts_.drawn) {
-    drawn_names_.push_back(draw.name);
-    drawn_.push_back({draw.name, draw.unit});
+                               std::optional<std::uint64_t> reference_digest,
+                               PrepareProgram prepare)
+    : parts_(std::move(description)),
+      prepare_(std::move(prepare)),
+      example_file_(fmt::format("{}.toml", name_of_model(parts_.version))),
+      reference_digest_(reference_digest) {
+  for (std::size_t i = 0; i < parts_.drawn_names.size(); ++i) {
+    drawn_.push_back({parts_.drawn_names[i], parts_.drawn_units[i]});
   }
-  example_file_ = DescribedCampaign(*this).name + ".toml";
 }
 
 std::string DescribedModel::why_no_runs() const {
-  if (program_) return {};
-  if (!is_imported()) {
-    const auto other = std::ranges::find_if(models(), [this](const Model* model) {
-      return name_of_model(model->version()) == name_of_model(version()) &&
-             model->version() != version();
-    });
-    const std::string version_here =
-        other == models().end() ? "" : fmt::format(" ({} is)", (*other)->version());
-    return fmt::format("its program is not here{}; name it with --model-program", version_here);
+  if (prepare_) return {};
+  if (is_imported()) {
+    return fmt::format("its results were imported from {}; no more can be computed",
+                       parts_.imported_from);
   }
-  return fmt::format("its results were imported from {}; no more can be computed",
-                     parts_.imported_from);
+  const auto other = std::ranges::find_if(models(), [this](const Model* model) {
+    return name_of_model(model->version()) == name_of_model(version()) &&
+           model->version() != version();
+  });
+  const std::string version_here =
+      other == models().end() ? "" : fmt::format(" ({} is)", (*other)->version());
+  return fmt::format("its program is not here{}; name it with --model-program", version_here);
 }
 
-const RunnableProgram& DescribedModel::program() const {
-  if (program_) return *program_;
+std::unique_ptr<const Plan> DescribedModel::prepare(const DescribedCampaign& campaign) const {
+  if (prepare_) return prepare_(campaign);
   throw ModelProgramError(fmt::format("model = {} ({})", version(), why_no_runs()));
 }
 
@@ -289,7 +248,8 @@ std::unique_ptr<Campaign> DescribedModel::read_campaign(Document& document,
         });
     campaign->validate();
     check_independence(campaign->law_set(), *campaign);
-    program().check(*campaign);
+    // With no runs the program does nothing but accept the parameters, or refuse them.
+    (void)campaign->prepare()->simulate_batch({}, InstructionSet::scalar);
   } catch (const ConfigError& error) {
     throw document.located(error);
   }
@@ -300,6 +260,23 @@ std::string DescribedModel::example() const {
   std::string text = DescribedCampaign(*this).definition(TableColumns::included).text;
   const std::size_t second_line = text.find('\n') + 1;
   return text.insert(second_line, fmt::format("model = \"{}\"\n", name_of_model(version())));
+}
+
+void set_estimates(std::vector<double> estimate, std::vector<double> errors, RunResult& result) {
+  const auto is_error = [](double value) { return is_in_range(value) && value >= 0.0; };
+  if (!std::ranges::all_of(estimate, is_in_range) || !std::ranges::all_of(errors, is_error)) {
+    result.status = RunStatus::not_finite;
+    return;
+  }
+  result.num_rounds = 1;
+  if (!errors.empty()) result.correlations.assign(errors.size() * (errors.size() - 1) / 2, 0.0);
+  result.estimate = std::move(estimate);
+  result.standard_error = std::move(errors);
+}
+
+void set_lost(RunResult& result) {
+  result.status = RunStatus::lost;
+  result.loss = {.cause = 1, .session = 1};
 }
 
 namespace {
@@ -320,9 +297,8 @@ const DescribedModel& described_model(const std::string& text, std::uint64_t ref
         fmt::format("description: this program has read {} others, of {} bytes; start it again",
                     models.size(), size));
   }
-  ProgramDescription description = description_in(text);
   const auto made =
-      models.try_emplace({text, reference_digest}, std::move(description), reference_digest);
+      models.try_emplace({text, reference_digest}, description_in(text), reference_digest, nullptr);
   size += text.size();
   return made.first->second;
 }
@@ -343,15 +319,6 @@ const Model* own_model(const ModelRecord& record) {
   return in_cpp == models().end() ? nullptr : *in_cpp;
 }
 
-/// `hardy2013-6 and oscillator-1`.
-std::string own_versions() {
-  std::string text;
-  for (const Model* const own : models()) {
-    text = fmt::format("{}{}{}", own->version(), text.empty() ? "" : " and ", text);
-  }
-  return text;
-}
-
 }  // namespace
 
 const Model& recorded_model(const ModelRecord& record) {
@@ -359,7 +326,7 @@ const Model& recorded_model(const ModelRecord& record) {
   if (record.description.empty()) {
     throw ModelProgramError(fmt::format(
         "is of the model {}, and this program has {}; --model-program names that of another model",
-        record.version, own_versions()));
+        record.version, model_versions()));
   }
   try {
     const Model& described = described_model(record.description, record.reference_digest);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -77,29 +78,19 @@ class DescribedCampaign final : public Campaign {
   std::vector<double> objectives_;
 };
 
-/// What a description lacks: the program itself, which computes.
-class RunnableProgram {
- public:
-  virtual ~RunnableProgram() = default;
-
-  [[nodiscard]] virtual std::unique_ptr<const Plan> prepare(
-      const DescribedCampaign& campaign) const = 0;
-  /// Asks the program whether it accepts the parameters.
-  /// @throws ConfigError naming the one that it refuses; ModelProgramError
-  virtual void check(const DescribedCampaign& campaign) const = 0;
-};
+/// What a description lacks, the program itself: it makes a plan, whose batches throw ConfigError
+/// naming the parameter that the program refuses, if it does.
+using PrepareProgram =
+    std::function<std::unique_ptr<const Plan>(const DescribedCampaign& campaign)>;
 
 /// A model that a description tells of, with its program or without: then it does all that needs no
 /// simulation.
 class DescribedModel final : public Model {
  public:
-  explicit DescribedModel(ProgramDescription description,
-                          std::unique_ptr<const RunnableProgram> program);
-  /// Without its program: what needs it throws ModelProgramError.
-  /// @param reference_digest  As the program computed it.
-  DescribedModel(ProgramDescription description, std::uint64_t reference_digest);
-  DescribedModel(const DescribedModel&) = delete;
-  DescribedModel& operator=(const DescribedModel&) = delete;
+  /// @param reference_digest  As the program computed it elsewhere; nothing: it is computed here.
+  /// @param prepare           Null without the program: what needs it throws ModelProgramError.
+  DescribedModel(ProgramDescription description, std::optional<std::uint64_t> reference_digest,
+                 PrepareProgram prepare);
 
   [[nodiscard]] std::string_view version() const override { return parts_.version; }
   [[nodiscard]] std::string_view purpose() const override { return parts_.purpose; }
@@ -121,19 +112,26 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::string_view example_file() const override { return example_file_; }
 
   [[nodiscard]] const ProgramDescription& parts() const { return parts_; }
-  [[nodiscard]] const std::vector<std::string>& drawn_names() const { return drawn_names_; }
-  /// @throws ModelProgramError that says how to name it if it is not there.
-  [[nodiscard]] const RunnableProgram& program() const;
+  /// @throws ModelProgramError that says how to name the program if it is not there.
+  [[nodiscard]] std::unique_ptr<const Plan> prepare(const DescribedCampaign& campaign) const;
 
  private:
   ProgramDescription parts_;
-  std::unique_ptr<const RunnableProgram> program_;
-  std::vector<std::string> drawn_names_;
+  PrepareProgram prepare_;
   std::vector<DrawnQuantity> drawn_;
   std::string example_file_;
   mutable std::mutex digest_mutex_;
   mutable std::optional<std::uint64_t> reference_digest_;
 };
+
+/// What a run of these models found out. Standard errors are taken as those of independent
+/// estimates.
+/// @param errors  Of the quantities that have one. If a number is out of range or an error
+/// negative,
+///                the run is not finite.
+void set_estimates(std::vector<double> estimate, std::vector<double> errors, RunResult& result);
+/// A run without any estimate.
+void set_lost(RunResult& result);
 
 /// By which a database, or a client, says what a campaign's model is. All of it may be anything.
 struct ModelRecord {

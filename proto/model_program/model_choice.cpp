@@ -79,12 +79,10 @@ void choose_models(int argc, const char* const* argv) {
   use_models(std::move(used));
 }
 
-std::vector<std::string> model_program_arguments() {
-  std::vector<std::string> arguments;
+void add_model_programs(std::vector<std::string>& arguments) {
   for (const ChosenModel& chosen : chosen_models()) {
     arguments.insert(arguments.end(), {std::string(option), chosen.program.string()});
   }
-  return arguments;
 }
 
 std::optional<std::filesystem::path> program_of(const Model& model) {

@@ -22,8 +22,9 @@ namespace proofmass::wire {
 /// @throws ModelProgramError as model_of() does; InvalidArgument if two have one version.
 void choose_models(int argc, const char* const* argv);
 
-/// The options that name the programs of choose_models(), for programs that this process starts.
-[[nodiscard]] std::vector<std::string> model_program_arguments();
+/// Appends the options that name the programs of choose_models(), for a program that this process
+/// starts.
+void add_model_programs(std::vector<std::string>& arguments);
 
 /// The program of one of models(), if it has one.
 [[nodiscard]] std::optional<std::filesystem::path> program_of(const Model& model);

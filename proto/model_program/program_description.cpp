@@ -6,6 +6,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <variant>
 
 #include "core/campaign/expression.hpp"
 #include "core/campaign/law_keys.hpp"
@@ -22,25 +23,56 @@ using Json = nlohmann::json;
 constexpr std::size_t parameters_max = 1000;
 constexpr std::size_t drawn_max = 1000;
 constexpr std::size_t streams_max = 100;
-constexpr std::size_t text_size_max = 200;
+constexpr std::size_t text_size_max = expression_size_max;
 constexpr int questions_version = 1;
 
 [[noreturn]] void refuse(const std::string& field, const Json& value, std::string_view rule) {
   std::string shown = value.dump(-1, ' ', false, Json::error_handler_t::replace);
-  if (shown.size() > text_size_max) shown = shown.substr(0, text_size_max) + "...";
+  constexpr std::size_t shown_size_max = 200;
+  if (shown.size() > shown_size_max) shown = shown.substr(0, shown_size_max) + "...";
   throw ModelProgramError(
       fmt::format("description: {} = {} ({})", field, value.is_null() ? "nothing" : shown, rule));
 }
 
-std::string text_in(const Json& value, const std::string& field, std::size_t size_max) {
-  const bool is_text = value.is_string() && value.get_ref<const std::string&>().size() <= size_max;
-  if (is_text && visible_text(value.get_ref<const std::string&>()) == value) return value;
-  refuse(field, value, fmt::format("must be a text of one line, at most {} bytes", size_max));
+// Each of these takes a value of the answer, or refuses it.
+
+void take(const Json& value, const std::string& field, std::string& text) {
+  if (value.is_string()) text = value;
+  if (!value.is_string() || text.size() > text_size_max || visible_text(text) != text) {
+    refuse(field, value,
+           fmt::format("must be a text of one line, at most {} bytes", text_size_max));
+  }
 }
 
-double number_in(const Json& value, const std::string& field) {
-  if (value.is_number() && is_in_range(value.get<double>())) return value;
-  refuse(field, value, "must be a number");
+void take(const Json& value, const std::string& field, double& number) {
+  if (!value.is_number() || !is_in_range(value.get<double>())) {
+    refuse(field, value, "must be a number");
+  }
+  number = value;
+}
+
+void take(const Json& value, const std::string& field, bool& flag) {
+  if (!value.is_boolean()) refuse(field, value, "must be true or false");
+  flag = value;
+}
+
+/// @param take_entry  Of an entry and its field.
+template <typename TakeEntry>
+void take_list(const Json& list, const std::string& field, std::size_t most,
+               const TakeEntry& take_entry) {
+  if (!list.is_array() || list.size() > most) {
+    refuse(field, list, fmt::format("must be a list of at most {}", most));
+  }
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    take_entry(list[i], fmt::format("{}[{}]", field, i));
+  }
+}
+
+template <typename Item>
+void take(const Json& list, const std::string& field, std::vector<Item>& items) {
+  take_list(list, field, law_list_size_max, [&](const Json& entry, const std::string& of_entry) {
+    take(entry, of_entry, items.emplace_back());
+  });
 }
 
 /// An object of the answer, of which each key is asked for by its name.
@@ -50,115 +82,86 @@ class Part {
     if (!object.is_object()) refuse(path_.empty() ? "answer" : path_, object, "must be an object");
   }
 
-  [[nodiscard]] std::string text_or(const std::string& key, const std::string& otherwise) const {
-    return has(key) ? text(key) : otherwise;
-  }
-  [[nodiscard]] std::string text(const std::string& key,
-                                 std::size_t size_max = text_size_max) const {
-    return text_in(at(key), field(key), size_max);
-  }
-  /// A name in files and SQL.
-  [[nodiscard]] std::string name() const {
-    const std::string name = text("name");
-    constexpr std::size_t size_max = 64;
-    const auto is_allowed = [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-    };
-    const bool begins_well = !name.empty() && name[0] >= 'a' && name[0] <= 'z';
-    if (begins_well && name.size() <= size_max && std::ranges::all_of(name, is_allowed))
-      return name;
-    refuse(field("name"), name, "must be 1 to 64 of [a-z0-9_], a letter first");
-  }
-  [[nodiscard]] double number(const std::string& key, double otherwise) const {
-    return has(key) ? number(key) : otherwise;
-  }
-  [[nodiscard]] double number(const std::string& key) const {
-    return number_in(at(key), field(key));
-  }
-  [[nodiscard]] std::size_t count(const std::string& key, std::size_t otherwise,
-                                  std::size_t most) const {
-    if (!has(key)) return otherwise;
-    const Json& value = at(key);
-    if (!value.is_number_unsigned() || value < 1 || value > most) {
-      refuse(field(key), value, fmt::format("must be a whole number in [1, {}]", most));
-    }
-    return value;
-  }
-  [[nodiscard]] bool flag(const std::string& key) const {
-    if (!has(key)) return false;
-    if (!at(key).is_boolean()) refuse(field(key), at(key), "must be true or false");
-    return at(key);
-  }
-  /// The entries of a list, which is empty if there is none.
-  void each(const std::string& key, std::size_t most,
-            const std::function<void(const Json&, const std::string&)>& take) const {
-    if (!has(key)) return;
-    const Json& list = at(key);
-    if (!list.is_array() || list.size() > most) {
-      refuse(field(key), list, fmt::format("must be a list of at most {}", most));
-    }
-    for (std::size_t i = 0; i < list.size(); ++i)
-      take(list[i], fmt::format("{}[{}]", field(key), i));
-  }
+  /// Null if it is not there.
   [[nodiscard]] const Json& at(const std::string& key) const {
     static const Json nothing;
-    return has(key) ? object_.at(key) : nothing;
+    return object_.contains(key) ? object_.at(key) : nothing;
   }
   [[nodiscard]] std::string field(const std::string& key) const {
     return path_.empty() ? key : path_ + "." + key;
   }
 
- private:
-  [[nodiscard]] bool has(const std::string& key) const { return object_.contains(key); }
+  template <typename Value>
+  void read(const std::string& key, Value& value) const {
+    take(at(key), field(key), value);
+  }
+  /// Leaves the value alone if the key is not there.
+  template <typename Value>
+  void read_if_there(const std::string& key, Value& value) const {
+    if (object_.contains(key)) read(key, value);
+  }
+  void read_if_there(const std::string& key, std::size_t& count, std::size_t most) const {
+    if (!object_.contains(key)) return;
+    if (!at(key).is_number_unsigned() || at(key) < 1 || at(key) > most) {
+      refuse(field(key), at(key), fmt::format("must be a whole number in [1, {}]", most));
+    }
+    count = at(key);
+  }
+  /// A name in files and SQL.
+  [[nodiscard]] std::string name() const {
+    std::string name;
+    read("name", name);
+    constexpr std::size_t size_max = 64;
+    const bool is_allowed =
+        name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == name.npos;
+    const bool begins_well = !name.empty() && name[0] >= 'a' && name[0] <= 'z';
+    if (begins_well && name.size() <= size_max && is_allowed) return name;
+    refuse(field("name"), name, "must be 1 to 64 of [a-z0-9_], a letter first");
+  }
+  /// The objects of a list, which may be missing.
+  void each(const std::string& key, std::size_t most,
+            const std::function<void(const Part&)>& take_part) const {
+    if (!object_.contains(key)) return;
+    take_list(at(key), field(key), most, [&](const Json& entry, const std::string& of_entry) {
+      take_part(Part(entry, of_entry));
+    });
+  }
 
+ private:
   const Json& object_;
   std::string path_;
 };
 
 /// @param may_be_table  The law may be a table: its values are stored with the campaign.
-ProgramDraw draw_in(const Part& part, bool may_be_table) {
-  ProgramDraw draw;
-  draw.name = part.name();
-  draw.unit = part.text_or("unit", "1");
-  const std::string law = part.text("law");
+Dispersion law_in(const Part& part, bool may_be_table) {
+  std::string name;
+  part.read("law", name);
   const std::span<const std::string_view> names = names_of(Law{});
-  const auto found = std::ranges::find(names, law);
-  draw.law.law = static_cast<Law>(found - names.begin() + 1);
-  if (found == names.end() || (draw.law.law == Law::table && !may_be_table)) {
-    refuse(part.field("law"), law,
+  const auto found = std::ranges::find(names, name);
+  Dispersion law{.law = static_cast<Law>(found - names.begin() + 1)};
+  if (found == names.end() || (law.law == Law::table && !may_be_table)) {
+    refuse(part.field("law"), name,
            fmt::format("must be {}; a table is named by a campaign file",
                        detail::alternatives(names)));
   }
-  draw.law.is_independent = draw.law.law == Law::table && part.flag("independent");
-  for (const std::string_view name : keys_of(draw.law.law)) {
-    const std::string key(name);
-    if (double* const number = number_at(draw.law, key)) {
-      *number = part.number(key);
-    } else if (auto* const numbers = numbers_at(draw.law, key)) {
-      part.each(key, law_list_size_max, [&](const Json& entry, const std::string& path) {
-        numbers->push_back(number_in(entry, path));
-      });
-    } else if (auto* const texts = texts_at(draw.law, key)) {
-      part.each(key, law_list_size_max, [&](const Json& entry, const std::string& path) {
-        texts->push_back(text_in(entry, path, text_size_max));
-      });
-    } else {
-      *text_at(draw.law, key) = part.text(key, expression_size_max);
-    }
+  if (law.law == Law::table) part.read_if_there("independent", law.is_independent);
+  for (const std::string_view key : keys_of(law.law)) {
+    std::visit([&](auto* value) { part.read(std::string(key), *value); }, field_of(law, key));
   }
-  return draw;
+  return law;
 }
 
 ProgramQuantity quantity_in(const Part& part) {
   ProgramQuantity quantity;
-  quantity.name = part.name();
-  quantity.truth = part.text("truth", expression_size_max);
-  quantity.symbol = part.text_or("symbol", quantity.name);
-  quantity.unit = part.text_or("unit", "1");
-  quantity.display_scale = part.number("display_scale", 1.0);
-  quantity.display_unit = part.text_or("display_unit", quantity.unit);
-  quantity.objective = part.number("objective", quantity.objective);
-  quantity.has_standard_error = part.flag("standard_error");
+  quantity.name = quantity.symbol = part.name();
+  part.read("truth", quantity.truth);
+  part.read_if_there("symbol", quantity.symbol);
+  part.read_if_there("unit", quantity.unit);
+  quantity.display_unit = quantity.unit;
+  part.read_if_there("display_unit", quantity.display_unit);
+  part.read_if_there("display_scale", quantity.display_scale);
+  part.read_if_there("objective", quantity.objective);
+  part.read_if_there("standard_error", quantity.has_standard_error);
   if (quantity.display_scale <= 0.0) {
     refuse(part.field("display_scale"), quantity.display_scale, "must be > 0");
   }
@@ -168,15 +171,12 @@ ProgramQuantity quantity_in(const Part& part) {
 
 /// Every name is there once, and a truth names what there is.
 void check_names(const ProgramDescription& description) {
-  std::set<std::string_view> inputs;
-  const auto add = [](std::set<std::string_view>& names, std::string_view kind,
-                      const std::string& name) {
-    if (!names.insert(name).second) refuse(std::string(kind), name, "must have a name of its own");
+  std::set<std::string_view> inputs, names;
+  const auto add = [](std::set<std::string_view>& to, const char* kind, const std::string& name) {
+    if (!to.insert(name).second) refuse(kind, name, "must have a name of its own");
   };
-  for (const ProgramParameter& parameter : description.parameters)
-    add(inputs, "parameters", parameter.name);
-  for (const ProgramDraw& draw : description.drawn) add(inputs, "drawn", draw.name);
-  std::set<std::string_view> names;
+  for (const auto& parameter : description.parameters) add(inputs, "parameters", parameter.name);
+  for (const std::string& name : description.drawn_names) add(inputs, "drawn", name);
   for (const ProgramQuantity& quantity : description.quantities) {
     add(names, "quantities", quantity.name);
     try {
@@ -191,18 +191,20 @@ void check_names(const ProgramDescription& description) {
   if (names.empty()) refuse("quantities", nullptr, "must be at least one");
 }
 
-void check_drawn(const ProgramDescription& description) {
-  std::vector<std::string> names;
-  std::vector<Dispersion> laws;
-  for (const ProgramDraw& draw : description.drawn) {
-    names.push_back(draw.name);
-    laws.push_back(draw.law);
-  }
-  try {
-    check_laws({.names = names, .laws = laws, .table = "drawn"});
-  } catch (const ConfigError& error) {
-    throw ModelProgramError(fmt::format("description: {}", error.what()));
-  }
+void read_lists(const Part& part, ProgramDescription& description) {
+  part.each("parameters", parameters_max, [&](const Part& parameter) {
+    description.parameters.push_back({.name = parameter.name()});
+    parameter.read("value", description.parameters.back().value);
+  });
+  part.each("quantities", quantities_max,
+            [&](const Part& quantity) { description.quantities.push_back(quantity_in(quantity)); });
+  part.each("drawn", drawn_max, [&](const Part& drawn) {
+    description.drawn_names.push_back(drawn.name());
+    drawn.read_if_there("unit", description.drawn_units.emplace_back("1"));
+    description.laws.push_back(law_in(drawn, !description.imported_from.empty()));
+  });
+  part.each("streams", streams_max,
+            [&](const Part& stream) { description.streams.push_back(stream.name()); });
 }
 
 }  // namespace
@@ -224,30 +226,24 @@ ProgramDescription description_in(std::string_view answer) {
   }
   ProgramDescription description;
   description.text = json.dump();
-  description.version = fmt::format("{}-{}", part.text("name"), part.text("version"));
-  description.purpose =
-      part.text_or("purpose", fmt::format("Runs campaigns of {}.", part.text("name")));
-  description.imported_from = part.text_or("imported_from", "");
-  description.runs_at_once = part.count("runs_at_once", 1, runs_at_once_max);
-  description.limits = {
-      .answer_time_max = std::chrono::seconds(part.count("run_time_max_s", 600, 86400)),
-      .memory_max_mib = part.count("memory_max_mib", 4096, std::size_t{1} << 20)};
+  std::string name, version;
+  part.read("name", name);
+  part.read("version", version);
+  description.version = fmt::format("{}-{}", name, version);
   if (!is_name(description.version)) refuse("name-version", description.version, is_name_rule);
-  part.each("parameters", parameters_max, [&](const Json& entry, const std::string& path) {
-    const Part of(entry, path);
-    description.parameters.push_back({.name = of.name(), .value = of.number("value")});
-  });
-  part.each("quantities", quantities_max, [&](const Json& entry, const std::string& path) {
-    description.quantities.push_back(quantity_in(Part(entry, path)));
-  });
-  part.each("drawn", drawn_max, [&](const Json& entry, const std::string& path) {
-    description.drawn.push_back(draw_in(Part(entry, path), !description.imported_from.empty()));
-  });
-  part.each("streams", streams_max, [&](const Json& entry, const std::string& path) {
-    description.streams.push_back(Part(entry, path).name());
-  });
+  description.purpose = fmt::format("Runs campaigns of {}.", name);
+  part.read_if_there("purpose", description.purpose);
+  part.read_if_there("imported_from", description.imported_from);
+  part.read_if_there("runs_at_once", description.runs_at_once, runs_at_once_max);
+  part.read_if_there("run_time_max_s", description.limits.answer_time_max_s, 86400);
+  part.read_if_there("memory_max_mib", description.limits.memory_max_mib, std::size_t{1} << 20);
+  read_lists(part, description);
   check_names(description);
-  check_drawn(description);
+  try {
+    check_laws(description.law_set(description.laws));
+  } catch (const ConfigError& error) {
+    throw ModelProgramError(fmt::format("description: {}", error.what()));
+  }
   return description;
 }
 

@@ -1,13 +1,14 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/law_set.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
 
@@ -24,8 +25,8 @@ inline constexpr std::size_t answer_size_max = std::size_t{1} << 20;
 
 /// What a model program may take.
 struct ProgramLimits {
-  std::chrono::seconds answer_time_max{600};  ///< For each answer.
-  std::size_t memory_max_mib = 4096;          ///< Of data, which counts once it is asked for.
+  std::size_t answer_time_max_s = 600;  ///< For each answer.
+  std::size_t memory_max_mib = 4096;    ///< Of data, which counts once it is asked for.
 };
 
 /// A number that the runs of a campaign share, and that a campaign file may change.
@@ -37,19 +38,12 @@ struct ProgramParameter {
 /// Most runs that a program is asked for together.
 inline constexpr std::size_t runs_at_once_max = 64;
 
-/// What a model program draws for each run.
-struct ProgramDraw {
-  std::string name;
-  std::string unit;
-  Dispersion law;  ///< Unless the campaign file has another one.
-};
-
 /// What a model program estimates in each run. The engine knows the true value: an expression of
 /// drawn quantities and parameters, see evaluate_expression().
 struct ProgramQuantity {
   std::string name;
-  std::string symbol;  ///< For people; the name by default.
-  std::string unit;    ///< SI; `1` by default.
+  std::string symbol;      ///< For people; the name by default.
+  std::string unit = "1";  ///< SI.
   double display_scale = 1.0;
   std::string display_unit;  ///< That of `unit` by default.
   std::string truth;
@@ -66,11 +60,17 @@ struct ProgramDescription {
   /// no program computes it again. Empty for a model program.
   std::string imported_from;
   std::vector<ProgramParameter> parameters;
-  std::vector<ProgramDraw> drawn;
+  std::vector<std::string> drawn_names;  ///< Of what it draws for each run.
+  std::vector<std::string> drawn_units;
+  std::vector<Dispersion> laws;  ///< Of each of these, unless the campaign file has another one.
   std::vector<ProgramQuantity> quantities;
   std::vector<std::string> streams;  ///< Of random numbers, each with a seed of its own in a run.
   std::size_t runs_at_once = 1;      ///< That it is asked for together.
   ProgramLimits limits;
+
+  [[nodiscard]] LawSet law_set(std::span<const Dispersion> of) const {
+    return {.names = drawn_names, .laws = of, .table = "drawn"};
+  }
 };
 
 /// @param answer  JSON that a program answered or a database holds: anything at all.

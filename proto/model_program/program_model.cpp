@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -47,8 +48,8 @@ std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& pr
     question["parameters"][of.parameters[i].name] = campaign.parameters[i];
   }
   auto process = std::make_unique<ProgramProcess>(program, of.limits);
-  const std::string text = question.dump();
-  process->ask({&text, 1}, [&](std::string_view answer) { expect_accepted(answer, program); });
+  process->ask({question.dump()},
+               [&](std::string_view answer) { expect_accepted(answer, program); });
   return process;
 }
 
@@ -70,8 +71,8 @@ class ProgramPlan final : public Plan {
 
  private:
   [[nodiscard]] std::unique_ptr<ProgramProcess> take_process() const;
-  [[nodiscard]] std::string question_of(RunIndex run, const RunDraw& draw) const;
-  [[nodiscard]] RunResult result_in(std::string_view answer, RunIndex run, RunDraw draw) const;
+  [[nodiscard]] std::string question_of(RunIndex run, const std::vector<double>& drawn) const;
+  void read(std::string_view answer, RunResult& result) const;
 
   const std::filesystem::path program_;
   const DescribedCampaign campaign_;
@@ -92,11 +93,11 @@ std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
   return prepared_process(program_, campaign_);
 }
 
-std::string ProgramPlan::question_of(RunIndex run, const RunDraw& draw) const {
+std::string ProgramPlan::question_of(RunIndex run, const std::vector<double>& drawn) const {
   const ProgramDescription& of = campaign_.description();
   Json question{{"ask", "run"}, {"run", run.value}};
-  for (std::size_t i = 0; i < of.drawn.size(); ++i) {
-    question["drawn"][of.drawn[i].name] = draw.values[i];
+  for (std::size_t i = 0; i < of.drawn_names.size(); ++i) {
+    question["drawn"][of.drawn_names[i]] = drawn[i];
   }
   for (const std::string& stream : of.streams) {
     const RandomBlock seed = RandomStream(campaign_.seed, run, stream_id(stream)).block(0);
@@ -106,88 +107,72 @@ std::string ProgramPlan::question_of(RunIndex run, const RunDraw& draw) const {
   return question.dump();
 }
 
-/// @return One number for each name, or nothing if one is null: it is not finite.
-std::optional<std::vector<double>> numbers_in(const Json& object,
-                                              const std::vector<std::string_view>& names,
-                                              const std::function<void(std::string_view)>& refuse) {
+/// @return A number for each name; NaN for null, which is not finite.
+std::vector<double> numbers_in(const Json& object, const std::vector<std::string_view>& names,
+                               const std::function<void(std::string_view)>& refuse) {
   if (!object.is_object() || object.size() != names.size()) {
     refuse(fmt::format("must have a number for each of {} quantities", names.size()));
   }
   std::vector<double> numbers;
   for (const std::string_view name : names) {
-    const auto found = object.find(name);
-    if (found == object.end() || !(found->is_number() || found->is_null())) {
+    const Json number = object.value(name, Json("missing"));
+    if (!number.is_number() && !number.is_null()) {
       refuse(fmt::format("must have a number for {}", name));
     }
-    if (found->is_null() || !is_in_range(found->get<double>())) return std::nullopt;
-    numbers.push_back(*found);
+    numbers.push_back(number.is_null() ? std::numeric_limits<double>::quiet_NaN()
+                                       : number.get<double>());
   }
   return numbers;
 }
 
-RunResult ProgramPlan::result_in(std::string_view answer, RunIndex run, RunDraw draw) const {
+void ProgramPlan::read(std::string_view answer, RunResult& result) const {
   const auto refuse_as = [&](std::string_view what) {
-    return [this, run, what](std::string_view rule) {
-      throw ModelProgramError(fmt::format("model program = {} (run {}: {} {})", program_.string(),
-                                          run.value, what, rule));
+    return [this, run = result.run.value, what](std::string_view rule) {
+      throw ModelProgramError(
+          fmt::format("model program = {} (run {}: {} {})", program_.string(), run, what, rule));
     };
   };
   const Json json = Json::parse(answer, nullptr, false);
   if (!json.is_object()) refuse_as("the answer")("must be an object of JSON");
-  RunResult result{.run = run, .num_draws = draw.num_draws, .truth = std::move(draw.truth)};
   if (json.contains("lost")) {
     if (json["lost"] != true) refuse_as("lost")("must be true, or left out");
-    result.status = RunStatus::lost;
-    result.loss = {.cause = 1, .session = 1};
-    return result;
+    return set_lost(result);
   }
   std::vector<std::string_view> names, with_errors;
   for (const ProgramQuantity& quantity : campaign_.description().quantities) {
     names.push_back(quantity.name);
     if (quantity.has_standard_error) with_errors.push_back(quantity.name);
   }
-  const auto estimate = numbers_in(json.value("estimate", Json()), names, refuse_as("estimate"));
-  auto errors = with_errors.empty() ? std::optional<std::vector<double>>(std::in_place)
-                                    : numbers_in(json.value("standard_error", Json()), with_errors,
-                                                 refuse_as("standard_error"));
-  if (!estimate || !errors || std::ranges::any_of(*errors, [](double e) { return e < 0.0; })) {
-    result.status = RunStatus::not_finite;
-    return result;
+  std::vector<double> errors;
+  if (!with_errors.empty()) {
+    errors =
+        numbers_in(json.value("standard_error", Json()), with_errors, refuse_as("standard_error"));
   }
-  result.num_rounds = 1;
-  result.estimate = *estimate;
-  result.standard_error = *std::move(errors);
-  // Standard errors are taken as those of independent estimates.
-  const std::size_t num_errors = result.standard_error.size();
-  if (num_errors > 0) result.correlations.assign(num_errors * (num_errors - 1) / 2, 0.0);
-  return result;
+  set_estimates(numbers_in(json.value("estimate", Json()), names, refuse_as("estimate")),
+                std::move(errors), result);
 }
 
 std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> requests,
                                                    InstructionSet,
                                                    const std::function<void(int)>& progress) const {
   std::vector<RunResult> results(requests.size());
-  std::vector<RunDraw> draws;
-  std::vector<std::size_t> asked;  // All but those whose truth is out of range.
+  std::vector<RunResult*> asked;  // All but those whose truth is out of range.
   std::vector<std::string> questions;
   for (std::size_t i = 0; i < requests.size(); ++i) {
-    RunDraw draw = campaign_.drawn(requests[i].run, requests[i].table_values);
+    const RunDraw draw = campaign_.drawn(requests[i].run, requests[i].table_values);
+    results[i] = {.run = requests[i].run, .num_draws = draw.num_draws, .truth = draw.truth};
     if (draw.truth.empty()) {
-      results[i] = {.run = requests[i].run, .status = RunStatus::no_draw, .num_draws = 1};
-      continue;
+      results[i].status = RunStatus::no_draw;
+    } else {
+      questions.push_back(question_of(requests[i].run, draw.values));
+      asked.push_back(&results[i]);
     }
-    questions.push_back(question_of(requests[i].run, draw));
-    draws.push_back(std::move(draw));
-    asked.push_back(i);
   }
   std::unique_ptr<ProgramProcess> process;
-  std::size_t num_answered = 0;
   try {
     process = take_process();
-    process->ask(questions, [&](std::string_view answer) {
-      const std::size_t i = asked[num_answered];
-      results[i] = result_in(answer, requests[i].run, std::move(draws[num_answered]));
-      ++num_answered;
+    process->ask(questions, [&, next = asked.begin()](std::string_view answer) mutable {
+      read(answer, **next++);
       if (progress) progress(0);
     });
   } catch (const ModelProgramError& error) {
@@ -199,37 +184,22 @@ std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> r
   return results;
 }
 
-class Program final : public RunnableProgram {
- public:
-  explicit Program(std::filesystem::path path) : path_(std::move(path)) {}
-
-  [[nodiscard]] std::unique_ptr<const Plan> prepare(
-      const DescribedCampaign& campaign) const override {
-    return std::make_unique<const ProgramPlan>(path_, campaign);
-  }
-  void check(const DescribedCampaign& campaign) const override {
-    (void)prepared_process(path_, campaign);
-  }
-
- private:
-  std::filesystem::path path_;
-};
-
 }  // namespace
 
 std::unique_ptr<const Model> model_of(const std::filesystem::path& path) {
-  constexpr ProgramLimits while_describing{.answer_time_max = std::chrono::seconds(60)};
+  constexpr ProgramLimits while_describing{.answer_time_max_s = 60};
   const std::filesystem::path program = std::filesystem::absolute(path);
   ProgramDescription description;
-  ProgramProcess process(program, while_describing);
-  const std::string question = Json{{"ask", "describe"}}.dump();
-  process.ask({&question, 1},
-              [&](std::string_view answer) { description = description_in(answer); });
+  ProgramProcess(program, while_describing)
+      .ask({Json{{"ask", "describe"}}.dump()},
+           [&](std::string_view answer) { description = description_in(answer); });
   if (!description.imported_from.empty()) {
     throw ModelProgramError("description: imported_from (must not be there: a program computes)");
   }
-  return std::make_unique<DescribedModel>(std::move(description),
-                                          std::make_unique<Program>(program));
+  return std::make_unique<DescribedModel>(
+      std::move(description), std::nullopt, [program](const DescribedCampaign& campaign) {
+        return std::make_unique<const ProgramPlan>(program, campaign);
+      });
 }
 
 }  // namespace proofmass::wire

@@ -1,6 +1,5 @@
 #include "proto/model_program/program_process.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
@@ -13,6 +12,7 @@
 #include <optional>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
@@ -20,10 +20,13 @@
 namespace proofmass::wire {
 namespace {
 
-/// Both ends are closed in programs that are started, but for what they are given.
-std::array<int, 2> connected_pair() {
+/// Two connected sockets, which are closed in programs that are started, but for what they are
+/// given.
+std::pair<Descriptor, Descriptor> connected_pair() {
   std::array<int, 2> ends{};
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) return ends;
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) {
+    return {Descriptor(ends[0]), Descriptor(ends[1])};
+  }
   throw ModelProgramError(
       fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
 }
@@ -31,32 +34,26 @@ std::array<int, 2> connected_pair() {
 }  // namespace
 
 ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
-    : name_(program.string()), answer_time_max_(limits.answer_time_max) {
-  const std::array<int, 2> in = connected_pair();
-  const std::array<int, 2> out = connected_pair();
-  questions_ = in[0];
-  answers_ = out[0];
+    : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
+  auto [questions, its_input] = connected_pair();
+  auto [answers, its_output] = connected_pair();
   try {
-    process_id_ = start_program({.arguments = {name_},
-                                 .descriptors = {in[1], out[1], STDERR_FILENO},
-                                 .environment = environment_without_settings(),
-                                 .has_own_group = true});
+    process_id_ =
+        start_program({.arguments = {name_},
+                       .descriptors = {its_input.number(), its_output.number(), STDERR_FILENO},
+                       .environment = environment_without_settings(),
+                       .has_own_group = true});
   } catch (const Error& error) {
-    for (const int end : {in[0], in[1], out[0], out[1]}) close(end);
     throw ModelProgramError(fmt::format("model program = {}", error.what()));
   }
-  close(in[1]);
-  close(out[1]);
+  questions_ = std::move(questions);
+  answers_ = std::move(answers);
   const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
   const rlimit memory{memory_max, memory_max};
   prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
-  fcntl(questions_, F_SETFL, O_NONBLOCK);
-  fcntl(answers_, F_SETFL, O_NONBLOCK);
 }
 
 ProgramProcess::~ProgramProcess() {
-  close(questions_);
-  close(answers_);
   if (process_id_ == 0) return;
   kill(process_id_, SIGKILL);
   (void)wait_for_end(process_id_);
@@ -80,7 +77,8 @@ void ProgramProcess::fail(std::string_view reason) const {
 }
 
 void ProgramProcess::write_some(std::string_view& text) const {
-  const ssize_t size = send(questions_, text.data(), text.size(), MSG_NOSIGNAL);
+  const ssize_t size =
+      send(questions_.number(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   if (size >= 0) {
     text.remove_prefix(static_cast<std::size_t>(size));
   } else if (errno != EAGAIN && errno != EINTR) {
@@ -89,8 +87,8 @@ void ProgramProcess::write_some(std::string_view& text) const {
 }
 
 void ProgramProcess::read_some() {
-  std::array<char, 65536> part;  // NOLINT: read() fills it.
-  const ssize_t size = read(answers_, part.data(), part.size());
+  std::array<char, 65536> part;  // NOLINT: recv() fills it.
+  const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT);
   if (size > 0) {
     received_.append(part.data(), static_cast<std::size_t>(size));
   } else if (size == 0 || (errno != EAGAIN && errno != EINTR)) {
@@ -98,7 +96,7 @@ void ProgramProcess::read_some() {
   }
 }
 
-void ProgramProcess::ask(std::span<const std::string> questions,
+void ProgramProcess::ask(const std::vector<std::string>& questions,
                          const std::function<void(std::string_view answer)>& on_answer) {
   using Clock = std::chrono::steady_clock;
   std::string all;
@@ -107,7 +105,7 @@ void ProgramProcess::ask(std::span<const std::string> questions,
   std::size_t num_answered = 0;
   Clock::time_point deadline = Clock::now() + answer_time_max_;
   while (num_answered < questions.size()) {
-    std::array<pollfd, 2> ends{{{answers_, POLLIN, 0}, {questions_, POLLOUT, 0}}};
+    std::array<pollfd, 2> ends{{{answers_.number(), POLLIN, 0}, {questions_.number(), POLLOUT, 0}}};
     const auto left =
         std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) {

@@ -5,10 +5,11 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
-#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "proto/link/descriptor.hpp"
 #include "proto/model_program/program_description.hpp"
 
 namespace proofmass::wire {
@@ -30,7 +31,7 @@ class ProgramProcess {
   ///
   /// @param on_answer  What it throws leaves answers behind: the process is of no further use.
   /// @throws ModelProgramError, after which the process is of no further use either.
-  void ask(std::span<const std::string> questions,
+  void ask(const std::vector<std::string>& questions,
            const std::function<void(std::string_view answer)>& on_answer);
 
  private:
@@ -42,8 +43,8 @@ class ProgramProcess {
   std::string name_;
   std::chrono::seconds answer_time_max_;
   pid_t process_id_ = 0;  // 0 once it has ended.
-  int questions_ = -1;
-  int answers_ = -1;
+  Descriptor questions_;
+  Descriptor answers_;
   std::string received_;  // Behind the last line that was taken.
 };
 

@@ -1,11 +1,6 @@
-#include <fmt/format.h>
-
 #include <filesystem>
-#include <nlohmann/json.hpp>
-#include <string>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
@@ -18,14 +13,9 @@ struct BackupOptions {
 };
 
 int back_up_database(const BackupOptions& options) {
-  const std::string destination = options.destination.string();
   check_new_file("destination", options.destination);
   Store::open_read_only(options.database).back_up(options.destination);
-  if (options.format == OutputFormat::json) {
-    print_json({{"file", destination}});
-  } else {
-    print_lines(fmt::format("wrote {}\n", destination));
-  }
+  print_written(options.destination, options.format);
   return exit_done;
 }
 

@@ -3,16 +3,16 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
+#include "coordinator/cli/stop_signals.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
-
-/// How a command prints what it found.
-enum class OutputFormat : std::uint8_t { text, json };
 
 /// A command that is being declared, and what its arguments are written to.
 template <typename Options>
@@ -25,11 +25,25 @@ struct Declared {
 /// @param chosen  Set while the arguments are parsed; outlives `app`.
 template <typename Options>
 Declared<Options> add_command(CLI::App& app, Command& chosen, const std::string& name,
-                              const std::string& description, int (*run)(const Options&)) {
+                              const std::string& description,
+                              const std::function<int(const Options&)>& run) {
   const auto options = std::make_shared<Options>();
   CLI::App& command = *app.add_subcommand(name, description);
   command.callback([options, run, &chosen] { chosen = [options, run] { return run(*options); }; });
   return {command, *options};
+}
+
+/// The same for a command that SIGINT and SIGTERM end in order, see run_until_stopped().
+template <typename Options>
+Declared<Options> add_stoppable_command(CLI::App& app, Command& chosen, const std::string& name,
+                                        const std::string& description,
+                                        int (*run)(const Options&, const IsStopped&)) {
+  const auto work = [run](const Options& options) {
+    return run_until_stopped([&](const IsStopped& is_stopped) { return run(options, is_stopped); });
+  };
+  const auto declared = add_command<Options>(app, chosen, name, description, work);
+  declared.command.footer(exit_codes_text({exit_interrupted}));
+  return declared;
 }
 
 /// Declares --json.

@@ -9,8 +9,6 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -34,7 +32,7 @@ void refuse_same_files(std::span<const std::filesystem::path> files) {
   }
 }
 
-int compare_databases(const CompareOptions& options) {
+int compare_databases(const CompareOptions& options, const IsStopped& is_stopped) {
   std::vector<std::filesystem::path> files{options.first, options.second};
   files.insert(files.end(), options.others.begin(), options.others.end());
   if (files.size() > num_compared_max) {
@@ -42,29 +40,26 @@ int compare_databases(const CompareOptions& options) {
         fmt::format("DB = {} files (must be at most {})", files.size(), num_compared_max));
   }
   refuse_same_files(files);
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    const std::vector<ComparedMember> members = compare_several(files, is_stopped);
-    if (options.format == OutputFormat::json) {
-      print_lines(comparison_json(members));
-    } else {
-      write_standard_output(
-          comparison_text(members, lettered(members.size()), style_of(stdout).paint));
-    }
-    for (const ComparedMember& member : members) {
-      if (member.why_not_independent.empty()) continue;
-      throw UsageError(fmt::format("DB = {} (needs independent draws: {})", member.file.string(),
-                                   member.why_not_independent));
-    }
-    return static_cast<int>(exit_done);
-  });
+  const std::vector<ComparedMember> members = compare_several(files, is_stopped);
+  if (options.format == OutputFormat::json) {
+    print_lines(comparison_json(members));
+  } else {
+    write_standard_output(
+        comparison_text(members, lettered(members.size()), style_of(stdout).paint));
+  }
+  for (const ComparedMember& member : members) {
+    if (member.why_not_independent.empty()) continue;
+    throw UsageError(fmt::format("DB = {} (needs independent draws: {})", member.file.string(),
+                                 member.why_not_independent));
+  }
+  return exit_done;
 }
 
 }  // namespace
 
 void add_compare(CLI::App& app, Command& chosen) {
-  auto [command, options] = add_command<CompareOptions>(
+  auto [command, options] = add_stoppable_command<CompareOptions>(
       app, chosen, "compare", "Compare the results of campaigns", compare_databases);
-  command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.first, "A");
   add_database(command, options.second, "B");
   command.add_option("DB", options.others, "Further databases: each is compared with A")

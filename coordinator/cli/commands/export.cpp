@@ -1,13 +1,14 @@
 #include "coordinator/archive/export.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
 
+#include "coordinator/archive/result_import.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/option_checks.hpp"
 
@@ -24,21 +25,34 @@ struct ExportOptions {
   DrawColumns draws = DrawColumns::left_out;
 };
 
-int export_results(const ExportOptions& options) {
+int export_results(const ExportOptions& options, const IsStopped& is_stopped) {
   if (options.format == ExportFormat::sqlite && options.draws == DrawColumns::included) {
     throw UsageError("draws = (must not be given with --format sqlite)");
   }
   if (options.output == "-") refuse_output("-", "must be a file");
   check_output_file(options.output, options.if_there, "name one that may be replaced");
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    const Store store = Store::open_read_only(options.database);
-    if (options.format == ExportFormat::hdf5) {
-      export_hdf5(store, options.output, is_stopped, options.draws);
-    } else {
-      export_sqlite(store, options.output, is_stopped);
-    }
-    return exit_done;
-  });
+  const Store store = Store::open_read_only(options.database);
+  if (options.format == ExportFormat::hdf5) {
+    export_hdf5(store, options.output, is_stopped, options.draws);
+  } else {
+    export_sqlite(store, options.output, is_stopped);
+  }
+  return exit_done;
+}
+
+struct ImportOptions {
+  std::filesystem::path results;
+  std::filesystem::path schema;
+  std::filesystem::path database;
+};
+
+int import_file(const ImportOptions& options, const IsStopped& is_stopped) {
+  check_new_file("db", options.database);
+  import_results(options.results, options.schema, options.database, is_stopped);
+  const Store store = Store::open_read_only(options.database);
+  print_lines(fmt::format("imported {} runs into {}\nDigest {}\n", store.num_runs(),
+                          options.database.string(), store.summary()->digests.results));
+  return exit_done;
 }
 
 }  // namespace
@@ -46,9 +60,8 @@ int export_results(const ExportOptions& options) {
 void add_export(CLI::App& app, Command& chosen) {
   static const std::map<std::string, ExportFormat> formats{{"hdf5", ExportFormat::hdf5},
                                                            {"sqlite", ExportFormat::sqlite}};
-  auto [command, options] = add_command<ExportOptions>(
+  auto [command, options] = add_stoppable_command<ExportOptions>(
       app, chosen, "export", "Write all results in a format of other programs", export_results);
-  command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
   wire::add_choice(command, "--format", options.format, formats, "hdf5 by default");
   command.add_option("--output", options.output, "File to write")
@@ -58,6 +71,19 @@ void add_export(CLI::App& app, Command& chosen) {
   command.add_flag_callback(
       "--draws", [&draws = options.draws] { draws = DrawColumns::included; },
       "Add what each run drew");
+}
+
+void add_import(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_stoppable_command<ImportOptions>(
+      app, chosen, "import", "Make a database of another program's results", import_file);
+  command.add_option("RESULTS", options.results, "CSV with truths and estimates, a line a run")
+      ->required();
+  command.add_option("--schema", options.schema, "TOML that says what its columns are")
+      ->type_name(campaign_file_type)
+      ->required();
+  command.add_option("--db", options.database, "Database to be made")
+      ->type_name(database_type)
+      ->required();
 }
 
 }  // namespace proofmass::coordinator

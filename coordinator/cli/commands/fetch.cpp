@@ -19,6 +19,7 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/link/descriptor.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
@@ -43,22 +44,13 @@ class ArrivedPart {
   /// @throws Error if the file is there and cannot be read or is another process's, or is not and
   ///         cannot be made.
   explicit ArrivedPart(std::filesystem::path path) : path_(std::move(path)) {
-    descriptor_ = wire::open_own_file("file", path_, wire::IfAbsent::leave);
-    if (descriptor_ < 0) {
+    if (!open(wire::IfAbsent::leave)) {
       check_directory();
       return;
     }
-    try {
-      lock();
-      read_again();
-    } catch (const Error&) {
-      close(descriptor_);
-      throw;
-    }
+    lock();
+    read_again();
   }
-  ~ArrivedPart() { close(descriptor_); }
-  ArrivedPart(const ArrivedPart&) = delete;
-  ArrivedPart& operator=(const ArrivedPart&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -66,12 +58,12 @@ class ArrivedPart {
 
   /// What is in the file now.
   void read_again() {
-    if (lseek(descriptor_, 0, SEEK_SET) != 0) fail();
+    if (lseek(file_.number(), 0, SEEK_SET) != 0) fail();
     size_ = 0;
     std::vector<char> block(std::size_t{1} << 20);
     Sha256 hash;
     ssize_t num_read = 0;
-    while ((num_read = read(descriptor_, block.data(), block.size())) > 0) {
+    while ((num_read = read(file_.number(), block.data(), block.size())) > 0) {
       hash.add_bytes({block.data(), static_cast<std::size_t>(num_read)});
       size_ += static_cast<std::uint64_t>(num_read);
     }
@@ -80,20 +72,15 @@ class ArrivedPart {
   }
 
   void clear() {
-    if (descriptor_ < 0) return;
-    if (ftruncate(descriptor_, 0) != 0 || lseek(descriptor_, 0, SEEK_SET) != 0) fail();
+    if (file_.number() < 0) return;
+    if (ftruncate(file_.number(), 0) != 0 || lseek(file_.number(), 0, SEEK_SET) != 0) fail();
     size_ = 0;
   }
 
   void append(std::string_view bytes) {
-    if (descriptor_ < 0) make();
-    while (!bytes.empty()) {
-      const ssize_t num_written = write(descriptor_, bytes.data(), bytes.size());
-      if (num_written < 0 && errno == EINTR) continue;
-      if (num_written < 0) fail();
-      size_ += static_cast<std::uint64_t>(num_written);
-      bytes.remove_prefix(static_cast<std::size_t>(num_written));
-    }
+    if (file_.number() < 0) make();
+    if (!wire::write_all(file_.number(), bytes)) fail();
+    size_ += bytes.size();
   }
 
  private:
@@ -103,15 +90,20 @@ class ArrivedPart {
     if (access(directory.empty() ? "." : directory.c_str(), W_OK | X_OK) != 0) fail();
   }
 
+  bool open(wire::IfAbsent if_absent) {
+    file_ = wire::Descriptor(wire::open_own_file("file", path_, if_absent));
+    return file_.number() >= 0;
+  }
+
   void make() {
-    descriptor_ = wire::open_own_file("file", path_, wire::IfAbsent::make);
+    open(wire::IfAbsent::make);
     lock();
-    if (ftruncate(descriptor_, 0) != 0) fail();
+    if (ftruncate(file_.number(), 0) != 0) fail();
   }
 
   // Its last owner may have renamed or removed it between our opening and locking it.
   void lock() const {
-    if (wire::lock_file(descriptor_) != wire::Locked::by_another && has_its_name()) return;
+    if (wire::lock_file(file_.number()) != wire::Locked::by_another && has_its_name()) return;
     throw Error(fmt::format("file = {} (is being written by another `fetch`; try again later)",
                             path_.string()));
   }
@@ -119,7 +111,7 @@ class ArrivedPart {
   [[nodiscard]] bool has_its_name() const {
     struct stat opened {};
     struct stat present {};
-    return fstat(descriptor_, &opened) == 0 && stat(path_.c_str(), &present) == 0 &&
+    return fstat(file_.number(), &opened) == 0 && stat(path_.c_str(), &present) == 0 &&
            opened.st_dev == present.st_dev && opened.st_ino == present.st_ino;
   }
 
@@ -131,7 +123,7 @@ class ArrivedPart {
   }
 
   std::filesystem::path path_;
-  int descriptor_ = -1;
+  wire::Descriptor file_;
   std::uint64_t size_ = 0;
   std::string sha256_;  ///< As it was last read.
 };
@@ -163,20 +155,19 @@ void complete(ArrivedPart& part, const Ask& ask, const proto::AnswerReply& answe
   throw Error("the database is not the one that was announced; fetch it again");
 }
 
-/// What was fetched, after its results were held against the digest that came with them.
-std::string summary_of(const std::filesystem::path& file, OutputFormat format) {
+/// Says what was fetched, after its results were held against the digest that came with them.
+void print_fetched(const std::filesystem::path& file, OutputFormat format) {
   const WalkedResults walked = walk_checked(Store::open_read_only(file), [](const RunResult&) {});
   const bool is_checked = walked.check == DigestCheck::holds;
   if (format == OutputFormat::json) {
-    const nlohmann::ordered_json summary{{"file", file.string()},
-                                         {"num_results", walked.num_results},
-                                         {"digest", walked.digest},
-                                         {"is_digest_checked", is_checked}};
-    return summary.dump(2, ' ', true) + "\n";
+    return print_json({{"file", file.string()},
+                       {"num_results", walked.num_results},
+                       {"digest", walked.digest},
+                       {"is_digest_checked", is_checked}});
   }
-  return fmt::format("wrote {}: {} results\nDigest {}\n{}", file.string(), walked.num_results,
-                     walked.digest,
-                     is_checked ? "" : "It was not checked: the campaign is not finished\n");
+  print_lines(fmt::format("wrote {}: {} results\nDigest {}\n{}", file.string(), walked.num_results,
+                          walked.digest,
+                          is_checked ? "" : "It was not checked: the campaign is not finished\n"));
 }
 
 int fetch_database(const FetchOptions& options) {
@@ -194,7 +185,7 @@ int fetch_database(const FetchOptions& options) {
     if (const int error = wire::publish_file(part.path(), file, wire::IfThere::keep); error != 0) {
       throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
     }
-    print_lines(summary_of(file, options.client.format));
+    print_fetched(file, options.client.format);
     return exit_done;
   });
 }

@@ -14,8 +14,6 @@
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"
@@ -88,8 +86,7 @@ RunSet runs_missing_in(const Store& store) {
 }
 
 /// The missing runs for people, and how to get them.
-std::string missing_text(const Store& store, const MergeOptions& options) {
-  const RunSet missing = runs_missing_in(store);
+std::string missing_text(const Store& store, const RunSet& missing, const MergeOptions& options) {
   if (missing.empty()) return {};
   return fmt::format(
       "{0} of {1} runs are in no part: {2}\n`proofmass run FILE --db {3} --runs {1}` computes "
@@ -110,10 +107,11 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
     json["parts"].push_back(
         {{"file", file}, {"num_new", parts[i].num_new}, {"num_again", parts[i].num_again}});
   }
-  if (options.format == OutputFormat::text) {
-    return print_lines(lines + missing_text(whole, options) + fmt::format("Digest {}\n", digest));
-  }
   const RunSet missing = runs_missing_in(whole);
+  if (options.format == OutputFormat::text) {
+    return print_lines(lines + missing_text(whole, missing, options) +
+                       fmt::format("Digest {}\n", digest));
+  }
   json["num_runs"] = whole.num_runs();
   json["num_missing"] = missing.size();
   json["missing"] = MergeJson::array();
@@ -124,33 +122,28 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
   print_json(json);
 }
 
-int merge_databases(const MergeOptions& options) {
+int merge_databases(const MergeOptions& options, const IsStopped& is_stopped) {
   check_new_file("output", options.whole);
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    const LargestPart largest = largest_part(options.parts);
-    for (const std::filesystem::path& part : options.parts) require_part(part, largest);
-    for (const std::filesystem::path& part : options.parts) {
-      require_sound(part, options, is_stopped);
-    }
-    const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
-    std::vector<MergedPart> parts;
-    Store whole = Store::merge(options.whole, *largest.campaign, definition, options.parts,
-                               [&](const MergedPart& part) {
-                                 if (is_stopped()) throw Interrupted();
-                                 parts.push_back(part);
-                               });
-    update_statistics(whole, *largest.campaign);
-    print_merged(whole, parts, options);
-    return exit_done;
-  });
+  const LargestPart largest = largest_part(options.parts);
+  for (const std::filesystem::path& part : options.parts) require_part(part, largest);
+  for (const std::filesystem::path& part : options.parts) require_sound(part, options, is_stopped);
+  const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
+  std::vector<MergedPart> parts;
+  Store whole = Store::merge(options.whole, *largest.campaign, definition, options.parts,
+                             [&](const MergedPart& part) {
+                               if (is_stopped()) throw Interrupted();
+                               parts.push_back(part);
+                             });
+  update_statistics(whole, *largest.campaign);
+  print_merged(whole, parts, options);
+  return exit_done;
 }
 
 }  // namespace
 
 void add_merge(CLI::App& app, Command& chosen) {
-  auto [command, options] = add_command<MergeOptions>(
+  auto [command, options] = add_stoppable_command<MergeOptions>(
       app, chosen, "merge", "Join databases of parts of a campaign", merge_databases);
-  command.footer(exit_codes_text({exit_interrupted}));
   command.add_option("OUT", options.whole, "Database to be made of all parts")
       ->type_name(database_type)
       ->required();

@@ -41,42 +41,31 @@ struct PlanOptions {
 
 /// The sessions of a campaign with some lengths, and what they find out.
 struct Planned {
-  std::vector<std::string> sessions;
-  std::vector<int> num_steps;
-  int num_steps_in_all;
-  int num_steps_beside;
+  const PlanStudy& study;
+  std::vector<int> num_steps;  ///< Of each session.
   PlanBound bound;
   std::vector<Quantity> quantities;
   std::vector<double> objectives;
-  std::size_t num_instruments;
-  std::size_t num_probed;
-  std::string method;
-  std::string note;                   ///< Campaign::note().
-  std::vector<std::string> remedies;  ///< Of each quantity, see PlanStudy::remedy().
+  std::string note;  ///< Campaign::note().
+
+  [[nodiscard]] int num_steps_in_all() const {
+    return std::accumulate(num_steps.begin(), num_steps.end(), 0);
+  }
 };
 
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
-  const int in_all = std::accumulate(num_steps.begin(), num_steps.end(), 0);
   PlanBound bound = study.bound(num_steps);
   // Sessions beside those of the study may add further ones.
   std::vector<Quantity> quantities = campaign.results().quantities;
   std::vector<double> objectives = campaign.objectives();
   quantities.resize(bound.misses.size());
   objectives.resize(bound.misses.size());
-  std::vector<std::string> remedies;
-  for (std::size_t i = 0; i < bound.misses.size(); ++i) remedies.push_back(study.remedy(i));
-  return {.sessions = study.session_names(),
-          .num_steps = std::move(num_steps),
-          .num_steps_in_all = in_all,
-          .num_steps_beside = study.num_steps_beside(),
-          .bound = std::move(bound),
-          .quantities = std::move(quantities),
-          .objectives = std::move(objectives),
-          .num_instruments = study.num_instruments(),
-          .num_probed = study.num_probed(),
-          .method = study.method(),
-          .note = campaign.note(),
-          .remedies = std::move(remedies)};
+  return {study,
+          std::move(num_steps),
+          std::move(bound),
+          std::move(quantities),
+          std::move(objectives),
+          campaign.note()};
 }
 
 /// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing.
@@ -97,10 +86,10 @@ std::string losses_text(const PlanBound& bound, std::size_t num_probed) {
 void add_losses(const Planned& plan, Table& table) {
   const std::vector<PlanLoss>& losses = plan.bound.losses;
   if (losses.empty()) {
-    table.notes.push_back(fmt::format("none of {} probed runs is lost", plan.num_probed));
+    table.notes.push_back(fmt::format("none of {} probed runs is lost", plan.study.num_probed()));
     return;
   }
-  table.remarks.push_back({losses_text(plan.bound, plan.num_probed), Tone::bad});
+  table.remarks.push_back({losses_text(plan.bound, plan.study.num_probed()), Tone::bad});
   for (const PlanLoss& loss : losses) {
     table.notes.push_back(fmt::format("lost, {}: {}; {}", loss.num_runs, loss.cause, loss.detail));
   }
@@ -114,7 +103,7 @@ void add_undetermined(const Planned& plan, Table& table) {
   for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
     if (plan.bound.standard_errors[i] <= plan.objectives[i]) continue;
     table.notes.push_back(fmt::format("σ of {} is larger than the objective; {} would reduce it",
-                                      plan.quantities[i].symbol, plan.remedies[i]));
+                                      plan.quantities[i].symbol, plan.study.remedy(i)));
   }
 }
 
@@ -135,7 +124,7 @@ Table bound_table(const Planned& plan) {
   }
   table.remarks.push_back(
       {fmt::format("all objectives hold in {} % of the runs, if estimated by the method {}",
-                   percent_text(plan.bound.misses_any), plan.method)});
+                   percent_text(plan.bound.misses_any), plan.study.method())});
   if (plan.bound.mean_budget) {
     table.remarks.push_back(
         {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});
@@ -144,7 +133,7 @@ Table bound_table(const Planned& plan) {
       "σ: standard error of estimates by the method {}, mean of {} instruments; errors are taken "
       "to be normal, and the chance that all objectives hold is the product of the single ones; "
       "correlated errors can only raise it",
-      plan.method, plan.num_instruments));
+      plan.study.method(), plan.study.num_instruments()));
   add_undetermined(plan, table);
   add_losses(plan, table);
   if (!plan.note.empty()) table.notes.push_back(plan.note);
@@ -155,14 +144,15 @@ Table session_table(const Planned& plan) {
   Table table{.columns = {{.title = "session", .is_text = true},
                           {.title = std::string(built_in_model().step_name())}},
               .has_total = true};
-  for (std::size_t i = 0; i < plan.sessions.size(); ++i) {
-    table.rows.push_back({plan.sessions[i], fmt::to_string(plan.num_steps[i])});
+  const std::vector<std::string> sessions = plan.study.session_names();
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    table.rows.push_back({sessions[i], fmt::to_string(plan.num_steps[i])});
   }
-  table.rows.push_back({"all", fmt::to_string(plan.num_steps_in_all)});
-  if (plan.num_steps_beside > 0) {
+  table.rows.push_back({"all", fmt::to_string(plan.num_steps_in_all())});
+  if (plan.study.num_steps_beside() > 0) {
     table.notes.push_back(
         fmt::format("{} {} of sessions that calibrate nothing are left as they are",
-                    plan.num_steps_beside, built_in_model().step_name()));
+                    plan.study.num_steps_beside(), built_in_model().step_name()));
   }
   return table;
 }
@@ -176,12 +166,12 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
   }
   using Json = nlohmann::ordered_json;
   Json json{{"file", options.file.string()},
-            {"method", plan.method},
+            {"method", plan.study.method()},
             {"note", plan.note},
-            {"num_steps", plan.num_steps_in_all},
+            {"num_steps", plan.num_steps_in_all()},
             {"step_name", built_in_model().step_name()},
-            {"num_instruments", plan.num_instruments},
-            {"num_probed", plan.num_probed},
+            {"num_instruments", plan.study.num_instruments()},
+            {"num_probed", plan.study.num_probed()},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", nullptr},
             {"losses", Json::array()},
@@ -202,8 +192,9 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
                                   {"standard_error", plan.bound.standard_errors[i]},
                                   {"misses", plan.bound.misses[i]}});
   }
-  for (std::size_t i = 0; i < plan.sessions.size(); ++i) {
-    json["sessions"].push_back({{"session", plan.sessions[i]}, {"num_steps", plan.num_steps[i]}});
+  const std::vector<std::string> sessions = plan.study.session_names();
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    json["sessions"].push_back({{"session", sessions[i]}, {"num_steps", plan.num_steps[i]}});
   }
   print_json(json);
 }
@@ -305,7 +296,7 @@ int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStu
   print_plan(options, plan);
   if (options.format == OutputFormat::text) {
     print_lines(fmt::format("wrote {}\n", options.new_file.string()));
-    print_changed_method(campaign, plan.method);
+    print_changed_method(campaign, plan.study.method());
   }
   if (!best.is_interrupted) return exit_code_of(plan);
   wire::say("proofmass: interrupted; this is the best allocation found so far\n");

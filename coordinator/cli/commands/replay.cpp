@@ -14,8 +14,6 @@
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
@@ -210,12 +208,10 @@ class ReplayCommand {
   SignalSelection selection_;
 };
 
-int replay_runs(const ReplayOptions& options) {
+int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
   check_arguments(options);
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    ReplayCommand(options, is_stopped).replay_all();
-    return exit_done;
-  });
+  ReplayCommand(options, is_stopped).replay_all();
+  return exit_done;
 }
 
 }  // namespace
@@ -223,9 +219,8 @@ int replay_runs(const ReplayOptions& options) {
 void add_replay(CLI::App& app, Command& chosen) {
   static const std::map<std::string, SeriesFormat> formats{{"csv", SeriesFormat::csv},
                                                            {"hdf5", SeriesFormat::hdf5}};
-  auto [command, options] = add_command<ReplayOptions>(
+  auto [command, options] = add_stoppable_command<ReplayOptions>(
       app, chosen, "replay", "Simulate runs again, write their time series", replay_runs);
-  command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
   command.add_option("--run", options.run, "The run")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));

@@ -353,7 +353,7 @@ int run_campaign(const RunOptions& options) {
   wire::require_threads(num_service_threads);
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
-  check_stop_rule(options.stop.rule, *campaign);
+  check_until(*campaign, options.stop.rule);
   check_part(options, *campaign);
   (void)page_config_of(options.page);  // Before any file is made.
   const std::filesystem::path database = database_of(options);

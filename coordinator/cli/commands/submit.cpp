@@ -4,6 +4,7 @@
 #include <string>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
@@ -34,7 +35,7 @@ struct SubmitOptions {
 /// The campaign that the arguments name.
 std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
-  check_stop_rule(options.stop.rule, *campaign);
+  check_until(*campaign, options.stop.rule);
   if (options.name) {
     campaign->name = *options.name;
     check_campaign_name(campaign->name, NameOrigin::given);

@@ -43,12 +43,17 @@ std::filesystem::path directory_of_sweep(const SweepOptions& options) {
   return options.directory.value_or(options.run.campaign_file.stem().string() + "-sweep");
 }
 
+/// What is left to be done of a campaign.
+struct Rest {
+  std::uint64_t num_missing = 0;  ///< Runs, at most.
+  std::optional<int> exit_code;   ///< If it is finished already: what `run` ended with.
+};
+
 /// One campaign of a sweep, ready to be run.
 struct SweptCampaign {
   SweptValues values;
   RunOptions run;
-  std::uint64_t num_missing = 0;  ///< Runs, at most.
-  std::optional<int> exit_code;   ///< If it is finished already: what it ended with.
+  Rest rest = {};
 };
 
 using Sweep = std::vector<SweptCampaign>;
@@ -81,14 +86,8 @@ std::unique_ptr<Campaign> read_swept(const SweptCampaign& swept) {
   }
 }
 
-/// What is left to be done of a campaign.
-struct FoundCampaign {
-  std::uint64_t num_missing = 0;  ///< Runs, at most.
-  std::optional<int> exit_code;   ///< If nothing is: what `run` ended with.
-};
-
 /// @throws UsageError if there is a database of another campaign, or of one with more runs.
-FoundCampaign look_for(const Campaign& campaign, const RunOptions& run) {
+Rest rest_of(const Campaign& campaign, const RunOptions& run) {
   const std::filesystem::path& database = *run.database;
   if (!std::filesystem::exists(database))
     return {.num_missing = campaign.num_runs, .exit_code = {}};
@@ -117,8 +116,8 @@ Sweep plan_sweep(const SweepOptions& options) {
   Sweep sweep;
   std::map<std::string, std::string> values_of_definition;
   for (const SweptValues& values : combinations(keys)) {
-    SweptCampaign& swept = sweep.emplace_back(
-        SweptCampaign{.values = values, .run = run_options_of(options, values), .exit_code = {}});
+    SweptCampaign& swept =
+        sweep.emplace_back(SweptCampaign{.values = values, .run = run_options_of(options, values)});
     const std::unique_ptr<Campaign> campaign = read_swept(swept);
     const auto [same, is_new] = values_of_definition.emplace(
         campaign->definition(TableColumns::left_out).text, text_of(values));
@@ -126,10 +125,8 @@ Sweep plan_sweep(const SweepOptions& options) {
       throw UsageError(
           fmt::format("vary = {} (makes the same campaign as {})", text_of(values), same->second));
     }
-    check_stop_rule(swept.run.stop.rule, *campaign);
-    const FoundCampaign found = look_for(*campaign, swept.run);
-    swept.num_missing = found.num_missing;
-    swept.exit_code = found.exit_code;
+    check_until(*campaign, swept.run.stop.rule);
+    swept.rest = rest_of(*campaign, swept.run);
   }
   return sweep;
 }
@@ -151,7 +148,7 @@ CostEstimate cost_of(const std::vector<const SweptCampaign*>& unfinished) {
       num_steps = plan->num_steps();
       if (i == 0) step_s = try_first_batch(*campaign, *plan).time_s / num_steps;
     }
-    cost += estimated_cost(*campaign, unfinished[i]->num_missing, step_s * num_steps);
+    cost += estimated_cost(*campaign, unfinished[i]->rest.num_missing, step_s * num_steps);
   }
   return cost;
 }
@@ -167,7 +164,7 @@ void say_plan(const Sweep& sweep, const SweepOptions& options) {
   if (options.run.is_quiet) return;
   std::vector<const SweptCampaign*> unfinished;
   for (const SweptCampaign& swept : sweep) {
-    if (!swept.exit_code) unfinished.push_back(&swept);
+    if (!swept.rest.exit_code) unfinished.push_back(&swept);
   }
   std::string text =
       fmt::format("proofmass: {} campaigns in {}, {} of them unfinished\n", sweep.size(),
@@ -185,11 +182,11 @@ int run_all(const Sweep& sweep, bool is_quiet) {
   for (std::size_t i = 0; i < sweep.size(); ++i) {
     if (stop != StopRequest::none) return exit_interrupted;
     const SweptCampaign& swept = sweep[i];
-    if (!is_quiet && !swept.exit_code) {
+    if (!is_quiet && !swept.rest.exit_code) {
       wire::say(fmt::format("proofmass: campaign {} of {}: {}\n", i + 1, sweep.size(),
                             text_of(swept.values)));
     }
-    const int exit_code = swept.exit_code ? *swept.exit_code : run_campaign(swept.run);
+    const int exit_code = swept.rest.exit_code ? *swept.rest.exit_code : run_campaign(swept.run);
     if (exit_code == exit_interrupted) return exit_interrupted;
     if (exit_code == exit_cannot_be_done || gravest == exit_done) gravest = exit_code;
   }

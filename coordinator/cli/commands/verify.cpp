@@ -1,13 +1,16 @@
-#include "coordinator/cli/commands/verify.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
-#include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/archive/publication.hpp"
+#include "coordinator/archive/verification.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
@@ -15,11 +18,20 @@
 namespace proofmass::coordinator {
 namespace {
 
-struct VerifyCommandOptions {
-  std::filesystem::path database;
+/// Of both commands; `verify` has no output.
+struct CheckedFileOptions {
+  std::filesystem::path file;    ///< A database, or the archive of one that is to be checked.
+  std::filesystem::path output;  ///< Empty: the name of the database with `.tar.gz`.
+  std::vector<std::string> authors{"anonymous"};
+  wire::IfThere if_there = wire::IfThere::keep;
+  bool is_check = false;
   double fraction = 0.01;  ///< Of the runs, simulated again; in [0, 1].
   OutputFormat format = OutputFormat::text;
 };
+
+VerifyOptions how_to_verify(double fraction) {
+  return {.fraction = fraction, .num_threads = wire::num_processors()};
+}
 
 using Json = nlohmann::ordered_json;
 
@@ -30,17 +42,8 @@ Json json_of_check(const Check& check) {
           {"details", check.details}};
 }
 
-int verify_database(const VerifyCommandOptions& options) {
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
-    return print_checks(options.database, options.format, [&](const auto& report) {
-      return verify(options.database, how, report, is_stopped);
-    });
-  });
-}
-
-}  // namespace
-
+/// Prints checks of a file as soon as they are made, and what came of them.
+/// @param make_checks  Calls its argument with each, and returns true if none fails.
 int print_checks(const std::filesystem::path& file, OutputFormat format,
                  const std::function<bool(const std::function<void(const Check&)>&)>& make_checks) {
   const bool is_json = format == OutputFormat::json;
@@ -65,13 +68,56 @@ int print_checks(const std::filesystem::path& file, OutputFormat format,
   return exit_cannot_be_done;
 }
 
+int verify_database(const CheckedFileOptions& options, const IsStopped& is_stopped) {
+  return print_checks(options.file, options.format, [&](const auto& report) {
+    return verify(options.file, how_to_verify(options.fraction), report, is_stopped);
+  });
+}
+
+int publish_campaign(const CheckedFileOptions& options, const IsStopped& is_stopped) {
+  if (options.is_check) {
+    return print_checks(options.file, options.format, [&](const auto& report) {
+      return check_publication(options.file, how_to_verify(options.fraction), report, is_stopped);
+    });
+  }
+  std::filesystem::path output = options.output;
+  if (output.empty()) output = options.file.stem().string() + ".tar.gz";
+  check_output_file(output, options.if_there, "name one to replace");
+  publish(options.file, output, options.if_there, options.authors, is_stopped);
+  print_written(output, options.format);
+  return exit_done;
+}
+
+}  // namespace
+
 void add_verify(CLI::App& app, Command& chosen) {
-  auto [command, options] = add_command<VerifyCommandOptions>(
+  auto [command, options] = add_stoppable_command<CheckedFileOptions>(
       app, chosen, "verify", "Check a database, simulate some runs again", verify_database);
-  command.footer(exit_codes_text({exit_interrupted}));
-  add_database(command, options.database);
+  add_database(command, options.file);
   command.add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
+      ->capture_default_str();
+  add_json_flag(command, options.format);
+}
+
+void add_publish(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_stoppable_command<CheckedFileOptions>(
+      app, chosen, "publish", "Write an archive to cite, or check one", publish_campaign);
+  command.add_option("FILE", options.file, "Database; with --check an archive")
+      ->type_name(wire::file_type)
+      ->required();
+  CLI::Option* const check =
+      command.add_flag("--check", options.is_check, "Check an archive, simulate some runs again");
+  command
+      .add_option("--output", options.output, "Archive; by default FILE's stem with .tar.gz, here")
+      ->type_name(wire::file_type)
+      ->excludes(check);
+  command.add_option("--author", options.authors, "Of the results, for citations; may be repeated")
+      ->excludes(check);
+  add_force_flag(command, options.if_there);
+  command.add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
+      ->check(wire::in_range(0.0, 1.0))
+      ->needs(check)
       ->capture_default_str();
   add_json_flag(command, options.format);
 }

@@ -37,7 +37,7 @@ TEST_F(ServiceSnapshotTest, TellsWhatEachWorkerDoes) {
   state.quarantined[quarantined.host] = TimePoint::max();
 
   ServiceSnapshot snapshot;
-  add_workers(state, now, SnapshotDepth::with_workers, snapshot);
+  take_workers(state, now, SnapshotDepth::with_workers, snapshot);
   ASSERT_EQ(snapshot.workers.size(), 4U);
   EXPECT_EQ(snapshot.workers[0].activity, WorkerActivity::idle);
   EXPECT_EQ(snapshot.workers[1].activity, WorkerActivity::computing);
@@ -62,7 +62,7 @@ TEST_F(ServiceSnapshotTest, HasTheSpeedOfCardsInTheirLatestCampaign) {
 TEST_F(ServiceSnapshotTest, CountsWorkersWithoutCopyingThem) {
   for (std::uint64_t id = 1; id <= 7; ++id) add_worker(id).num_lent = id % 2;
   ServiceSnapshot snapshot;
-  add_workers(state, now, SnapshotDepth::without_workers, snapshot);
+  take_workers(state, now, SnapshotDepth::without_workers, snapshot);
   EXPECT_TRUE(snapshot.workers.empty());
   const auto count = [&](WorkerActivity activity) {
     return snapshot.num_workers_by_activity[static_cast<std::size_t>(activity)];
