@@ -28,25 +28,44 @@ std::array<int, 2> connected_pair() {
       fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
 }
 
+/// A pipe: what holds its first end can be killed when its second end is closed.
+std::array<int, 2> lifeline() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) == 0) return ends;
+  throw ModelProgramError(
+      fmt::format("model program: no pipe: {}", std::generic_category().message(errno)));
+}
+
+/// Has the kernel kill the group of processes as soon as nobody has the other end of the pipe: it
+/// then signals that there is something to read. A parent-death signal (PR_SET_PDEATHSIG) would
+/// come when the thread that started the program ends, and other threads go on using it.
+void kill_at_end_of(int pipe, pid_t group) {
+  fcntl(pipe, F_SETSIG, SIGKILL);
+  fcntl(pipe, F_SETOWN, -group);
+  fcntl(pipe, F_SETFL, O_ASYNC);
+}
+
 }  // namespace
 
 ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
     : name_(program.string()), answer_time_max_(limits.answer_time_max) {
   const std::array<int, 2> in = connected_pair();
   const std::array<int, 2> out = connected_pair();
+  const std::array<int, 2> life = lifeline();
   questions_ = in[0];
   answers_ = out[0];
+  lifeline_ = life[1];
   try {
     process_id_ = start_program({.arguments = {name_},
-                                 .descriptors = {in[1], out[1], STDERR_FILENO},
+                                 .descriptors = {in[1], out[1], STDERR_FILENO, life[0]},
                                  .environment = environment_without_settings(),
                                  .has_own_group = true});
   } catch (const Error& error) {
-    for (const int end : {in[0], in[1], out[0], out[1]}) close(end);
+    for (const int end : {in[0], in[1], out[0], out[1], life[0], life[1]}) close(end);
     throw ModelProgramError(fmt::format("model program = {}", error.what()));
   }
-  close(in[1]);
-  close(out[1]);
+  kill_at_end_of(life[0], process_id_);
+  for (const int end : {in[1], out[1], life[0]}) close(end);
   const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
   const rlimit memory{memory_max, memory_max};
   prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
@@ -57,6 +76,7 @@ ProgramProcess::ProgramProcess(const std::filesystem::path& program, const Progr
 ProgramProcess::~ProgramProcess() {
   close(questions_);
   close(answers_);
+  close(lifeline_);
   if (process_id_ == 0) return;
   kill(process_id_, SIGKILL);
   (void)wait_for_end(process_id_);
