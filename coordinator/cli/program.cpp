@@ -134,6 +134,11 @@ int run_proofmass(int argc, char** argv) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);
   }
+  // All commands take it; these say so.
+  for (const char* const name : {"run", "init", "check", "sweep", "models", "replay", "submit",
+                                 "verify", "merge", "publish"}) {
+    wire::add_model_program_option(*app.get_subcommand(name));
+  }
   app.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   return run_program(app, argc, argv, [&] {
     let_stop_signals_kill();
