@@ -37,6 +37,7 @@ Json campaign_object(const proto::CampaignStatus& campaign) {
   json.update({{"rate_hz", campaign.rate_hz()},
                {"remaining_s", nullptr},
                {"storage_failure", text_or_null(campaign.storage_failure())},
+               {"model_version", text_or_null(campaign.model_version())},
                {"missing_model", text_or_null(campaign.missing_model())},
                {"owner", text_or_null(campaign.owner())}});
   if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();

@@ -1,6 +1,7 @@
 #include "coordinator/report/status_notes.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -55,6 +56,12 @@ Remark comparison_note(const proto::CampaignStatus& campaign) {
 }
 
 }  // namespace
+
+std::string models_text(std::set<std::string> versions, const std::string& of_coordinator) {
+  versions.erase("");
+  if (versions.empty()) versions.insert(of_coordinator);
+  return fmt::format("model{} {}", versions.size() > 1 ? "s" : "", fmt::join(versions, ", "));
+}
 
 std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
   std::vector<Remark> notes;

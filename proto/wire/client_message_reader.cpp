@@ -127,6 +127,9 @@ void check(const proto::CampaignStatus& message) {
   if (!message.missing_model().empty()) {
     (void)checked_name(message.missing_model(), "missing_model");
   }
+  if (!message.model_version().empty()) {
+    (void)checked_name(message.model_version(), "model_version");
+  }
   check_owner(message.owner());
 }
 

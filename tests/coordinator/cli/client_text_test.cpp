@@ -143,6 +143,22 @@ second-order: 10 results compared with a second computation: 3 differ (none may)
 )");
 }
 
+TEST(StatusTable, NamesTheModelsOfTheCampaigns) {
+  const auto first_line = [](const proto::StatusReply& status) {
+    const std::string text = status_text(status, {.line_width_max = 79});
+    return text.substr(0, text.find('\n'));
+  };
+  proto::CampaignStatus ruler = campaign("a", 1), scale = campaign("b", 1);
+  ruler.set_model_version("ruler-1");
+  scale.set_model_version("balance-3");
+
+  EXPECT_EQ(first_line(status_with({ruler, ruler})),
+            "Proofmass 0.1.0, model ruler-1, up 3 h 20 min");
+  EXPECT_EQ(first_line(status_with({ruler, scale})),
+            "Proofmass 0.1.0, models balance-3, ruler-1, up 3 h 20 min");
+  EXPECT_EQ(first_line(status_with({})), "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min");
+}
+
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
   const std::string name(30, 'x');
   const proto::StatusReply status = status_with({campaign(name, 1), campaign("b", 1)});
@@ -278,6 +294,7 @@ proto::StatusReply some_status() {
   campaign.set_remaining_s(2.5);
   campaign.set_storage_failure("disk full");
   campaign.set_missing_model("ruler-1");
+  campaign.set_model_version("ruler-1");
   campaign.set_owner("anna");
   proto::StatusReply status = test::status_with({campaign});
   status.set_version("0.1.0");
@@ -315,6 +332,7 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"rate_hz", 0.5},
                          {"remaining_s", 2.5},
                          {"storage_failure", "disk full"},
+                         {"model_version", "ruler-1"},
                          {"missing_model", "ruler-1"},
                          {"owner", "anna"}}}},
                       {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
@@ -342,12 +360,14 @@ TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
   status.mutable_campaigns(0)->clear_remaining_s();
   status.mutable_campaigns(0)->clear_storage_failure();
   status.mutable_campaigns(0)->clear_missing_model();
+  status.mutable_campaigns(0)->clear_model_version();
   status.clear_factories();
   *status.add_factories()->mutable_report() = test::factory_report("fleet", 30);
   const Json json = Json::parse(status_json(status, JsonLayout::indented));
   EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["missing_model"].is_null());
+  EXPECT_TRUE(json["campaigns"][0]["model_version"].is_null());
   for (const std::string key : {"wait_s", "reason", "owner"}) {
     EXPECT_TRUE(json["factories"][0][key].is_null()) << key;
   }
