@@ -73,6 +73,10 @@ Json status_object(const proto::StatusReply& status) {
   json["num_unserved_files"] = status.num_unserved_files();
   json["quarantined_hosts"] = status.quarantined_hosts();
   json["num_quarantined_hosts"] = status.num_quarantined_hosts();
+  json["num_refusals"] = status.num_refusals();
+  json["last_refusal"] = text_or_null(status.last_refusal());
+  json["last_refusal_s"] = nullptr;
+  if (status.num_refusals() > 0) json["last_refusal_s"] = status.last_refusal_s();
   json["factories"] = Json::array();
   for (const auto& factory : status.factories())
     json["factories"].push_back(factory_object(factory));

@@ -91,6 +91,13 @@ std::string quarantine_note(const std::string& host) {
       "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`", host);
 }
 
+std::string refusal_note(const proto::StatusReply& status) {
+  if (status.num_refusals() == 0) return {};
+  return fmt::format("{} refused; the last {} ago: {}", counted(status.num_refusals(), "worker"),
+                     duration_text(status.last_refusal_s()),
+                     wire::visible_text(status.last_refusal()));
+}
+
 std::string factory_note(const proto::FactoryStatus& factory) {
   const proto::FactoryReport& report = factory.report();
   std::string note = fmt::format(
@@ -117,6 +124,7 @@ std::vector<Remark> service_notes(const proto::StatusReply& status) {
   }
   add(further_note(status.num_unserved_files(), status.unserved_files_size(), "more such file"),
       Tone::plain);
+  add(refusal_note(status), Tone::bad);
   for (const std::string& host : status.quarantined_hosts()) add(quarantine_note(host), Tone::bad);
   add(further_note(status.num_quarantined_hosts(), status.quarantined_hosts_size(),
                    "more such host"),

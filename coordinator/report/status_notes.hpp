@@ -42,7 +42,8 @@ struct CampaignCounter {
 /// About a campaign.
 [[nodiscard]] std::vector<Remark> notes_about(const proto::CampaignStatus& campaign);
 
-/// About the coordinator itself: files that are not served, hosts in quarantine, factories.
+/// About the coordinator itself: files that are not served, refused workers, hosts in quarantine,
+/// factories.
 [[nodiscard]] std::vector<Remark> service_notes(const proto::StatusReply& status);
 
 }  // namespace proofmass::coordinator

@@ -151,6 +151,8 @@ void check(const proto::StatusReply& message) {
     (void)checked_name(host, "quarantined_hosts");
   }
   for (const proto::FactoryStatus& factory : message.factories()) check(factory);
+  check_text(message.last_refusal(), "last_refusal");
+  (void)checked_magnitude(message.last_refusal_s(), "last_refusal_s");
 }
 
 void check(const proto::WorkersReply& message) {

@@ -66,6 +66,18 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
       << text;
 }
 
+TEST(StatusTable, TellsOfRefusedWorkersAndTheLastReason) {
+  proto::StatusReply status = status_with({campaign("a", 1)});
+  status.set_num_refusals(3);
+  status.set_last_refusal("n7-12: host = n7 (too much crashed there)");
+  status.set_last_refusal_s(200.0);
+  const std::string text = status_text(status, {.line_width_max = 120});
+  EXPECT_TRUE(
+      text.ends_with("\n3 workers refused; the last 3 min 20 s ago: n7-12: host = n7 (too "
+                     "much crashed there)\n"))
+      << text;
+}
+
 // A file that somebody made may have any name of a campaign in it, and the reason may quote it.
 TEST(StatusTable, ShowsAReasonInOneLine) {
   proto::StatusReply status = status_with({campaign("a", 1)});
@@ -303,6 +315,9 @@ proto::StatusReply some_status() {
   status.set_num_workers(2);
   status.set_num_slots(3);
   status.set_num_campaigns(1);
+  status.set_num_refusals(3);
+  status.set_last_refusal("w: no");
+  status.set_last_refusal_s(4.5);
   add_unserved("d/a.db", "is locked", status);
   status.set_num_unserved_files(2);
   status.add_quarantined_hosts("n7");
@@ -339,6 +354,9 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                       {"num_unserved_files", 2},
                       {"quarantined_hosts", {"n7"}},
                       {"num_quarantined_hosts", 1},
+                      {"num_refusals", 3},
+                      {"last_refusal", "w: no"},
+                      {"last_refusal_s", 4.5},
                       {"factories",
                        {{{"name", "fleet"},
                          {"batch_system", "pbs"},
