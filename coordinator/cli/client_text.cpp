@@ -7,6 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/cli/progress_display.hpp"
@@ -61,10 +64,15 @@ Table campaigns_table(const proto::StatusReply& status) {
 
 std::string service_lines(const proto::StatusReply& status, std::size_t line_width_max) {
   std::uint64_t num_lent = 0;
-  for (const CampaignStatus& campaign : status.campaigns()) num_lent += campaign.num_lent();
+  std::set<std::string> versions;
+  for (const CampaignStatus& campaign : status.campaigns()) {
+    num_lent += campaign.num_lent();
+    versions.insert(campaign.model_version());
+  }
   const std::size_t width = line_width_max;
-  const std::string service = fmt::format("Proofmass {}, model {}, up {}", status.version(),
-                                          status.model_version(), duration_text(status.uptime_s()));
+  const std::string service = fmt::format("Proofmass {}, {}, up {}", status.version(),
+                                          models_text(std::move(versions), status.model_version()),
+                                          duration_text(status.uptime_s()));
   const std::string workers =
       fmt::format("{} with {}, {} lent", counted(status.num_workers(), "worker"),
                   counted(status.num_slots(), "slot"), counted(num_lent, "run"));

@@ -1,9 +1,12 @@
 #include "coordinator/cli/program.hpp"
 
 #include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <optional>
@@ -24,6 +27,23 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
+namespace {
+
+constexpr std::string_view interrupted = "proofmass: interrupted\n";
+
+/// A handler may do little more.
+void end_at_once(int /*signal*/) {
+  (void)!write(STDERR_FILENO, interrupted.data(), interrupted.size());
+  _exit(exit_interrupted);
+}
+
+void handle_unless_ignored(int signal, void (*handler)(int)) {
+  struct sigaction now {};
+  sigaction(signal, nullptr, &now);
+  if (now.sa_handler != SIG_IGN) std::signal(signal, handler);
+}
+
+}  // namespace
 
 std::string exit_codes_text(std::initializer_list<ExitCode> further) {
   const auto may_be = [&](ExitCode code) { return std::ranges::count(further, code) > 0; };
@@ -70,6 +90,14 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   }
 }
 
+void end_at_stop_signals() {
+  for (const int signal : {SIGINT, SIGTERM}) handle_unless_ignored(signal, end_at_once);
+}
+
+void let_stop_signals_kill() {
+  for (const int signal : {SIGINT, SIGTERM}) handle_unless_ignored(signal, SIG_DFL);
+}
+
 std::optional<int> refused_model(int argc, char** argv, std::string_view program) {
   try {
     wire::choose_models(argc, argv);
@@ -81,6 +109,7 @@ std::optional<int> refused_model(int argc, char** argv, std::string_view program
 }
 
 int run_proofmass(int argc, char** argv) {
+  end_at_stop_signals();  // A program may take a while to say what its model is.
   if (const std::optional<int> refused = refused_model(argc, argv, "proofmass")) return *refused;
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
@@ -105,8 +134,16 @@ int run_proofmass(int argc, char** argv) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);
   }
+  // All commands take it; these say so.
+  for (const char* const name : {"run", "init", "check", "sweep", "models", "replay", "submit",
+                                 "verify", "merge", "publish"}) {
+    wire::add_model_program_option(*app.get_subcommand(name));
+  }
   app.footer(exit_codes_text({exit_not_met, exit_interrupted}));
-  return run_program(app, argc, argv, [&] { return chosen(); });
+  return run_program(app, argc, argv, [&] {
+    let_stop_signals_kill();
+    return chosen();
+  });
 }
 
 }  // namespace proofmass::coordinator

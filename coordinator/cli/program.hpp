@@ -39,6 +39,13 @@ using Command = std::function<int()>;
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 [[nodiscard]] int run_program(CLI::App& app, int argc, char** argv, const Command& work);
 
+/// From now on SIGINT and SIGTERM, unless they are ignored, end the process at once with the words
+/// and the exit code of an interruption: as long as there is nothing to be brought to an end.
+void end_at_stop_signals();
+
+/// Undoes end_at_stop_signals().
+void let_stop_signals_kill();
+
 /// Chooses the model, which is to be done first.
 /// @param program  For the message.
 /// @return The exit code if the program that is to simulate cannot be used, which it has said.

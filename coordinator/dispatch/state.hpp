@@ -339,6 +339,9 @@ struct State {
   std::map<HostId, Host> hosts;
   /// Hosts that are lent nothing until then, but for one round to workers that have delivered.
   std::map<HostId, TimePoint> quarantined;
+  std::uint64_t num_refusals = 0;  ///< Of workers that wanted to register.
+  std::string last_refusal;        ///< `NAME: reason`.
+  TimePoint refused_at{};
   /// Sessions that should be attached and have not said yet what they hold.
   std::set<SessionId> awaited;
   TimePoint awaited_until{};

@@ -297,6 +297,9 @@ void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
   }
   if (reject) {
     state.awaited.erase(session);
+    ++state.num_refusals;
+    state.last_refusal = fmt::format("{}: {}", hello.worker_name(), reject->reject().text());
+    state.refused_at = now;
     outbox.log({.severity = Severity::warning,
                 .kind = "worker_refused",
                 .fields = {{"name", hello.worker_name()}, Field::remark(reject->reject().text())}});

@@ -108,6 +108,9 @@ proto::StatusReply RequestService::service_status() const {
   for (proto::FactoryStatus& factory : factories_.current(now)) {
     *reply.add_factories() = std::move(factory);
   }
+  reply.set_num_refusals(state.num_refusals);
+  reply.set_last_refusal(state.last_refusal);
+  if (state.num_refusals > 0) reply.set_last_refusal_s(seconds(now - state.refused_at));
   return reply;
 }
 

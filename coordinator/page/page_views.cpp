@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -35,8 +37,13 @@ Cell progress_cell(const CampaignStatus& campaign) {
 
 std::string title_of(const ServiceSnapshot& snapshot) {
   const proto::StatusReply& status = snapshot.status;
-  return fmt::format("<p>Proofmass {}, model {}, up {}</p>\n", markup_text(status.version()),
-                     markup_text(status.model_version()), duration_text(status.uptime_s()));
+  std::set<std::string> versions;
+  for (const CampaignRecord& campaign : snapshot.campaigns) {
+    versions.insert(campaign.status.model_version());
+  }
+  const std::string models = models_text(std::move(versions), status.model_version());
+  return fmt::format("<p>Proofmass {}, {}, up {}</p>\n", markup_text(status.version()),
+                     markup_text(models), duration_text(status.uptime_s()));
 }
 
 /// The line that screen readers announce when it changes: it must not change often.

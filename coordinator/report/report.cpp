@@ -9,10 +9,17 @@
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/independence.hpp"
+#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+/// That of another program is not known.
+std::optional<std::uint64_t> seed_of(const Store& store) {
+  if (store.model().is_imported()) return std::nullopt;
+  return store.seed();
+}
 
 std::string report_of_one_state(const Store& store, const Campaign& campaign, Paint paint) {
   const auto [results, check, given_up] = read_checked_results(store, campaign);
@@ -20,7 +27,7 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign, Pa
   const CampaignStatistics& statistics = results.statistics;
   const std::uint64_t num_given_up = num_runs_in(given_up);
   std::string text =
-      wire::visible_lines(summary_text(store.name(), store.seed(), store.num_runs(), statistics,
+      wire::visible_lines(summary_text(store.name(), seed_of(store), store.num_runs(), statistics,
                                        results.digests.results, check)) +
       given_up_text(given_up, paint) + note_text(campaign) +
       wire::visible_lines(warnings_text(schema, results.warnings) + stop_text(store));
@@ -52,11 +59,13 @@ std::string note_text(const Campaign& campaign) {
   return wire::visible_lines("Note      " + wrapped(note, 10, 10) + "\n");
 }
 
-std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
-                         const CampaignStatistics& statistics, std::string_view digest,
-                         DigestCheck check) {
+std::string summary_text(std::string_view name, std::optional<std::uint64_t> seed,
+                         std::uint64_t num_runs, const CampaignStatistics& statistics,
+                         std::string_view digest, DigestCheck check) {
   const std::uint64_t num_imperfect = missing_in(statistics, 0).total();
-  std::string text = fmt::format("Campaign  {}\nSeed      {}\nDigest    {}\n", name, seed, digest);
+  std::string text = fmt::format("Campaign  {}\n", name);
+  if (seed) text += fmt::format("Seed      {}\n", *seed);
+  text += fmt::format("Digest    {}\n", digest);
   if (check == DigestCheck::not_checked) {
     text += fmt::format("          (not checked: no stored one of these {} runs)\n",
                         statistics.num_runs);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,11 +24,11 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string report_text(const Store& store, const Campaign& campaign,
                                       Paint paint = Paint::no);
 
-/// Name, seed, and how many runs ended how.
+/// Name, seed if it is known, and how many runs ended how.
 /// @param num_runs  Runs wanted.
 /// @param digest    Of the results; see Digest.
 /// @param check     A line says so if the digest could not be checked.
-[[nodiscard]] std::string summary_text(std::string_view name, std::uint64_t seed,
+[[nodiscard]] std::string summary_text(std::string_view name, std::optional<std::uint64_t> seed,
                                        std::uint64_t num_runs, const CampaignStatistics& statistics,
                                        std::string_view digest,
                                        DigestCheck check = DigestCheck::holds);

@@ -105,6 +105,7 @@ Table identity_table(const Review& review) {
        {"created", identity.created_utc},
        {"SHA-256 of the results", digest_words(review)},
        {"SHA-256 of the definition", identity.definition_digest}});
+  if (identity.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
   if (!review.stop.empty()) table.rows.push_back({"stop rule", review.stop});
   if (!identity.note.empty()) table.rows.push_back({"note", identity.note});
   return table;

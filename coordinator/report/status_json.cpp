@@ -37,6 +37,7 @@ Json campaign_object(const proto::CampaignStatus& campaign) {
   json.update({{"rate_hz", campaign.rate_hz()},
                {"remaining_s", nullptr},
                {"storage_failure", text_or_null(campaign.storage_failure())},
+               {"model_version", text_or_null(campaign.model_version())},
                {"missing_model", text_or_null(campaign.missing_model())},
                {"owner", text_or_null(campaign.owner())}});
   if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();
@@ -72,6 +73,10 @@ Json status_object(const proto::StatusReply& status) {
   json["num_unserved_files"] = status.num_unserved_files();
   json["quarantined_hosts"] = status.quarantined_hosts();
   json["num_quarantined_hosts"] = status.num_quarantined_hosts();
+  json["num_refusals"] = status.num_refusals();
+  json["last_refusal"] = text_or_null(status.last_refusal());
+  json["last_refusal_s"] = nullptr;
+  if (status.num_refusals() > 0) json["last_refusal_s"] = status.last_refusal_s();
   json["factories"] = Json::array();
   for (const auto& factory : status.factories())
     json["factories"].push_back(factory_object(factory));

@@ -1,6 +1,7 @@
 #include "coordinator/report/status_notes.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -56,6 +57,12 @@ Remark comparison_note(const proto::CampaignStatus& campaign) {
 
 }  // namespace
 
+std::string models_text(std::set<std::string> versions, const std::string& of_coordinator) {
+  versions.erase("");
+  if (versions.empty()) versions.insert(of_coordinator);
+  return fmt::format("model{} {}", versions.size() > 1 ? "s" : "", fmt::join(versions, ", "));
+}
+
 std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
   std::vector<Remark> notes;
   const auto add_trouble = [&](std::string text) { notes.push_back({std::move(text), Tone::bad}); };
@@ -84,6 +91,13 @@ std::string quarantine_note(const std::string& host) {
       "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`", host);
 }
 
+std::string refusal_note(const proto::StatusReply& status) {
+  if (status.num_refusals() == 0) return {};
+  return fmt::format("{} refused; the last {} ago: {}", counted(status.num_refusals(), "worker"),
+                     duration_text(status.last_refusal_s()),
+                     wire::visible_text(status.last_refusal()));
+}
+
 std::string factory_note(const proto::FactoryStatus& factory) {
   const proto::FactoryReport& report = factory.report();
   std::string note = fmt::format(
@@ -110,6 +124,7 @@ std::vector<Remark> service_notes(const proto::StatusReply& status) {
   }
   add(further_note(status.num_unserved_files(), status.unserved_files_size(), "more such file"),
       Tone::plain);
+  add(refusal_note(status), Tone::bad);
   for (const std::string& host : status.quarantined_hosts()) add(quarantine_note(host), Tone::bad);
   add(further_note(status.num_quarantined_hosts(), status.quarantined_hosts_size(),
                    "more such host"),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,10 +33,17 @@ struct CampaignCounter {
 /// Of the campaign's runs.
 [[nodiscard]] std::uint64_t percent_done(const proto::CampaignStatus& campaign);
 
+/// `model a-1`, or `models a-1, b-2`.
+/// @param versions        Of the campaigns; empty for one that an older coordinator serves.
+/// @param of_coordinator  Of its built-in model, which stands there if no other is known.
+[[nodiscard]] std::string models_text(std::set<std::string> versions,
+                                      const std::string& of_coordinator);
+
 /// About a campaign.
 [[nodiscard]] std::vector<Remark> notes_about(const proto::CampaignStatus& campaign);
 
-/// About the coordinator itself: files that are not served, hosts in quarantine, factories.
+/// About the coordinator itself: files that are not served, refused workers, hosts in quarantine,
+/// factories.
 [[nodiscard]] std::vector<Remark> service_notes(const proto::StatusReply& status);
 
 }  // namespace proofmass::coordinator

@@ -25,6 +25,8 @@ CampaignRecord read_record(const Database& database) {
   record.status.set_phase(wire::message_value(control.phase));
   record.status.set_priority(control.priority);
   record.status.set_num_runs(database.count("SELECT num_runs FROM campaign"));
+  record.status.set_model_version(
+      wire::name_from(database.text("SELECT model_version FROM campaign")));
   record.status.set_owner(database.text("SELECT owner FROM campaign"));
   return record;
 }

@@ -45,6 +45,8 @@ class TerminalTable {
     }
   };
 
+  void widen_for_groups();
+  [[nodiscard]] bool continues_group(std::size_t i) const;
   void fit();
   [[nodiscard]] bool is_before_line(std::size_t i) const;
   [[nodiscard]] std::string cell(std::size_t i, const Cell& cell) const;
@@ -76,7 +78,25 @@ TerminalTable::TerminalTable(const Table& table, const TerminalStyle& style)
     }
     columns_.push_back(shown);
   }
+  widen_for_groups();
   fit();
+}
+
+/// The last column of a group has the room that the columns before it lack for its heading.
+void TerminalTable::widen_for_groups() {
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const std::size_t first = i;
+    std::size_t width = columns_[i].width;
+    while (continues_group(i + 1)) width += columns_[++i].width;
+    const std::size_t needed = display_width(columns_[first].column->group);
+    if (needed > width) columns_[i].width += needed - width;
+  }
+}
+
+/// Whether a heading of the column before it goes on above it.
+bool TerminalTable::continues_group(std::size_t i) const {
+  return i < columns_.size() && !columns_[i].column->is_after_line &&
+         columns_[i].column->group == columns_[i - 1].column->group;
 }
 
 // Takes from the widest column of text, one at a time.
@@ -113,7 +133,9 @@ std::string TerminalTable::cell(std::size_t i, const Cell& cell) const {
   line.append(shown.lead, ' ');
   const std::string painted = in_tone(text, cell.tone, style_.paint);
   if (shown.column->is_text && !cell.value) return line + painted + blanks;
-  if (!is_before_line(i) || blanks.empty()) return line + blanks + painted;
+  // One blank moves behind the number, unless it is what separates that from the column before it.
+  const std::size_t kept = shown.has_own_width() ? 1 : 0;
+  if (!is_before_line(i) || blanks.size() <= kept) return line + blanks + painted;
   blanks.pop_back();
   return line + blanks + painted + " ";
 }
@@ -138,10 +160,7 @@ std::string TerminalTable::groups() const {
     const std::string& group = columns_[i].column->group;
     if (columns_[i].column->is_after_line) line += "│";
     std::size_t width = columns_[i].width;
-    while (++i < columns_.size() && columns_[i].column->group == group &&
-           !columns_[i].column->is_after_line) {
-      width += columns_[i].width;
-    }
+    while (continues_group(++i)) width += columns_[i].width;
     const std::size_t taken = display_width(group);
     line += left_aligned(std::string(width > taken ? (width - taken) / 2 : 0, ' ') + group, width);
     has_group = has_group || !group.empty();

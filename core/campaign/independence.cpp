@@ -9,6 +9,7 @@
 
 #include "core/campaign/dispersion.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass {
 
@@ -29,9 +30,11 @@ std::string why_not_independent(const Campaign& campaign) {
     const std::string declaration = path + ".independent";
     if (std::ranges::find(items, declaration, &DefinitionItem::key) != items.end()) continue;
     return fmt::format(
-        "{} is a table that is not declared independent, so that the draws may be those of a "
+        "{} is a table that is not declared independent ({}), so that the draws may be those of a "
         "design",
-        path);
+        path,
+        campaign.model().is_imported() ? "campaign.independent = true in the schema of its import"
+                                       : declaration + " = true");
   }
   return "";
 }

@@ -29,8 +29,9 @@ std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
 pid_t start_program(const ProgramStart& start) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  for (int i = 0; i < 3; ++i) {
-    posix_spawn_file_actions_adddup2(&actions, start.descriptors[static_cast<std::size_t>(i)], i);
+  int number = 0;
+  for (const int descriptor : start.descriptors) {
+    posix_spawn_file_actions_adddup2(&actions, descriptor, number++);
   }
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);

@@ -2,7 +2,6 @@
 
 #include <sys/types.h>
 
-#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -15,8 +14,8 @@ namespace proofmass::wire {
 struct ProgramStart {
   /// The program first: a path, or a name that is looked for in PATH.
   std::vector<std::string> arguments;
-  /// That become its standard input, output and error.
-  std::array<int, 3> descriptors{0, 1, 2};
+  /// That become its standard input, output and error, and further ones from 3 on.
+  std::vector<int> descriptors{0, 1, 2};
   /// `NAME=value` each; that of this process by default.
   std::optional<std::vector<std::string>> environment = {};
   /// Signals of the terminal, such as that of Ctrl-C, do not reach it.

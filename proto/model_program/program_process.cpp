@@ -1,5 +1,6 @@
 #include "proto/model_program/program_process.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
@@ -31,23 +32,43 @@ std::pair<Descriptor, Descriptor> connected_pair() {
       fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
 }
 
+/// A pipe: what holds its first end can be killed when its second end is closed.
+std::pair<Descriptor, Descriptor> life_pipe() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) == 0) return {Descriptor(ends[0]), Descriptor(ends[1])};
+  throw ModelProgramError(
+      fmt::format("model program: no pipe: {}", std::generic_category().message(errno)));
+}
+
+/// Has the kernel kill the group of processes as soon as nobody has the other end of the pipe: it
+/// then signals that there is something to read. A parent-death signal (PR_SET_PDEATHSIG) would
+/// come when the thread that started the program ends, and other threads go on using it.
+void kill_at_end_of(int pipe, pid_t group) {
+  fcntl(pipe, F_SETSIG, SIGKILL);
+  fcntl(pipe, F_SETOWN, -group);
+  fcntl(pipe, F_SETFL, O_ASYNC);
+}
+
 }  // namespace
 
 ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
     : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
   auto [questions, its_input] = connected_pair();
   auto [answers, its_output] = connected_pair();
+  auto [its_lifeline, lifeline] = life_pipe();
   try {
-    process_id_ =
-        start_program({.arguments = {name_},
-                       .descriptors = {its_input.number(), its_output.number(), STDERR_FILENO},
-                       .environment = environment_without_settings(),
-                       .has_own_group = true});
+    process_id_ = start_program({.arguments = {name_},
+                                 .descriptors = {its_input.number(), its_output.number(),
+                                                 STDERR_FILENO, its_lifeline.number()},
+                                 .environment = environment_without_settings(),
+                                 .has_own_group = true});
   } catch (const Error& error) {
     throw ModelProgramError(fmt::format("model program = {}", error.what()));
   }
+  kill_at_end_of(its_lifeline.number(), process_id_);
   questions_ = std::move(questions);
   answers_ = std::move(answers);
+  lifeline_ = std::move(lifeline);
   const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
   const rlimit memory{memory_max, memory_max};
   prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);

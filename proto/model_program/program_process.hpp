@@ -16,12 +16,12 @@ namespace proofmass::wire {
 
 /// A model program that runs as a child of this process: it reads questions from its standard
 /// input, a line each, and answers each with a line, in their order. What it prints as standard
-/// error is that of this process.
+/// error is that of this process. It does not outlive this process, however that ends.
 class ProgramProcess {
  public:
   /// @throws ModelProgramError if it cannot be started.
   ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits);
-  /// Kills it.
+  /// Kills it, and what it has started.
   ~ProgramProcess();
   ProgramProcess(const ProgramProcess&) = delete;
   ProgramProcess& operator=(const ProgramProcess&) = delete;
@@ -45,6 +45,7 @@ class ProgramProcess {
   pid_t process_id_ = 0;  // 0 once it has ended.
   Descriptor questions_;
   Descriptor answers_;
+  Descriptor lifeline_;
   std::string received_;  // Behind the last line that was taken.
 };
 

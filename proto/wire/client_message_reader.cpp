@@ -127,6 +127,9 @@ void check(const proto::CampaignStatus& message) {
   if (!message.missing_model().empty()) {
     (void)checked_name(message.missing_model(), "missing_model");
   }
+  if (!message.model_version().empty()) {
+    (void)checked_name(message.model_version(), "model_version");
+  }
   check_owner(message.owner());
 }
 
@@ -148,6 +151,8 @@ void check(const proto::StatusReply& message) {
     (void)checked_name(host, "quarantined_hosts");
   }
   for (const proto::FactoryStatus& factory : message.factories()) check(factory);
+  check_text(message.last_refusal(), "last_refusal");
+  (void)checked_magnitude(message.last_refusal_s(), "last_refusal_s");
 }
 
 void check(const proto::WorkersReply& message) {

@@ -199,7 +199,7 @@ struct Outcome {
 /// Computes the missing runs, up to `num_runs` in all.
 /// @param start  Null if nothing has begun yet.
 Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options,
-                std::unique_ptr<RunStart> start) {
+                std::unique_ptr<RunStart> start, const std::atomic<StopRequest>& stop) {
   const bool is_decided = options.stop.rule.empty() ||
                           (campaign.store.control().phase == wire::CampaignPhase::finished &&
                            !lacks_stop_check(campaign.store));
@@ -216,8 +216,6 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
         num_workers(options, *campaign.definition, part.count - num_finished_now), options.gpus);
   }
   make_active(campaign.store, options);
-  const SignalThread signals;
-  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
   GrowingFile file;
   std::vector<ServedCampaign> campaigns;
@@ -296,6 +294,12 @@ int say_cancelled(const Store& store, std::uint64_t failures_max) {
   return exit_cannot_be_done;
 }
 
+/// That of a program is needed to make or open a database, and takes as long as the program does:
+/// it is computed before signals are caught.
+void compute_reference_digest(const Model& model) {
+  if (!model.description().empty()) (void)model.reference_digest(best_instruction_set());
+}
+
 /// A part must be of the campaign. With a stop rule it would not be known which runs there will be.
 void check_part(const RunOptions& options, const Campaign& campaign) {
   if (!options.part) return;
@@ -358,13 +362,16 @@ int run_campaign(const RunOptions& options) {
   (void)page_config_of(options.page);  // Before any file is made.
   const std::filesystem::path database = database_of(options);
   const std::uint64_t num_runs = campaign->num_runs;
+  compute_reference_digest(campaign->model());
+  const SignalThread signals;
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   std::unique_ptr<RunStart> start;
   if (!std::filesystem::exists(database)) {
     start = std::make_unique<RunStart>(
         num_workers(options, *campaign, part_of(options, num_runs).count), options.gpus);
   }
   Outcome outcome = compute(open_or_create(*campaign, stop_plan_of(options, num_runs), database),
-                            num_runs, options, std::move(start));
+                            num_runs, options, std::move(start), stop);
   if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, options);
   update_statistics(outcome.store, *campaign);
   bring_to_rest(outcome.store, database);
@@ -376,6 +383,15 @@ int run_campaign(const RunOptions& options) {
   if (!given_up.empty()) return say_given_up(given_up, outcome.store.num_runs());
   return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
 }
+
+namespace {
+
+int run_from_start(const RunOptions& options) {
+  end_at_stop_signals();  // Until there is a file.
+  return run_campaign(options);
+}
+
+}  // namespace
 
 void add_run_options(CLI::App& command, RunOptions& options) {
   add_override_options(command, options.overrides);
@@ -394,7 +410,7 @@ void add_run_options(CLI::App& command, RunOptions& options) {
 
 void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
-      app, chosen, "run", "Run a campaign, or its missing runs", run_campaign);
+      app, chosen, "run", "Run a campaign, or its missing runs", run_from_start);
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_campaign_file(command, options.campaign_file);
   command.add_option("--db", options.database, "Database; by default FILE's stem with .db, here")

@@ -66,6 +66,18 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
       << text;
 }
 
+TEST(StatusTable, TellsOfRefusedWorkersAndTheLastReason) {
+  proto::StatusReply status = status_with({campaign("a", 1)});
+  status.set_num_refusals(3);
+  status.set_last_refusal("n7-12: host = n7 (too much crashed there)");
+  status.set_last_refusal_s(200.0);
+  const std::string text = status_text(status, {.line_width_max = 120});
+  EXPECT_TRUE(
+      text.ends_with("\n3 workers refused; the last 3 min 20 s ago: n7-12: host = n7 (too "
+                     "much crashed there)\n"))
+      << text;
+}
+
 // A file that somebody made may have any name of a campaign in it, and the reason may quote it.
 TEST(StatusTable, ShowsAReasonInOneLine) {
   proto::StatusReply status = status_with({campaign("a", 1)});
@@ -141,6 +153,22 @@ second-order: 1 run given up: too many workers crashed
 second-order: 2 runs without an estimate
 second-order: 10 results compared with a second computation: 3 differ (none may)
 )");
+}
+
+TEST(StatusTable, NamesTheModelsOfTheCampaigns) {
+  const auto first_line = [](const proto::StatusReply& status) {
+    const std::string text = status_text(status, {.line_width_max = 79});
+    return text.substr(0, text.find('\n'));
+  };
+  proto::CampaignStatus ruler = campaign("a", 1), scale = campaign("b", 1);
+  ruler.set_model_version("ruler-1");
+  scale.set_model_version("balance-3");
+
+  EXPECT_EQ(first_line(status_with({ruler, ruler})),
+            "Proofmass 0.1.0, model ruler-1, up 3 h 20 min");
+  EXPECT_EQ(first_line(status_with({ruler, scale})),
+            "Proofmass 0.1.0, models balance-3, ruler-1, up 3 h 20 min");
+  EXPECT_EQ(first_line(status_with({})), "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min");
 }
 
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
@@ -278,6 +306,7 @@ proto::StatusReply some_status() {
   campaign.set_remaining_s(2.5);
   campaign.set_storage_failure("disk full");
   campaign.set_missing_model("ruler-1");
+  campaign.set_model_version("ruler-1");
   campaign.set_owner("anna");
   proto::StatusReply status = test::status_with({campaign});
   status.set_version("0.1.0");
@@ -286,6 +315,9 @@ proto::StatusReply some_status() {
   status.set_num_workers(2);
   status.set_num_slots(3);
   status.set_num_campaigns(1);
+  status.set_num_refusals(3);
+  status.set_last_refusal("w: no");
+  status.set_last_refusal_s(4.5);
   add_unserved("d/a.db", "is locked", status);
   status.set_num_unserved_files(2);
   status.add_quarantined_hosts("n7");
@@ -315,12 +347,16 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"rate_hz", 0.5},
                          {"remaining_s", 2.5},
                          {"storage_failure", "disk full"},
+                         {"model_version", "ruler-1"},
                          {"missing_model", "ruler-1"},
                          {"owner", "anna"}}}},
                       {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
                       {"num_unserved_files", 2},
                       {"quarantined_hosts", {"n7"}},
                       {"num_quarantined_hosts", 1},
+                      {"num_refusals", 3},
+                      {"last_refusal", "w: no"},
+                      {"last_refusal_s", 4.5},
                       {"factories",
                        {{{"name", "fleet"},
                          {"batch_system", "pbs"},
@@ -342,12 +378,14 @@ TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
   status.mutable_campaigns(0)->clear_remaining_s();
   status.mutable_campaigns(0)->clear_storage_failure();
   status.mutable_campaigns(0)->clear_missing_model();
+  status.mutable_campaigns(0)->clear_model_version();
   status.clear_factories();
   *status.add_factories()->mutable_report() = test::factory_report("fleet", 30);
   const Json json = Json::parse(status_json(status, JsonLayout::indented));
   EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["missing_model"].is_null());
+  EXPECT_TRUE(json["campaigns"][0]["model_version"].is_null());
   for (const std::string key : {"wait_s", "reason", "owner"}) {
     EXPECT_TRUE(json["factories"][0][key].is_null()) << key;
   }

@@ -153,6 +153,42 @@ TEST(StopSignalsDeathTest, MakeWhatADatabaseThenSaysAnInterruption) {
   EXPECT_EXIT(exit_after_store_error(false), testing::ExitedWithCode(99), "");
 }
 
+/// A program in the place of the worker's, or of a model's.
+std::filesystem::path script(const test::ScratchDirectory& directory, const std::string& text) {
+  const auto file = directory / "worker";
+  std::ofstream(file) << "#!/bin/sh\n" << text << '\n';
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  return file;
+}
+
+// The model has not yet said what it is, and hangs.
+TEST(StopSignalsDeathTest, EndAProgramInOrderFromItsStart) {
+  const test::ScratchDirectory directory;
+  for (const std::string signal : {"INT", "TERM"}) {
+    const std::string model =
+        script(directory, "read question; kill -" + signal + " $PPID; sleep 1000");
+    for (const std::string command : {"run", "verify"}) {
+      EXPECT_EXIT(
+          _exit(run_with(run_proofmass, {"proofmass", command, "--model-program", model, "a.db"})),
+          testing::ExitedWithCode(exit_interrupted), "^proofmass: interrupted\n$");
+    }
+  }
+}
+
+/// Ends this process with 0 if a program that is started with a signal ignored leaves it ignored,
+/// or if the signal kills as usual.
+[[noreturn]] void exit_with_handler_left(void (*handler)(int)) {
+  (void)std::signal(SIGINT, handler);
+  end_at_stop_signals();
+  let_stop_signals_kill();
+  _exit(std::signal(SIGINT, SIG_DFL) == handler ? 0 : 1);
+}
+
+TEST(StopSignalsDeathTest, AreWhatTheyWereOnceACommandBegins) {
+  EXPECT_EXIT(exit_with_handler_left(SIG_DFL), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(exit_with_handler_left(SIG_IGN), testing::ExitedWithCode(0), "");
+}
+
 testing::ExitedWithCode ends_with(StopRequest request) {
   return testing::ExitedWithCode(static_cast<int>(request));
 }
@@ -165,14 +201,6 @@ TEST(StopSignalsDeathTest, LeaveTheWorkersOnAHangUp) {
 // As `nohup` does.
 TEST(StopSignalsDeathTest, LeaveAHangUpIgnoredThatWasIgnoredBefore) {
   EXPECT_EXIT(exit_with_request_after(SIGHUP, SIG_IGN), ends_with(StopRequest::none), "");
-}
-
-/// A program in the place of the worker's.
-std::filesystem::path script(const test::ScratchDirectory& directory, const std::string& text) {
-  const auto file = directory / "worker";
-  std::ofstream(file) << "#!/bin/sh\n" << text << '\n';
-  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
-  return file;
 }
 
 WorkerProcesses::Exit exit_of(const std::string& text) {

@@ -8,12 +8,15 @@ namespace {
 class WorkerTest : public DispatchFixture {
  protected:
   void refuse(const proto::Hello& said, proto::RejectReason reason, const std::string& text) {
+    const std::uint64_t num_refusals_before = state.num_refusals;
     say_hello(second, said);
     const auto reject = outbox.take_sent<proto::Reject>(second);
     EXPECT_EQ(reject.reason(), reason);
     EXPECT_EQ(reject.text(), text);
     EXPECT_EQ(outbox.take_events(), Strings{"worker_refused name=w " + text});
     EXPECT_FALSE(state.workers.contains(second));
+    EXPECT_EQ(state.num_refusals, num_refusals_before + 1);
+    EXPECT_EQ(state.last_refusal, "w: " + text);
   }
 };
 

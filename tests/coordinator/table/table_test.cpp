@@ -106,6 +106,19 @@ TEST(TerminalTable, HasGroupsVerticalLinesAndATotal) {
             "sum        4    5 │     6\n");
 }
 
+TEST(TerminalTable, KeepsItsLinesWhereNumbersAndHeadingsAreWide) {
+  const Table table{.columns = {{"a", true, 3},
+                                {"from", false, 7},
+                                {"to", false, 7},
+                                {"b", false, 4, "long group", true}},
+                    .rows = {{"S", "4.8e-04", "5.5e-04", "1"}}};
+  EXPECT_EQ(terminal_text(table),
+            "                   │long group\n"
+            "a      from     to │         b\n"
+            "───────────────────┼──────────\n"
+            "S   4.8e-04 5.5e-04│         1\n");
+}
+
 TEST(TerminalTable, HasACaptionRemarksAndSentences) {
   Table table = named_runs({});
   table.caption = "runs";

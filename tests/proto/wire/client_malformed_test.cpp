@@ -409,8 +409,13 @@ TEST(MalformedTexts, AreBoundedAndHarmlessToATerminal) {
   EXPECT_EQ(refusal_of_campaign(
                 [](auto& campaign) { campaign.set_storage_failure(std::string(4097, 'x')); }),
             "storage_failure = 4097 bytes (must be at most 4096)");
+  EXPECT_EQ(refusal_of_status([](auto& status) { status.set_last_refusal("\r"); }),
+            "last_refusal = 1 bytes (must be printable ASCII and line ends)");
   EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_missing_model("\x1b[2J"); }),
             "missing_model = 4 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit "
+            "first)");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_model_version("\x1b[2J"); }),
+            "model_version = 4 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit "
             "first)");
   EXPECT_EQ(refusal(done_reply("a"),
                     [](auto& envelope) { envelope.mutable_done()->set_text("\x1b[2J"); }),
