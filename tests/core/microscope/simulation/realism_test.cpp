@@ -77,20 +77,19 @@ TEST(Realism, ReportsOldAngles) {
   }
 }
 
-// t goes on from session to session: the second begins after the orbits of the first.
+// The settling before a record is counted backwards.
 TEST(Realism, MovesTheStarTrackerWithTheOrbit) {
   RealismConfig config;
   config.star_tracker_orbital_error_rad = 2e-5;
   config.star_tracker_orbital_phase_rad = 0.4;
   const Instrument instrument = make_instrument({});
   Scenario scenario = scenario_with(config);
-  scenario.sessions[0].num_orbits = 7;
   LoopConstants<double> constants = constants_of(scenario, instrument);
   const Vector3<double> bias = constants.star_tracker_bias_S_rad;
-  Realism realism(scenario, instrument, constants, 1, 100);
+  Realism realism(scenario, instrument, constants, 0, 100);
   for (int k = -100; k < 20000; ++k) {
     realism.begin_sample(constants);
-    const double t_s = 7 * scenario.orbit.period_s + 0.25 * k;
+    const double t_s = 0.25 * k;
     const double expected = 2e-5 * std::sin(two_pi * t_s / scenario.orbit.period_s + 0.4);
     ASSERT_NEAR(constants.star_tracker_bias_S_rad.z - bias.z, expected, 1e-16) << k;
   }
@@ -165,9 +164,9 @@ TEST(Realism, CommandsTorquesOfThePrincipalMoments) {
   const LoopConstants<double> constants = constants_of(scenario_with(config), make_instrument({}));
   Vector3<double> thrust_S{}, torque_S{1e-6, -2e-6, 3e-6};
   realism.actuate(constants, zero, thrust_S, torque_S);
-  EXPECT_NEAR(90.0 * torque_S.x + 2.0 * torque_S.y - 3.0 * torque_S.z, 90e-6, 1e-19);
-  EXPECT_NEAR(2.0 * torque_S.x + 111.0 * torque_S.y + 4.0 * torque_S.z, -222e-6, 1e-19);
-  EXPECT_NEAR(-3.0 * torque_S.x + 4.0 * torque_S.y + 75.0 * torque_S.z, 225e-6, 1e-19);
+  EXPECT_NEAR(90.0 * torque_S.x + 2.0 * torque_S.y - 3.0 * torque_S.z, 90e-6, 1e-20);
+  EXPECT_NEAR(2.0 * torque_S.x + 111.0 * torque_S.y + 4.0 * torque_S.z, -222e-6, 1e-20);
+  EXPECT_NEAR(-3.0 * torque_S.x + 4.0 * torque_S.y + 75.0 * torque_S.z, 225e-6, 1e-20);
 }
 
 // Scale 1 + ½(ε_1 + ε_2); the mean misalignment of both sensors turns it: v_K = v_S − θ × v_S.
@@ -184,23 +183,26 @@ TEST(Realism, MeasuresRotationInTheFramesOfTheSensors) {
   EXPECT_NEAR(realism_of(config, instrument).measured({1e-6, 0.0, 0.0}).y, -1.5e-9, 1e-21);
 }
 
-// What a sensor reports of Γ_App after an hour: b0 + ḃt + ([K1] + st) Γ_App, in its frame.
+// What a sensor reports of Γ_App after an hour of the second session, which begins after the seven
+// orbits of the first: b0 + ḃt + ([K1] + st) Γ_App, in its frame.
 TEST(Realism, LetsBiasAndScaleFactorDrift) {
   Instrument instrument = make_instrument({});
   instrument.sensors[1].parasitic_K_m_s2 = {3e-8, -2e-8, 1e-8};
   RealismConfig config;
   config.bias_drift_m_s3 = {0.0, 2e-13};
   config.scale_drift_per_s = {0.0, 1e-7};
-  const Scenario scenario = scenario_with(config);
+  Scenario scenario = scenario_with(config);
+  scenario.sessions[0].num_orbits = 7;
+  const double t_s = 7 * scenario.orbit.period_s + 3600;
   LoopConstants<double> constants = constants_of(scenario, instrument);
-  Realism realism(scenario, instrument, constants, 0, 0);
+  Realism realism(scenario, instrument, constants, 1, 0);
   for (int k = 0; k <= 14400; ++k) realism.begin_sample(constants);
   const Vector3<double> applied_S{5e-8, 0.0, -7e-8};
   const Vector3<double> measured = measured_acceleration(
       constants.sensors[1], applied_S + constants.sensors[1].parasitic_K_m_s2);
-  EXPECT_NEAR(measured.x, 2e-13 * 3600 + (1.0 + 1e-7 * 3600) * 5e-8, 1e-20);
-  EXPECT_NEAR(measured.y, 2e-13 * 3600, 1e-20);
-  EXPECT_NEAR(measured.z, 2e-13 * 3600 - (1.0 + 1e-7 * 3600) * 7e-8, 1e-20);
+  EXPECT_NEAR(measured.x, 2e-13 * t_s + (1.0 + 1e-7 * t_s) * 5e-8, 1e-20);
+  EXPECT_NEAR(measured.y, 2e-13 * t_s, 1e-20);
+  EXPECT_NEAR(measured.z, 2e-13 * t_s - (1.0 + 1e-7 * t_s) * 7e-8, 1e-20);
   EXPECT_EQ(measured_acceleration(constants.sensors[0], applied_S).x, 5e-8);
 }
 
