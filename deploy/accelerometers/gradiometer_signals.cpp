@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -139,7 +140,8 @@ Motion in_science(const Gradiometer& settings, const Sampling& sampling, std::ui
   const RandomStream stream(seed, run, stream_id("science"));
   const std::size_t bins = sampling.transform.num_bins();
   const double orbit_hz = settings.orbit_rate_rad_s() / (2.0 * std::numbers::pi);
-  const auto orbit_bin = static_cast<std::size_t>(std::round(orbit_hz / sampling.spacing_hz()));
+  const double orbits = std::max(1.0, std::round(orbit_hz / sampling.spacing_hz()));
+  const auto orbit_bin = static_cast<std::size_t>(orbits);
   Motion motion;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     motion.linear_m_s2[axis] = comb(sampling, stream, {}, axis);
