@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/random/stream.hpp"
 #include "fourier.hpp"
 #include "kinematics.hpp"
 #include "settings_model.hpp"
@@ -34,23 +35,10 @@ struct Unknowns {
 inline constexpr std::array<std::array<std::size_t, 2>, 3> coupling_places{
     {{1, 0}, {2, 1}, {1, 2}}};
 
-/// An accelerometer as it is, or as it is estimated.
-struct Accelerometer {
-  Matrix3<double> matrix;     ///< M
-  Vector3<double> quadratic;  ///< Diagonal of K, s²/m.
-  Matrix3<double> coupling;   ///< W, m.
-  Vector3<double> place_m;    ///< r
-};
-
 /// @param unknowns  Shape [Unknowns::count].
 /// @param length_m  From the first sensor to the third.
 [[nodiscard]] std::array<Accelerometer, 3> sensors_of(std::span<const double> unknowns,
                                                       double length_m);
-
-/// yᵢ without its noise, m/s².
-[[nodiscard]] Vector3<double> reading(const Accelerometer& sensor, const Vector3<double>& a_ng_m_s2,
-                                      const Matrix3<double>& gradient,
-                                      const Vector3<double>& angular_rad_s2);
 
 /// A quantity of the results: a sum of unknowns that the observations tell.
 struct Combination {
@@ -61,7 +49,7 @@ struct Combination {
 
 /// Numbers of the campaign file.
 struct Gradiometer {
-  static constexpr std::string_view name = "nggm-three", version = "gradiometer-1",
+  static constexpr std::string_view name = "nggm-three", version = "gradiometer-2",
                                     purpose =
                                         "Measures how well shaking a satellite calibrates a "
                                         "gradiometer of three accelerometers.",
@@ -73,6 +61,8 @@ struct Gradiometer {
   double duration_s = 86400.0;
   double linear_m_s2_rthz = 2e-6;
   double angular_rad_s2_rthz = 2e-6;
+  double lowest_hz = 1e-5;
+  double drag_m_s2 = 1e-8;
   double noise_factor = 1.0;
   double matrix = 1e-3;
   double quadratic_s2_m = 10.0;
@@ -82,6 +72,7 @@ struct Gradiometer {
   double quadratic_objective_s2_m = 1.5;
   double coupling_objective_m = 1e-5;
   double place_objective_m = 3e-6;
+  double ratio_objective = 0.15;
 
   static std::span<const SettingInfo<Gradiometer>> infos();
   static std::span<const DrawnQuantity> drawn();
@@ -102,10 +93,38 @@ struct Gradiometer {
 /// The combinations that are estimated, in the order of the results.
 [[nodiscard]] const std::vector<Combination>& combinations();
 
-/// What a run measures: a reading of each sensor and the satellite's rotation, each second.
+using Amplitudes = std::vector<ComplexDouble>;
+
+/// Records of equally spaced samples; all signals are lines at multiples of 1 / (their length).
+struct Sampling {
+  FourierTransform transform;
+  double period_s;
+
+  [[nodiscard]] double spacing_hz() const {
+    return 1.0 / (period_s * static_cast<double>(transform.size()));
+  }
+};
+
+/// What moves the satellite: amplitudes of the lines of each axis.
+struct Motion {
+  std::array<Amplitudes, 3> linear_m_s2;  ///< Of a_ng.
+  std::array<Amplitudes, 3> angular_rad_s2;
+};
+
+/// Shaking about and along all axes, and the noise of the thrusters.
+[[nodiscard]] Motion shaken(const Gradiometer& settings, const Sampling& sampling,
+                            std::uint64_t seed, RunIndex run);
+
+/// Without shaking: noise of the thrusters, which take the drag away along x, and drag along y and
+/// z, a line at the orbit's frequency. The satellite turns evenly.
+[[nodiscard]] Motion in_science(const Gradiometer& settings, const Sampling& sampling,
+                                std::uint64_t seed, RunIndex run);
+
+/// A reading of each sensor and the satellite's rotation, in each sample.
 struct Measurement {
   std::array<std::vector<Vector3<double>>, 3> readings_m_s2;
-  std::vector<Rotation> rotation;  ///< With its noise.
+  std::vector<Rotation> rotation;          ///< With its noise.
+  std::vector<Vector3<double>> a_ng_m_s2;  ///< The true one, which no estimate may use.
 };
 
 /// One-sided amplitude spectral densities at a frequency above 0.
@@ -113,12 +132,12 @@ struct Measurement {
 /// Of angular accelerometers and star trackers together.
 [[nodiscard]] double angular_noise_rad_s2_rthz(double frequency_hz);
 
-/// Simulates what a run measures. Shaking is a comb of lines with random phases, and noise a comb
-/// of lines with random amplitudes, at the frequencies of the record's Fourier transform.
+/// Simulates what sensors measure, with noise: lines with random amplitudes.
 /// @param unknowns  True values, shape [Unknowns::count].
-[[nodiscard]] Measurement measure(const Gradiometer& settings, const FourierTransform& transform,
-                                  std::span<const double> unknowns, std::uint64_t seed,
-                                  RunIndex run);
+/// @param noises    The stream of the noise.
+[[nodiscard]] Measurement measure(const Gradiometer& settings, const Sampling& sampling,
+                                  const Motion& motion, std::span<const double> unknowns,
+                                  const RandomStream& noises);
 
 /// What the fit of a measurement finds.
 struct Fit {
@@ -131,6 +150,18 @@ struct Fit {
 /// Estimates all unknowns by least squares of Gauss and Newton, weighted by the noise's spectra.
 [[nodiscard]] Fit fit(const Gradiometer& settings, const FourierTransform& transform,
                       const Measurement& measurement);
+
+/// What the calibration is for: a_ng in science data, judged by the power of its residual between
+/// 0.1 and 1 mHz, over the power that is required there. Each is below 1 if the requirement is met.
+struct ScienceRatios {
+  double calibrated = 0.0;
+  double uncalibrated = 0.0;  ///< All unknowns taken to be 0.
+  double floor = 0.0;         ///< With the true values: what noise alone makes.
+};
+[[nodiscard]] ScienceRatios science_ratios(const Gradiometer& settings,
+                                           std::span<const double> truth,
+                                           std::span<const double> estimate, std::uint64_t seed,
+                                           RunIndex run);
 
 /// Simulates and fits.
 class Shaking {
@@ -145,7 +176,7 @@ class Shaking {
 
  private:
   Gradiometer settings_;
-  FourierTransform transform_;
+  Sampling sampling_;
 };
 
 }  // namespace proofmass

@@ -23,9 +23,6 @@ constexpr std::size_t gradient_signal = 3, square_signal = 12, angular_signal = 
 using Derivatives = std::array<std::array<double, residual_signal>, Unknowns::count>;
 using AxisDerivatives = std::array<Derivatives, 3>;
 
-/// Below this the noise of the satellite's rotation is much larger than what the lines tell.
-constexpr double lowest_hz = 1e-4;
-
 struct SignalTable {
   std::array<std::vector<double>, num_signals> signals;
 
@@ -154,7 +151,7 @@ std::array<Products, 4> weighted_products(const Gradiometer& settings,
   std::array<double, num_signals> real{}, imaginary{};
   for (std::size_t k = 0; k < transform.num_bins(); ++k) {
     const double frequency_hz = static_cast<double>(k + 1) / n;
-    if (frequency_hz < lowest_hz) continue;
+    if (frequency_hz < settings.lowest_hz) continue;
     for (std::size_t s = 0; s < num_signals; ++s) {
       real[s] = spectra[s][k].real();
       imaginary[s] = spectra[s][k].imag();

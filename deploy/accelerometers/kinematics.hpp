@@ -4,7 +4,7 @@
 
 namespace proofmass {
 
-/// Angular motion of the satellite in its frame: x along track, y across track, z radial.
+/// Angular motion of the satellite in its frame: x along track, y across track, z to the Earth.
 struct Rotation {
   Vector3<double> rate_rad_s;           ///< ω
   Vector3<double> acceleration_rad_s2;  ///< ω̇
@@ -28,6 +28,28 @@ struct Rotation {
   return {{{{n2 - w.y * w.y - w.z * w.z, w.x * w.y - a.z, w.x * w.z + a.y - v_xz},
             {w.x * w.y + a.z, n2 - w.x * w.x - w.z * w.z, w.y * w.z - a.x - v_yz},
             {w.x * w.z - a.y - v_xz, w.y * w.z + a.x - v_yz, -2.0 * n2 - w.x * w.x - w.y * w.y}}}};
+}
+
+/// An accelerometer as it is, or as it is estimated.
+struct Accelerometer {
+  Matrix3<double> matrix;     ///< M
+  Vector3<double> quadratic;  ///< Diagonal of K, s²/m.
+  Matrix3<double> coupling;   ///< W, m.
+  Vector3<double> place_m;    ///< r
+};
+
+/// What it reads without its noise, m/s²:
+///
+///     a = G r + a_ng,    y = M a + K (a ∘ a) + W ω̇
+///
+/// @param gradient  G.
+[[nodiscard]] inline Vector3<double> reading(const Accelerometer& sensor,
+                                             const Vector3<double>& a_ng_m_s2,
+                                             const Matrix3<double>& gradient,
+                                             const Vector3<double>& angular_rad_s2) {
+  const Vector3<double> a = gradient * sensor.place_m + a_ng_m_s2;
+  return sensor.matrix * a + scaled(sensor.quadratic, scaled(a, a)) +
+         sensor.coupling * angular_rad_s2;
 }
 
 }  // namespace proofmass

@@ -78,7 +78,7 @@ TEST_F(ProgramProcessTest, OutlivesTheThreadThatStartedIt) {
   const std::string question = "still there?";
   std::string answered;
 
-  process->ask({&question, 1}, [&](std::string_view answer) { answered = answer; });
+  process->ask({question}, [&](std::string_view answer) { answered = answer; });
 
   EXPECT_EQ(answered, question);
 }
