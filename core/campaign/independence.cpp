@@ -9,7 +9,6 @@
 
 #include "core/campaign/dispersion.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 
 namespace proofmass {
 
@@ -30,11 +29,9 @@ std::string why_not_independent(const Campaign& campaign) {
     const std::string declaration = path + ".independent";
     if (std::ranges::find(items, declaration, &DefinitionItem::key) != items.end()) continue;
     return fmt::format(
-        "{} is a table that is not declared independent ({}), so that the draws may be those of a "
-        "design",
-        path,
-        campaign.model().is_imported() ? "campaign.independent = true in the schema of its import"
-                                       : declaration + " = true");
+        "{} is a table that is not declared independent ({} = true, or campaign.independent = true "
+        "in the schema of an import), so that the draws may be those of a design",
+        path, declaration);
   }
   return "";
 }

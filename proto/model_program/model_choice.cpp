@@ -102,7 +102,10 @@ void add_model_program_option(CLI::App& app) {
   app.add_option_function<std::vector<std::string>>(
          std::string(option),
          [](const std::vector<std::string>& named) {
+           // An argument of a command hides the variable, which this option is given all the same.
+           const std::vector<std::string> of_variable = named_programs(0, nullptr);
            for (const std::string& program : named) {
+             if (std::ranges::find(of_variable, program) != of_variable.end()) continue;
              if (std::ranges::find(chosen_models(), whole_path(program), &ChosenModel::program) !=
                  chosen_models().end()) {
                continue;

@@ -164,9 +164,9 @@ TEST(Realism, CommandsTorquesOfThePrincipalMoments) {
   const LoopConstants<double> constants = constants_of(scenario_with(config), make_instrument({}));
   Vector3<double> thrust_S{}, torque_S{1e-6, -2e-6, 3e-6};
   realism.actuate(constants, zero, thrust_S, torque_S);
-  EXPECT_NEAR(90.0 * torque_S.x + 2.0 * torque_S.y - 3.0 * torque_S.z, 90e-6, 1e-20);
-  EXPECT_NEAR(2.0 * torque_S.x + 111.0 * torque_S.y + 4.0 * torque_S.z, -222e-6, 1e-20);
-  EXPECT_NEAR(-3.0 * torque_S.x + 4.0 * torque_S.y + 75.0 * torque_S.z, 225e-6, 1e-20);
+  EXPECT_NEAR(90.0 * torque_S.x + 2.0 * torque_S.y - 3.0 * torque_S.z, 90e-6, 1e-19);
+  EXPECT_NEAR(2.0 * torque_S.x + 111.0 * torque_S.y + 4.0 * torque_S.z, -222e-6, 1e-19);
+  EXPECT_NEAR(-3.0 * torque_S.x + 4.0 * torque_S.y + 75.0 * torque_S.z, 225e-6, 1e-19);
 }
 
 // Scale 1 + ½(ε_1 + ε_2); the mean misalignment of both sensors turns it: v_K = v_S − θ × v_S.
