@@ -68,12 +68,14 @@ class DataFilesIn final : public DataFiles {
   std::map<std::string, std::string> texts_;
 };
 
-/// A mistake that is made easily. Nothing is read from a pipe: it would be missing afterwards.
+/// A mistake that is made easily. Nothing is read from a pipe: it would be missing afterwards. What
+/// the kernel makes up, as in /proc, has no size, and reading it might wait for ever.
 bool is_database(const std::filesystem::path& file) {
   constexpr std::string_view format{"SQLite format 3\0", 16};
   std::string beginning(format.size(), '\0');
   std::error_code error;
   return std::filesystem::is_regular_file(file, error) &&
+         std::filesystem::file_size(file, error) >= format.size() && !error &&
          std::ifstream(file).read(beginning.data(), 16) && beginning == format;
 }
 
