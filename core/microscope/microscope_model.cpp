@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <memory>
@@ -77,14 +78,23 @@ ResultSchema MicroscopeCampaign::results() const { return scenario_results(scena
 
 std::string MicroscopeCampaign::note() const {
   if (scenario.has_plain_loops()) return {};
-  const Margins margins = least(loop_margins(scenario, make_instrument({})));
+  const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
+  const auto name_of = [](const AxisMargins& of) {
+    return fmt::format("{} {}", names_of(of.loop)[static_cast<std::size_t>(of.loop) - 1],
+                       names_of(of.axis)[index(of.axis)]);
+  };
+  const auto by_gain = [](const AxisMargins& of) { return of.margins.gain; };
+  const auto by_phase = [](const AxisMargins& of) { return of.margins.phase_rad; };
+  const AxisMargins gain = *std::ranges::min_element(of_axes, {}, by_gain);
+  const AxisMargins phase = *std::ranges::min_element(of_axes, {}, by_phase);
   const std::string_view of_realism =
       scenario.realism ? "; errors have what [realism] adds, standard errors and plans do not" : "";
   return fmt::format(
-      "loops that are not the paper's: with a perfect instrument, the least gain margin of an axis "
-      "is {:.3g}, the least phase margin {:.3g}°; each run has its own, gain_margin and "
+      "loops that are not the paper's: with a perfect instrument, the least margin of gain is a "
+      "factor of {:.3g} ({}), that of phase {:.3g}° ({}); each run has its own, gain_margin and "
       "phase_margin_rad{}",
-      margins.gain, margins.phase_rad * 180.0 / std::numbers::pi, of_realism);
+      gain.margins.gain, name_of(gain), phase.margins.phase_rad * 180.0 / std::numbers::pi,
+      name_of(phase), of_realism);
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {

@@ -1,6 +1,6 @@
 #include "core/microscope/campaign/loop_margins.hpp"
 
-#include <Eigen/LU>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -29,8 +29,8 @@ std::optional<SampledController> controller_of(const Scenario& scenario, Control
 /// y/u of an Actuator in its linear range.
 ComplexDouble actuator_response(const Scenario& scenario, ComplexDouble z_inverse) {
   if (!scenario.realism || scenario.realism->actuation_lag_s == 0.0) return 1.0;
-  const double memory =
-      exponential(-scenario.simulation.sample_period_s / scenario.realism->actuation_lag_s);
+  const double memory = exponential(
+      -std::min(scenario.simulation.sample_period_s / scenario.realism->actuation_lag_s, 50.0));
   return (1.0 - memory) / (1.0 - memory * z_inverse);
 }
 
@@ -88,19 +88,26 @@ ComplexDouble delayed(ComplexDouble value, ComplexDouble z_inverse, std::int64_t
   return value;
 }
 
+/// The least and the largest eigenvalue of [J]⁻¹ diag[J], by which products of inertia change the
+/// loop's gain: with one controller on all axes, that of the modes that they couple. 1 alone if
+/// there are none.
+std::vector<double> extreme_mode_gains(const RealismConfig& realism) {
+  if (!realism.has_inertia()) return {1.0};
+  const Eigen::Matrix3d inertia = realism.inertia_tensor_kg_m2();
+  const Eigen::Vector3d roots = inertia.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::Vector3d scaled = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(
+                                     roots.asDiagonal() * inertia * roots.asDiagonal())
+                                     .eigenvalues();
+  return {1.0 / scaled[2], 1.0 / scaled[0]};
+}
+
 AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
-  const auto a = static_cast<Eigen::Index>(index(axis));
   const double period = scenario.simulation.sample_period_s;
   const AttitudeGains gains = attitude_gains(scenario.attitude, period);
   const auto own = controller_of(scenario, ControlLoop::attitude, axis);
   const RealismConfig realism = scenario.realism.value_or(RealismConfig{});
   const double measured =
       1.0 + 0.5 * (realism.angular_scale_error[0] + realism.angular_scale_error[1]);
-  double factor = 1.0;
-  if (realism.has_inertia()) {
-    const Eigen::Matrix3d inertia = realism.inertia_tensor_kg_m2();
-    factor = Eigen::Matrix3d(inertia.inverse())(a, a) * inertia(a, a);
-  }
   const auto open_loop = [&](ComplexDouble z_inverse) {
     const ComplexDouble sum = 1.0 / (1.0 - z_inverse);
     const ComplexDouble angle = 0.5 * period * period * (z_inverse * (1.0 + z_inverse) * sum * sum);
@@ -110,9 +117,15 @@ AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
         (gains.stiffness_per_s2 + gains.integral_per_s3 * period * sum) * angle_s2 +
         gains.damping_per_s * rate_s;
     const ComplexDouble command = own ? own->response(z_inverse) * angle_s2 : nominal;
-    return factor * z_inverse * command * actuator_response(scenario, z_inverse);
+    return z_inverse * command * actuator_response(scenario, z_inverse);
   };
-  return {ControlLoop::attitude, axis, margins_of(open_loop)};
+  std::vector<AxisMargins> of_modes;
+  for (const double factor : extreme_mode_gains(realism)) {
+    of_modes.push_back({ControlLoop::attitude, axis, margins_of([&](ComplexDouble z_inverse) {
+                          return factor * open_loop(z_inverse);
+                        })});
+  }
+  return {ControlLoop::attitude, axis, least(of_modes)};
 }
 
 }  // namespace

@@ -19,11 +19,12 @@ struct AxisMargins {
 /// command acts; of the drag-free loop in every session that has another source:
 ///
 ///     drag-free    L = z⁻¹ C(z) y(z) [M_DF]_aa Σ_k w_k [M_k]_aa
-///     attitude     L = z⁻¹ (C θ̂)(z) y(z) [J]⁻¹_aa J_aa,    θ̂ for θ = ½T² z⁻¹(1 + z⁻¹)/(1 − z⁻¹)²
+///     attitude     L = z⁻¹ (C θ̂)(z) y(z) λ,              θ̂ for θ = ½T² z⁻¹(1 + z⁻¹)/(1 − z⁻¹)²
 ///
-/// C is nominal or of `[[controller]]`, y the lag of Realism, and θ̂ that of AttitudeEstimator,
-/// which sees θ by the star tracker with its latency and Ω̇ by the angular measurement. Resonators
-/// of tests are left out: they keep their distance (README.md of core/microscope/control).
+/// λ are the extreme eigenvalues of [J]⁻¹ diag[J], C is nominal or of `[[controller]]`, y the lag
+/// of Realism, and θ̂ that of AttitudeEstimator, which sees θ by the star tracker with its latency
+/// and Ω̇ by the angular measurement. Resonators of tests are left out: they keep their distance
+/// (README.md of core/microscope/control).
 [[nodiscard]] std::vector<AxisMargins> loop_margins(const Scenario& scenario,
                                                     const Instrument& instrument);
 

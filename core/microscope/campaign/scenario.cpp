@@ -220,8 +220,16 @@ void check_stability(const Scenario& scenario) {
   if (scenario.has_plain_loops()) return;
   for (const AxisMargins& of : loop_margins(scenario, make_instrument({}))) {
     if (of.margins.gain > 0.0) continue;
+    const RealismConfig realism = scenario.realism.value_or(RealismConfig{});
     std::string path = "realism.actuation_lag_s";
-    double value = scenario.realism ? scenario.realism->actuation_lag_s : 0.0;
+    double value = realism.actuation_lag_s;
+    if (value == 0.0 && realism.star_tracker_latency_samples == 0) {
+      path = "realism.inertia_xx_kg_m2";
+      value = realism.inertia_kg_m2[0];
+    } else if (value == 0.0) {
+      path = "realism.star_tracker_latency_samples";
+      value = static_cast<double>(realism.star_tracker_latency_samples);
+    }
     for (std::size_t i = 0; i < scenario.controllers.size(); ++i) {
       const ControllerConfig& controller = scenario.controllers[i];
       if (controller.loop != of.loop || controller.axis != of.axis) continue;

@@ -214,7 +214,8 @@ void visit_realism(Config& realism, Visitor& visit) {
   size("realism.thrust_quantum_m_s2", "Its step; 0 for none.", realism.thrust_quantum_m_s2);
   size("realism.torque_limit_rad_s2", "Of an axis; 0 for none.", realism.torque_limit_rad_s2);
   size("realism.torque_quantum_rad_s2", "Its step; 0 for none.", realism.torque_quantum_rad_s2);
-  size("realism.actuation_lag_s", "Time constant of thrust and torque.", realism.actuation_lag_s);
+  number("realism.actuation_lag_s", "Time constant of thrust and torque; 0 for none.",
+         realism.actuation_lag_s, range::between(0.0, 100.0));
   size("realism.mass_kg", "Of the satellite.", realism.mass_kg);
   size("realism.inertia_xx_kg_m2", "0 for no dynamics of rotation.", realism.inertia_kg_m2[0]);
   size("realism.inertia_yy_kg_m2", "Of the satellite.", realism.inertia_kg_m2[1]);

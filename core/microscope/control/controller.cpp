@@ -79,6 +79,7 @@ std::span<const std::string_view> names_of(ControlLoop) {
 }
 
 void ControllerConfig::validate(const std::string& path, double sample_period_s) const {
+  if (gain == 0.0) throw ConfigError(path + ".gain", "0", "must close the loop");
   if (poles_rad_s.size() > controller_order_max || zeros_rad_s.size() > poles_rad_s.size()) {
     throw ConfigError(path + ".poles_rad_s", fmt::format("{} of them", poles_rad_s.size()),
                       fmt::format("must be at least as many as the {} zeros and at most {}",

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "core/math/elementary.hpp"
 
@@ -12,16 +15,32 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double first_angle = 2e-8 * pi;
-constexpr int num_angles = 4000;  // 500 a decade: L turns by some degrees from one to the next.
+constexpr int num_angles = 16000;  // A peak that is narrower than a thousandth is missed.
 
-double grid_angle(int i) {
-  if (i == num_angles) return pi;
-  return first_angle * exponential(logarithm(pi / first_angle) * i / num_angles);
+ComplexDouble at(const OpenLoop& loop, const SineCosine& turn, double radius) {
+  return loop({turn.cosine / radius, -turn.sine / radius});
+}
+ComplexDouble at(const OpenLoop& loop, double angle, double radius = 1.0) {
+  return at(loop, sincos(angle), radius);
 }
 
-ComplexDouble at(const OpenLoop& loop, double angle, double radius = 1.0) {
-  const SineCosine turn = sincos(angle);
-  return loop({turn.cosine / radius, -turn.sine / radius});
+struct GridPoint {
+  double angle;
+  SineCosine turn;
+};
+
+/// From first_angle to π in equal ratios.
+const std::vector<GridPoint>& grid() {
+  static const std::vector<GridPoint> points = [] {
+    std::vector<GridPoint> all;
+    const double ratio = logarithm(pi / first_angle);
+    for (int i = 0; i <= num_angles; ++i) {
+      const double angle = i == num_angles ? pi : first_angle * exponential(ratio * i / num_angles);
+      all.push_back({angle, sincos(angle)});
+    }
+    return all;
+  }();
+  return points;
 }
 
 /// Where a function that changes its sign does so; the higher end if it does not.
@@ -41,43 +60,77 @@ double quadrant(ComplexDouble number) {
   return number.real() < 0.0 ? 2.5 : 3.5;
 }
 
-/// Along half of the circle, of which the other half is the mirror image, 1 + L begins and ends on
-/// the real axis. A zero outside makes it turn by half a turn at least.
-bool is_stable(const OpenLoop& loop) {
-  constexpr double radius = 1.0 + 1e-6;
-  const auto on_axis = [&](double angle) {
-    return 1.0 + at(loop, angle, radius).real() >= 0.0 ? 0.0 : 2.0;
-  };
-  double last = on_axis(0.0), num_quarters = 0.0;
-  const auto turn_to = [&](double next) {
-    const double step = next - last;  // A quarter at most, or the same less or more a whole turn.
-    num_quarters += step - 4.0 * std::round(step / 4.0);
-    last = next;
-  };
-  for (int i = 0; i < num_angles; ++i) turn_to(quadrant(1.0 + at(loop, grid_angle(i), radius)));
-  turn_to(on_axis(pi));
-  return num_quarters == 0.0;
-}
+/// The turns of 1 + L about 0 along half of a circle, of which the other half is the mirror image.
+class Winding {
+ public:
+  explicit Winding(const OpenLoop& loop) : loop_(loop) {}
+
+  /// It begins and ends on the real axis. A zero outside makes it turn by half a turn at least.
+  [[nodiscard]] bool is_none() {
+    last_ = on_axis(0.0);
+    double low = 0.0;
+    for (const GridPoint& point : std::span(grid()).first(num_angles)) {
+      if (!is_known_) break;
+      turn_to(low, point, halvings_max);
+      low = point.angle;
+    }
+    const double half = on_axis(pi) - last_;
+    return is_known_ && num_quarters_ + half - 4.0 * std::round(half / 4.0) == 0.0;
+  }
+
+ private:
+  static constexpr double radius = 1.0 + 1e-6;
+  static constexpr int halvings_max = 40;
+
+  [[nodiscard]] double on_axis(double angle) const {
+    return 1.0 + at(loop_, angle, radius).real() >= 0.0 ? 0.0 : 2.0;
+  }
+
+  /// Where it may have passed on either side of 0, its way is looked at more closely.
+  void turn_to(double low, const GridPoint& high, int num_halvings) {
+    const ComplexDouble there = 1.0 + at(loop_, high.turn, radius);
+    const double step = quadrant(there) - last_;
+    const double turned = step - 4.0 * std::round(step / 4.0);
+    if (!std::isfinite(norm(there)) || (std::abs(turned) > 1.0 && num_halvings == 0)) {
+      is_known_ = false;
+    } else if (std::abs(turned) > 1.0) {
+      const double middle = 0.5 * (low + high.angle);
+      turn_to(low, {middle, sincos(middle)}, num_halvings - 1);
+      if (is_known_) turn_to(middle, high, num_halvings - 1);
+    } else {
+      num_quarters_ += turned;
+      last_ += step;
+    }
+  }
+
+  const OpenLoop& loop_;
+  double last_ = 0.0;  ///< Quadrant.
+  double num_quarters_ = 0.0;
+  bool is_known_ = true;  ///< False if a zero is on the circle, or L is no number.
+};
 
 }  // namespace
 
 Margins margins_of(const OpenLoop& open_loop) {
-  if (!is_stable(open_loop)) return {};
+  if (!Winding(open_loop).is_none()) return {};
   const auto excess = [&](double angle) { return norm(at(open_loop, angle)) - 1.0; };
   const auto height = [&](double angle) { return at(open_loop, angle).imag(); };
   Margins margins{std::numeric_limits<double>::infinity(), pi};
-  for (int i = 0; i < num_angles; ++i) {
-    const double low = grid_angle(i), high = grid_angle(i + 1);
-    if ((excess(low) > 0.0) != (excess(high) > 0.0)) {
+  double high = 0.0;
+  ComplexDouble at_high = at(open_loop, first_angle);
+  for (const GridPoint& point : grid()) {
+    const double low = std::exchange(high, point.angle);
+    const ComplexDouble at_low = std::exchange(at_high, at(open_loop, point.turn, 1.0));
+    if ((norm(at_low) > 1.0) != (norm(at_high) > 1.0)) {
       const double there = at(open_loop, root(excess, low, high)).real();
       // |L| is 1, so −L has the cosine −Re L.
       const auto above = [&](double phase) { return sincos(phase).cosine + there; };
       margins.phase_rad = std::min(margins.phase_rad, root(above, 0.0, pi));
     }
     // At half the sample rate L is real: its phase reaches the axis there, or crosses it before.
-    if ((height(low) > 0.0) != (height(high) > 0.0) || i + 1 == num_angles) {
+    if ((at_low.imag() > 0.0) != (at_high.imag() > 0.0) || high == pi) {
       const double there = at(open_loop, root(height, low, high)).real();
-      if (there > -1.0 && there < 0.0) margins.gain = std::min(margins.gain, -1.0 / there);
+      if (there < 0.0) margins.gain = std::min(margins.gain, std::max(-there, -1.0 / there));
     }
   }
   return margins;

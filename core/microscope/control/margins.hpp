@@ -12,7 +12,8 @@ using OpenLoop = std::function<ComplexDouble(ComplexDouble z_inverse)>;
 
 /// How far a closed loop is from instability.
 struct Margins {
-  double gain = 0.0;       ///< The least factor above 1 that L may grow by; 0: it is unstable.
+  /// The least factor above 1 by which L may grow or shrink; 0: it is unstable.
+  double gain = 0.0;
   double phase_rad = 0.0;  ///< The least phase that L may lose or gain where |L| is 1; 0 likewise.
 };
 

@@ -118,10 +118,32 @@ TEST(Margins, KnowAnUnstableLoop) {
   };
   EXPECT_EQ(loop(0.01, -0.1).gain, 0.0);
   EXPECT_EQ(loop(0.1, 1.1).gain, 0.0);
+  // A hundred-thousandth beyond the boundary, and before it.
+  EXPECT_EQ(loop(4.0 / 1.9 * (1.0 + 1e-5), 0.9).gain, 0.0);
+  EXPECT_NEAR(loop(4.0 / 1.9 * (1.0 - 1e-5), 0.9).gain, 1.0 + 1e-5, 1e-9);
+  EXPECT_EQ(margins_of([](ComplexDouble z) { return 1e308 * z / (1.0 - z); }).gain, 0.0);
   EXPECT_EQ(loop(2.2, 0.9).gain, 0.0);
   for (const double b : {0.01, 0.1, 1.0, 2.0}) {
     EXPECT_NEAR(loop(b, 0.9).gain, 4.0 / 1.9 / b, 1e-6 / b) << b;
   }
+}
+
+// Three sums and two leads need a least gain, which is found by scaling L until it is unstable.
+TEST(Margins, CountAGainThatFalls) {
+  const auto loop = [](double b) {
+    return margins_of([=](ComplexDouble z) {
+      const ComplexDouble lead = 1.0 - 0.9 * z, sum = 1.0 / (1.0 - z);
+      return b * (z * lead * lead * sum * sum * sum);
+    });
+  };
+  double low = 1e-6, high = 0.5;  // Unstable; stable.
+  ASSERT_GT(loop(high).gain, 0.0);
+  for (int i = 0; i < 40; ++i) {
+    const double middle = std::sqrt(low * high);
+    (loop(middle).gain > 0.0 ? high : low) = middle;
+  }
+  // Growth counts from |z| = 1 + 1e-6 on: that is 5e-5 of the angle, 0.02, of the crossing.
+  EXPECT_NEAR(loop(1.1 * high).gain, 1.1, 1e-4);
 }
 
 }  // namespace
