@@ -79,9 +79,8 @@ ResultSchema MicroscopeCampaign::results() const { return scenario_results(scena
 std::string MicroscopeCampaign::note() const {
   if (scenario.has_plain_loops()) return {};
   const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
-  const auto name_of = [](const AxisMargins& of) {
-    return fmt::format("{} {}", names_of(of.loop)[static_cast<std::size_t>(of.loop) - 1],
-                       names_of(of.axis)[index(of.axis)]);
+  const auto axis_text = [](const AxisMargins& of) {
+    return fmt::format("{} {}", name_of(of.loop), names_of(of.axis)[index(of.axis)]);
   };
   const auto by_gain = [](const AxisMargins& of) { return of.margins.gain; };
   const auto by_phase = [](const AxisMargins& of) { return of.margins.phase_rad; };
@@ -93,8 +92,8 @@ std::string MicroscopeCampaign::note() const {
       "loops that are not the paper's: with a perfect instrument, the least margin of gain is a "
       "factor of {:.3g} ({}), that of phase {:.3g}° ({}); each run has its own, gain_margin and "
       "phase_margin_rad{}",
-      gain.margins.gain, name_of(gain), phase.margins.phase_rad * 180.0 / std::numbers::pi,
-      name_of(phase), of_realism);
+      gain.margins.gain, axis_text(gain), phase.margins.phase_rad * 180.0 / std::numbers::pi,
+      axis_text(phase), of_realism);
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {

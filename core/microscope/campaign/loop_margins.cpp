@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "core/math/complex.hpp"
-#include "core/math/elementary.hpp"
 #include "core/microscope/control/control_loops.hpp"
 
 namespace proofmass {
@@ -28,9 +27,8 @@ std::optional<SampledController> controller_of(const Scenario& scenario, Control
 
 /// y/u of an Actuator in its linear range.
 ComplexDouble actuator_response(const Scenario& scenario, ComplexDouble z_inverse) {
-  if (!scenario.realism || scenario.realism->actuation_lag_s == 0.0) return 1.0;
-  const double memory = exponential(
-      -std::min(scenario.simulation.sample_period_s / scenario.realism->actuation_lag_s, 50.0));
+  if (!scenario.realism) return 1.0;
+  const double memory = scenario.realism->actuation_memory(scenario.simulation.sample_period_s);
   return (1.0 - memory) / (1.0 - memory * z_inverse);
 }
 

@@ -239,8 +239,7 @@ void check_stability(const Scenario& scenario) {
     throw ConfigError(path, fmt::format("{}", value),
                       fmt::format("makes the {} loop of axis {} unstable, even with a perfect "
                                   "instrument",
-                                  names_of(of.loop)[static_cast<std::size_t>(of.loop) - 1],
-                                  names_of(of.axis)[index(of.axis)]));
+                                  name_of(of.loop), names_of(of.axis)[index(of.axis)]));
   }
 }
 

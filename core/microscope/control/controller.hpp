@@ -19,6 +19,7 @@ enum class ControlLoop : std::uint8_t {
   attitude = 2,   ///< From θ̂, rad, to the angular acceleration −C θ̂, rad/s².
 };
 [[nodiscard]] std::span<const std::string_view> names_of(ControlLoop);
+[[nodiscard]] std::string_view name_of(ControlLoop loop);
 
 inline constexpr std::size_t controller_order_max = 8;
 
@@ -35,8 +36,6 @@ struct ControllerConfig {
   /// @param path  Of the entry, for messages.
   /// @throws ConfigError unless C is proper, real and itself stable.
   void validate(const std::string& path, double sample_period_s) const;
-
-  bool operator==(const ControllerConfig&) const = default;
 };
 
 /// A controller at the sample rate, by the bilinear transform: C(z) is C(s) at

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/error.hpp"
+#include "core/math/elementary.hpp"
 
 namespace proofmass {
 namespace {
@@ -22,6 +23,12 @@ Eigen::Matrix3d RealismConfig::inertia_tensor_kg_m2() const {
   Eigen::Matrix3d tensor;
   tensor << xx, xy, xz, xy, yy, yz, xz, yz, zz;
   return tensor;
+}
+
+double RealismConfig::actuation_memory(double sample_period_s) const {
+  if (actuation_lag_s == 0.0) return 0.0;
+  constexpr double exponent_max = 50.0;  // Beyond, 1 less e^(−x) is 1.
+  return exponential(-std::min(sample_period_s / actuation_lag_s, exponent_max));
 }
 
 void RealismConfig::validate() const {

@@ -34,6 +34,9 @@ struct RealismConfig {
   [[nodiscard]] bool has_inertia() const { return inertia_kg_m2[0] > 0.0; }
   [[nodiscard]] Eigen::Matrix3d inertia_tensor_kg_m2() const;
 
+  /// e^(−T/τ): what is left of the distance to a command after a sample.
+  [[nodiscard]] double actuation_memory(double sample_period_s) const;
+
   /// @throws ConfigError if [J] is no tensor of inertia, or a term lacks what it needs.
   void validate() const;
 };

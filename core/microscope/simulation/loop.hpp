@@ -77,13 +77,13 @@ struct PaperHardware {
     return omega_dot_IS_S;
   }
   template <typename T>
-  PROOFMASS_INLINE void actuate(const LoopConstants<T>& /*constants*/,
-                                const Vector3<T>& /*omega_IS_S*/, const Vector3<T>& /*thrust_S*/,
-                                const Vector3<T>& /*torque_S*/) const {}
-  template <typename T>
   PROOFMASS_INLINE void steer(const Vector3<T>& /*input_S*/, const Vector3<T>& /*angle_RS_S*/,
                               const Vector3<T>& /*thrust_S*/,
                               const Vector3<T>& /*torque_S*/) const {}
+  template <typename T>
+  PROOFMASS_INLINE void actuate(const LoopConstants<T>& /*constants*/,
+                                const Vector3<T>& /*omega_IS_S*/, const Vector3<T>& /*thrust_S*/,
+                                const Vector3<T>& /*torque_S*/) const {}
 };
 
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
@@ -98,7 +98,7 @@ struct Loop {
   Quaternion<T> attitude_IS;    ///< True attitude.
   Vector3<T> omega_IS_S;        ///< Ω, rad/s.
   Vector3<T> thrust_command_S;  ///< Γ_DF of the sample before, as it acts now, m/s².
-  Vector3<T> torque_command_S;  ///< Angular acceleration of the sample before, rad/s².
+  Vector3<T> torque_command_S;  ///< Angular acceleration, likewise, rad/s².
   DragFreeController<T> drag_free;
   AttitudeEstimator<T> estimator;  ///< With the commanded motion in its angles.
   AttitudeController<T> controller;

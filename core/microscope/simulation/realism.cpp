@@ -60,8 +60,7 @@ Realism::Realism(const Scenario& scenario, const Instrument& instrument,
     start_s_ += scenario.sessions[i].num_orbits * orbit_period_s_;
   }
   seen_S_rad_.resize(static_cast<std::size_t>(config_.star_tracker_latency_samples));
-  const double lag_s = config_.actuation_lag_s;
-  const double memory = lag_s > 0.0 ? exponential(-std::min(sample_period_s_ / lag_s, 50.0)) : 0.0;
+  const double memory = config_.actuation_memory(sample_period_s_);
   thrust_ = {config_.thrust_limit_m_s2, config_.thrust_quantum_m_s2, memory, {}};
   torque_ = {config_.torque_limit_rad_s2, config_.torque_quantum_rad_s2, memory, {}};
 }

@@ -102,9 +102,10 @@ constexpr std::array gradient_rows{
 constexpr std::array thrust_rows{
     vector_row("acceleration_S_", m_s2, "S", "Γ_propu = −[M_DF] Γ_DF + Γ_n,DF",
                [](const Sample& s) { return s.loop.thrust_S(s.constants, s.noise); }),
-    vector_row("command_S_", m_s2, "S",
-               "Γ_DF of the sample before, which acts now: the acceleration to be cancelled",
-               [](const Sample& s) { return s.loop.thrust_command_S; }),
+    vector_row(
+        "command_S_", m_s2, "S",
+        "Γ_DF of the sample before as thrusters deliver it now: the acceleration to be cancelled",
+        [](const Sample& s) { return s.loop.thrust_command_S; }),
 };
 
 constexpr std::array attitude_rows{

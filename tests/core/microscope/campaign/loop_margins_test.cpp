@@ -90,6 +90,17 @@ TEST(LoopMargins, FollowTheInstrument) {
   EXPECT_NEAR(perfect / gain_about_y(), 1.1 * 1.02, 1e-9);
 }
 
+// Two axes that a product of inertia couples have the modes x ± y, whose gains are 1/(1 ± ρ) times
+// that of one axis, ρ = J_xy/J_xx.
+TEST(LoopMargins, AreThoseOfCoupledModes) {
+  Scenario scenario = silent_scenario();
+  const double alone = margins_about_z(scenario).gain;
+  scenario.realism.emplace().inertia_kg_m2 = {90.0, 90.0, 100.0};
+  EXPECT_NEAR(margins_about_z(scenario).gain / alone, 1.0, 1e-9);
+  scenario.realism->inertia_products_kg_m2 = {45.0, 0.0, 0.0};
+  EXPECT_NEAR(margins_about_z(scenario).gain / alone, 0.5, 1e-9);
+}
+
 TEST(LoopMargins, RefuseAnUnstableLoop) {
   Scenario scenario = scenario_with_attitude_controller(0.3);
   scenario.sessions = Scenario().sessions;
