@@ -18,7 +18,6 @@
 
 #include "core/campaign/device.hpp"
 #include "core/campaign/name.hpp"
-#include "core/campaign/simulation_crash.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -208,24 +207,6 @@ int say_ended(const Ending& ending, const wire::Log& log) {
   return 0;
 }
 
-/// A crash of what simulates ends the worker as its own would.
-Prepare ending_on_crashes(const Prepare& prepare, const std::string& name) {
-  return [prepare, name](const Campaign& campaign) {
-    PreparedCampaign prepared = prepare(campaign);
-    prepared.simulate = [simulate = std::move(prepared.simulate), name](
-                            std::span<const RunRequest> requests,
-                            const std::function<void(int)>& progress) {
-      try {
-        return simulate(requests, progress);
-      } catch (const SimulationCrash& error) {
-        wire::say(fmt::format("{}: error: {}\n", name, wire::visible_text(error.what())));
-        std::abort();
-      }
-    };
-    return prepared;
-  };
-}
-
 /// The worker itself; 0, or it throws, or it ends the process because threads do not end.
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
@@ -246,8 +227,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
                         num_threads_beside);
   StopSignals signals(config.signals);
   const wire::Wake progress;
-  Executor executor(ending_on_crashes(program.prepare, program.name),
-                    [&progress] { progress.notify(); },
+  Executor executor(program.prepare, [&progress] { progress.notify(); },
                     {.num_threads = num_threads,
                      .batch_size_max = wire::slots_per_thread(),
                      .devices = cards.devices,

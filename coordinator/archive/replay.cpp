@@ -60,10 +60,9 @@ RunResult Replay::stored_result(RunIndex run) const {
   }
   if (std::optional<RunResult> result = store_.results(RunRange{run, 1}).next()) return *result;
   const bool is_given_up = is_among(store_.given_up_runs(), run);
-  throw ArchiveError(fmt::format("run = {} ({})", run.value,
-                                 is_given_up
-                                     ? "has no result: it was given up after it had crashed workers"
-                                     : "has no result yet"));
+  throw ArchiveError(fmt::format(
+      "run = {} ({})", run.value,
+      is_given_up ? "has no result: it was given up after it had crashed" : "has no result yet"));
 }
 
 std::vector<RunResult> Replay::worst_results(std::size_t count, const IsStopped& is_stopped) const {

@@ -105,6 +105,9 @@ LocalWorkers::LocalWorkers(Service& service, ProgressDisplay& display, WorkerPro
 
 void LocalWorkers::replace_dead() {
   for (const WorkerProcesses::Exit& exit : processes_.take_exits()) replace(exit);
+  if (service_.has_crashing_campaign()) {
+    throw Error("the model crashes again and again without a finished run; see what is said above");
+  }
 }
 
 void LocalWorkers::replace(const WorkerProcesses::Exit& exit) {

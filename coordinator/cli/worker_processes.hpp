@@ -64,8 +64,8 @@ class LocalWorkers {
   /// @param service, display, processes  Outlive this object.
   LocalWorkers(Service& service, ProgressDisplay& display, WorkerProcesses& processes);
 
-  /// @throws Error if workers end again and again without finishing a run, unless that is the fault
-  ///         of single runs, which the dispatch finds out.
+  /// @throws Error if workers end, or their model crashes, again and again without finishing a run,
+  ///         unless that is the fault of single runs, which the dispatch finds out.
   void replace_dead();
 
  private:

@@ -1,5 +1,7 @@
 #include "coordinator/dispatch/blame.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -133,16 +135,8 @@ RunsByCampaign split_audits(const State& state, RunsByCampaign& accused) {
   return audits;
 }
 
-RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certainty certainty,
-                     Outbox& outbox) {
-  const HostId host = state.workers.at(id).host;
-  // The end of a process that was lent nothing proves nothing: anybody can start and end one.
-  if (state.quarantined.contains(host) || state.workers.at(id).num_lent == 0) return {};
-  const std::uint32_t num_crashes = ++state.hosts.at(host).num_crashes;
-  if (num_crashes >= state.config.crashes_per_host_max) {
-    quarantine(state, host, num_crashes, outbox);
-    return {};
-  }
+RunsByCampaign blame_all(State& state, const HostId& host, RunsByCampaign accused,
+                         Certainty certainty, Outbox& outbox) {
   const RunsByCampaign audits = split_audits(state, accused);
   RunsByCampaign blamed;
   for (const auto& [campaign, runs] : accused) {
@@ -160,6 +154,24 @@ RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certaint
   return blamed;
 }
 
+/// Counts a crash of a worker against its host, and then against the runs.
+RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certainty certainty,
+                     Outbox& outbox) {
+  const HostId host = state.workers.at(id).host;
+  // The end of a process that was lent nothing proves nothing: anybody can start and end one.
+  if (state.quarantined.contains(host) || state.workers.at(id).num_lent == 0) return {};
+  const std::uint32_t num_crashes = ++state.hosts.at(host).num_crashes;
+  if (num_crashes >= state.config.crashes_per_host_max) {
+    quarantine(state, host, num_crashes, outbox);
+    return {};
+  }
+  return blame_all(state, host, std::move(accused), certainty, outbox);
+}
+
+Certainty certainty_of(const RunSet& runs) {
+  return runs.size() == 1 ? Certainty::certain : Certainty::ambiguous;
+}
+
 }  // namespace
 
 RunsByCampaign blame_crash(State& state, WorkerId id, Outbox& outbox) {
@@ -174,8 +186,36 @@ RunsByCampaign blame_batch(State& state, WorkerId id, const Progress& batch, Out
   const auto found = leased.find(batch.campaign);
   RunsByCampaign accused;
   if (found != leased.end()) accused[batch.campaign] = found->second.overlap(batch.runs);
-  const bool is_certain = batch.runs.size() == 1;
-  return blame(state, id, accused, is_certain ? Certainty::certain : Certainty::ambiguous, outbox);
+  return blame(state, id, accused, certainty_of(batch.runs), outbox);
+}
+
+RunsByCampaign blame_simulation(State& state, WorkerId id, CampaignId campaign, const RunSet& runs,
+                                Outbox& outbox) {
+  const Worker& worker = state.workers.at(id);
+  const RunsByCampaign leased = leased_runs(state, worker);
+  const auto found = leased.find(campaign);
+  const RunSet accused = found == leased.end() ? RunSet() : found->second.overlap(runs);
+  if (accused.empty() || state.quarantined.contains(worker.host)) return {};
+  ++state.campaigns.at(campaign).outside_crashes[worker.session].num_in_a_row;
+  return blame_all(state, worker.host, {{campaign, accused}}, certainty_of(runs), outbox);
+}
+
+void pause_crashing_campaigns(State& state, Outbox& outbox) {
+  for (auto& [id, campaign] : state.campaigns) {
+    std::erase_if(campaign.outside_crashes, [&](const auto& item) {
+      return item.second.paused_until && state.ticked_at >= *item.second.paused_until;
+    });
+    for (auto& [session, crashes] : campaign.outside_crashes) {
+      if (crashes.paused_until || crashes.num_in_a_row < state.config.crashes_per_host_max)
+        continue;
+      crashes.paused_until = state.ticked_at + state.config.quarantine_duration;
+      outbox.log({.severity = Severity::error,
+                  .kind = "campaign_paused_at_worker",
+                  .fields = {{"session", fmt::format("{:016x}", session.value)},
+                             {"crashes", crashes.num_in_a_row}}},
+                 id);
+    }
+  }
 }
 
 bool is_guilty(const State& state, const Suspicion& suspicion) {
@@ -205,6 +245,10 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
     if (!is_proven(state, id_of_host)) continue;
     Host& host = state.hosts.at(id_of_host);
     host.num_crashes -= std::min(host.num_crashes, on_host.num_crashes);
+  }
+  for (const auto& [worker_id, worker] : state.workers) {
+    if (!is_proven(state, worker.host) || !suspicion.hosts.contains(worker.host)) continue;
+    campaign.outside_crashes.erase(worker.session);
   }
   campaign.suspects.erase(run);
   campaign.given_up.add({run, 1});

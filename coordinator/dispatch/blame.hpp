@@ -18,6 +18,16 @@ RunsByCampaign blame_crash(State& state, WorkerId worker, Outbox& outbox);
 /// @return The runs against which it counts.
 RunsByCampaign blame_batch(State& state, WorkerId worker, const Progress& batch, Outbox& outbox);
 
+/// What simulates these runs crashed outside the worker's process, all of them together: counts
+/// that as a crash against those that are lent to it, and against the campaign at this worker.
+/// @return The runs against which it counts.
+RunsByCampaign blame_simulation(State& state, WorkerId worker, CampaignId campaign,
+                                const RunSet& runs, Outbox& outbox);
+
+/// Campaigns that crashed too often in a row at a worker, and not because of runs that have been
+/// given up, pause there; those that have paused for long enough are tried again.
+void pause_crashing_campaigns(State& state, Outbox& outbox);
+
 /// True if a run crashed so often, on two hosts at least while it ran alone, that it must be the
 /// cause.
 [[nodiscard]] bool is_guilty(const State& state, const Suspicion& suspicion);

@@ -326,6 +326,9 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
   if (host.num_workers == 0 && host.num_crashes == 0 && host.num_results == 0) {
     state.hosts.erase(found);
   }
+  for (auto& [campaign_id, campaign] : state.campaigns) {
+    campaign.outside_crashes.erase(worker.session);
+  }
   state.hungry.erase(id);
   state.awaited.erase(worker.session);
   state.workers.erase(id);

@@ -234,6 +234,7 @@ void count_results(State& state, Worker& worker, CampaignId id,
   host.num_crashes = 0;
   host.num_results += num_results;
   worker.num_results += num_results;
+  campaign.outside_crashes.erase(worker.session);
   worker.num_retracts = 0;
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : results) {

@@ -55,15 +55,29 @@ bool is_finished(const CampaignState& campaign) {
          campaign.audits.empty() && campaign.num_comparing == 0;
 }
 
-bool can_compute(const Worker& worker, const CampaignState& campaign) {
+bool has_model(const Worker& worker, const CampaignState& campaign) {
   return std::ranges::any_of(worker.models, [&](const ModelIdentity& model) {
     return model == campaign.model ||
            (campaign.definition->tolerates_digests() && model.version == campaign.model.version);
   });
 }
 
+bool can_compute(const Worker& worker, const CampaignState& campaign) {
+  const auto crashes = campaign.outside_crashes.find(worker.session);
+  const bool is_paused =
+      crashes != campaign.outside_crashes.end() && crashes->second.paused_until.has_value();
+  return !is_paused && has_model(worker, campaign);
+}
+
 bool lacks_workers(const State& state, const CampaignState& campaign) {
   return campaign.phase == Phase::active && !state.workers.empty() &&
+         std::ranges::none_of(state.workers,
+                              [&](const auto& item) { return has_model(item.second, campaign); });
+}
+
+bool crashes_everywhere(const State& state, const CampaignState& campaign) {
+  return campaign.phase == Phase::active && !state.workers.empty() &&
+         !lacks_workers(state, campaign) &&
          std::ranges::none_of(state.workers,
                               [&](const auto& item) { return can_compute(item.second, campaign); });
 }

@@ -7,6 +7,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -83,7 +84,8 @@ struct DispatchConfig {
   /// A run that one host alone saw crash waits for others to try it: so long, while nothing is
   /// lent.
   Duration lone_witness_wait = std::chrono::minutes(5);
-  std::uint32_t crashes_per_host_max = 5;  ///< In a row, without a finished run; then quarantine.
+  /// In a row, without a finished run; then quarantine. Likewise of a campaign at a worker.
+  std::uint32_t crashes_per_host_max = 5;
   Duration quarantine_duration = std::chrono::minutes(10);
   /// After a start with workers that should still be attached, nothing is lent until all of them
   /// have said what they hold, or until this has passed.
@@ -225,6 +227,12 @@ struct Suspicion {
   TimePoint tried_at{};            ///< When it was last lent alone.
 };
 
+/// What speaks against computing a campaign at a worker: crashes outside its process.
+struct OutsideCrashes {
+  std::uint32_t num_in_a_row = 0;              ///< Without a finished run of the campaign.
+  std::optional<TimePoint> paused_until = {};  ///< Until then no run of it is lent to the worker.
+};
+
 /// A result on its way to the store, with the workers that wait for the acknowledgement; the first
 /// one's result is stored.
 struct Uncommitted {
@@ -261,13 +269,14 @@ struct CampaignState {
   RunSet committed;
   RunSet given_up;
   RunSet elsewhere;  ///< Not lent here, as another coordinator computes them; taken if they come.
-  std::map<RunIndex, Suspicion> suspects;           ///< Open runs that were blamed for a crash.
-  std::map<RunIndex, Copies> copies;                ///< Of runs in `lent`, once there was one.
-  std::map<AuditKey, RunSet> to_audit;              ///< Committed, and not lent for audit yet.
-  std::uint64_t num_to_audit = 0;                   ///< Runs in `to_audit`.
-  std::map<RunIndex, LeaseId> audits;               ///< Runs on audit leases.
-  std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in `to_audit` or `audits`.
-  std::uint64_t num_comparing = 0;                  ///< Results on their way to be compared.
+  std::map<RunIndex, Suspicion> suspects;               ///< Open runs that were blamed for a crash.
+  std::map<SessionId, OutsideCrashes> outside_crashes;  ///< At registered workers.
+  std::map<RunIndex, Copies> copies;                    ///< Of runs in `lent`, once there was one.
+  std::map<AuditKey, RunSet> to_audit;                  ///< Committed, and not lent for audit yet.
+  std::uint64_t num_to_audit = 0;                       ///< Runs in `to_audit`.
+  std::map<RunIndex, LeaseId> audits;                   ///< Runs on audit leases.
+  std::map<RunIndex, std::uint32_t> audit_crashes;      ///< Of runs in `to_audit` or `audits`.
+  std::uint64_t num_comparing = 0;                      ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
   std::string storage_failure;             ///< Why nothing can be stored; empty if all is well.
   std::uint64_t num_committed_here = 0;    ///< Without those that were finished before.
@@ -374,10 +383,17 @@ struct State {
 [[nodiscard]] bool is_finished(const CampaignState& campaign);
 
 /// True if the worker has the campaign's model.
+[[nodiscard]] bool has_model(const Worker& worker, const CampaignState& campaign);
+
+/// True if the worker may be lent runs of the campaign: it has the model, and what simulates does
+/// not crash there again and again.
 [[nodiscard]] bool can_compute(const Worker& worker, const CampaignState& campaign);
 
 /// True if there are workers, and none of them has the model of a campaign that is to go on.
 [[nodiscard]] bool lacks_workers(const State& state, const CampaignState& campaign);
+
+/// True if a campaign that is to go on crashes at all workers that have its model.
+[[nodiscard]] bool crashes_everywhere(const State& state, const CampaignState& campaign);
 
 /// Slots of its processors that a worker needs for a run: more than one if a thread has more than
 /// the runs that the model computes together.

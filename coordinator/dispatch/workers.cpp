@@ -362,6 +362,8 @@ void on_give_back(State& state, WorkerId id, const proto::GiveBack& give_back, T
   for (const proto::HeldRuns& held : give_back.runs()) {
     const CampaignId campaign{held.campaign()};
     const RunSet runs(wire::ranges_of(held.ranges()));
+    detail::RunsByCampaign blamed;
+    if (is_blamed(reason)) blamed = detail::blame_simulation(state, id, campaign, runs, outbox);
     if (const auto found = worker->unleased.find(campaign); found != worker->unleased.end()) {
       found->second.remove(runs);
       if (found->second.empty()) worker->unleased.erase(found);
@@ -373,7 +375,7 @@ void on_give_back(State& state, WorkerId id, const proto::GiveBack& give_back, T
       const Lease& lease = found->second;
       if (lease.campaign != campaign || lease.known_as != Attempt{held.attempt()}) continue;
       const RunSet lost = lease.remaining.overlap(runs);
-      if (!lost.empty()) detail::lose(state, lease_id, lost, reason, {}, outbox);
+      if (!lost.empty()) detail::lose(state, lease_id, lost, reason, blamed[campaign], outbox);
     }
   }
   if (reason == LossReason::retracted) worker->num_retracts = 0;
@@ -405,6 +407,7 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
   state.ticked_at = now;
   end_quarantines(state, outbox);
   detail::give_up_untried(state, outbox);
+  detail::pause_crashing_campaigns(state, outbox);
   if (!state.awaited.empty() && now >= state.awaited_until) state.awaited.clear();
   const Duration lost_after =
       state.is_behind ? state.config.lost_after_if_behind : state.config.lost_after;

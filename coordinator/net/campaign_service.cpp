@@ -74,6 +74,7 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   if (left_s) status.set_remaining_s(*left_s);
   status.set_storage_failure(campaign.storage_failure);
   if (lacks_workers(state_, campaign)) status.set_missing_model(campaign.model.version);
+  status.set_crashes_everywhere(crashes_everywhere(state_, campaign));
   return record;
 }
 

@@ -430,6 +430,12 @@ bool Service::is_quarantined(const std::string& host) const {
   return coordinator::is_quarantined(impl_->state_, host);
 }
 
+bool Service::has_crashing_campaign() const {
+  return std::ranges::any_of(impl_->state_.campaigns, [&](const auto& item) {
+    return crashes_everywhere(impl_->state_, item.second);
+  });
+}
+
 void Service::worker_ended(WorkerId worker, LossReason reason) {
   impl_->worker_ended(worker, reason);
 }

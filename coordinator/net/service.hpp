@@ -129,6 +129,8 @@ class Service {
   [[nodiscard]] std::string runs_held_text(WorkerId worker) const;  ///< For people.
   /// True if runs are not lent to workers of that host any more: too many crashed there.
   [[nodiscard]] bool is_quarantined(const std::string& host) const;
+  /// True if a campaign crashes at all workers that have its model.
+  [[nodiscard]] bool has_crashing_campaign() const;
 
   /// The worker's process is known to have ended: its runs are lent again at once.
   void worker_ended(WorkerId worker, LossReason reason);

@@ -84,8 +84,7 @@ std::string summary_text(std::string_view name, std::optional<std::uint64_t> see
 std::string given_up_text(std::span<const RunRange> given_up, Paint paint) {
   if (given_up.empty()) return "";
   constexpr std::size_t columns_max = 76;  // And an ellipsis.
-  std::string line =
-      fmt::format("          {} given up, having crashed workers:", num_runs_in(given_up));
+  std::string line = fmt::format("          {} given up, having crashed:", num_runs_in(given_up));
   for (const RunRange& range : given_up) {
     const std::string item = range.count == 1
                                  ? fmt::format(" {}", range.first.value)

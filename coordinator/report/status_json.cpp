@@ -39,6 +39,7 @@ Json campaign_object(const proto::CampaignStatus& campaign) {
                {"storage_failure", text_or_null(campaign.storage_failure())},
                {"model_version", text_or_null(campaign.model_version())},
                {"missing_model", text_or_null(campaign.missing_model())},
+               {"crashes_everywhere", campaign.crashes_everywhere()},
                {"owner", text_or_null(campaign.owner())}});
   if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();
   return json;

@@ -72,8 +72,12 @@ std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
   if (!campaign.missing_model().empty()) {
     add_trouble("no worker has the model " + wire::visible_text(campaign.missing_model()));
   }
+  if (campaign.crashes_everywhere()) {
+    add_trouble(
+        "its model crashes at each worker, whose log says why; tried again within ten minutes");
+  }
   if (campaign.num_given_up() > 0) {
-    add_trouble(counted(campaign.num_given_up(), "run") + " given up: too many workers crashed");
+    add_trouble(counted(campaign.num_given_up(), "run") + " given up: crashed too often");
   }
   if (campaign.num_without_estimate() > 0) {
     add_trouble(counted(campaign.num_without_estimate(), "run") + " without an estimate");

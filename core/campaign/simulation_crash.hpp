@@ -4,9 +4,9 @@
 
 namespace proofmass {
 
-/// What simulates runs has crashed, hangs, or yields what no simulation does. Nothing is known of
-/// the runs: a worker that sees one ends as if it had crashed itself, so that each run has as many
-/// attempts as with any crash.
+/// What simulates runs, outside this process, has crashed, hangs, or yields what no simulation
+/// does. Nothing is known of the runs. A worker gives them back so: each has as many attempts as if
+/// the worker had crashed, which goes on with its other runs.
 class SimulationCrash : public Error {
  public:
   using Error::Error;

@@ -151,8 +151,8 @@ void check(const proto::Retract& retract) {
 void check(const proto::GiveBack& give_back) {
   require_count(give_back.runs_size(), 1, ranges_per_message_max, "runs");
   check_reason(give_back.reason(),
-               {LossReason::retracted, LossReason::drained, LossReason::walltime,
-                LossReason::preempted, LossReason::failed});
+               {LossReason::crashed, LossReason::retracted, LossReason::drained,
+                LossReason::walltime, LossReason::preempted, LossReason::failed});
   int num_ranges = 0;
   for (const proto::HeldRuns& held : give_back.runs()) check_held(held, num_ranges);
 }

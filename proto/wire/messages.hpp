@@ -15,7 +15,7 @@
 namespace proofmass::wire {
 
 /// Grows with every change that an older peer would misunderstand.
-inline constexpr std::uint32_t protocol_version = 7;
+inline constexpr std::uint32_t protocol_version = 8;
 
 // Limits. The comments of proofmass.proto name them.
 

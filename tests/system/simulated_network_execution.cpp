@@ -70,6 +70,7 @@ void PlayedExecution::forget(wire::CampaignId campaign) {
   std::erase_if(waiting_, [&](const WaitingRun& run) { return run.run.first == campaign; });
   std::erase_if(batches_, [&](const Batch& batch) { return batch.runs[0].first == campaign; });
   std::erase_if(finished_, [&](const auto& finished) { return finished.campaign == campaign; });
+  std::erase_if(crashed_, [&](const auto& crashed) { return crashed.campaign == campaign; });
   defined_.erase(campaign);
 }
 
@@ -121,6 +122,14 @@ PlayedExecution::Outcome PlayedExecution::advance() {
   Outcome outcome = Outcome::nothing;
   for (auto batch = batches_.begin(); batch != batches_.end();) {
     if (is_any_of(*batch, poison_.crashing)) return Outcome::crashed;
+    if (is_any_of(*batch, poison_.crashing_outside)) {
+      worker::CrashedBatch& crashed = crashed_.emplace_back();
+      crashed.campaign = batch->runs[0].first;
+      for (const RunKey& run : batch->runs) crashed.runs.push_back(run.second);
+      outcome = Outcome::finished;
+      batch = batches_.erase(batch);
+      continue;
+    }
     if (!is_any_of(*batch, poison_.hanging)) {
       ++batch->num_steps_done;
       num_steps_done_ += batch->runs.size();

@@ -25,7 +25,11 @@ using Draws = std::map<RunKey, RunDraw>;
 /// Runs that do not end as they should, whoever computes them.
 struct Poison {
   std::set<RunKey> crashing;
+  std::set<RunKey> crashing_outside;  ///< Not with their worker.
   std::set<RunKey> hanging;
+  [[nodiscard]] bool has(const RunKey& run) const {
+    return crashing.contains(run) || crashing_outside.contains(run) || hanging.contains(run);
+  }
 };
 
 /// Computes runs in simulated time: in batches, some at a time, step by step.
@@ -49,6 +53,7 @@ class PlayedExecution final : public worker::Execution {
   void forget(wire::CampaignId campaign) override;
   void abandon() override;
   std::vector<worker::FinishedRun> take_finished() override { return std::exchange(finished_, {}); }
+  std::vector<worker::CrashedBatch> take_crashed() override { return std::exchange(crashed_, {}); }
   std::vector<worker::RunningBatch> computing() const override;
   std::optional<worker::Duration> usual_batch_time() const override { return std::nullopt; }
   std::uint64_t num_steps_done() const override { return num_steps_done_; }
@@ -85,6 +90,7 @@ class PlayedExecution final : public worker::Execution {
   std::deque<WaitingRun> waiting_;
   std::vector<Batch> batches_;
   std::vector<worker::FinishedRun> finished_;
+  std::vector<worker::CrashedBatch> crashed_;
   std::uint64_t next_batch_ = 1;
   std::uint64_t num_steps_done_ = 0;
 };

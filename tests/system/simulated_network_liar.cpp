@@ -193,8 +193,7 @@ Envelope Liar::results() {
   const bool tells_the_truth = !lent.empty() && random_.happens(truthfulness_);
   const RunKey key = tells_the_truth ? any_of(lent, random_).first : any_run();
   wire::ComputedRun computed = made_up(key);
-  const bool is_harmful = poison_.crashing.contains(key) || poison_.hanging.contains(key);
-  if (tells_the_truth && !is_harmful) {
+  if (tells_the_truth && !poison_.has(key)) {
     computed.result.num_draws = draws_.at(key).num_draws;
     computed.result.truth = draws_.at(key).truth;
   } else if (lent.contains(key)) {

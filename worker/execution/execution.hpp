@@ -31,6 +31,13 @@ struct FinishedRun {
   wire::ComputedRun computed;
 };
 
+/// Runs whose simulation crashed, together, outside this process.
+struct CrashedBatch {
+  wire::CampaignId campaign;
+  std::vector<RunIndex> runs;  ///< Not empty.
+  std::string reason;          ///< For people.
+};
+
 /// Runs that are being computed together.
 struct RunningBatch {
   std::uint64_t number = 0;  ///< No other batch of the execution has it.
@@ -42,7 +49,8 @@ struct RunningBatch {
 };
 
 /// What the conversation with a coordinator needs of whatever computes runs. Neither knows how the
-/// other works. A run is in one of three places: it waits, is in a batch, or is finished.
+/// other works. A run is in one of four places: it waits, is in a batch, is finished, or has
+/// crashed.
 class Execution {
  public:
   virtual ~Execution() = default;
@@ -73,13 +81,15 @@ class Execution {
                                                            std::span<const RunRange> ranges) = 0;
   /// Drops the runs of a batch; false if there is no such batch (any more).
   [[nodiscard]] virtual bool drop_batch(std::uint64_t number) = 0;
-  /// Drops all runs of a campaign, finished ones included, and its definition.
+  /// Drops all runs of a campaign, finished and crashed ones included, and its definition.
   virtual void forget(wire::CampaignId campaign) = 0;
   /// Drops all runs that are not finished.
   virtual void abandon() = 0;
 
   /// Finished runs, each handed out once, in the order in which they finished.
   [[nodiscard]] virtual std::vector<FinishedRun> take_finished() = 0;
+  /// Crashed ones, each handed out once; none if all that simulates is within this process.
+  [[nodiscard]] virtual std::vector<CrashedBatch> take_crashed() { return {}; }
   [[nodiscard]] virtual std::vector<RunningBatch> computing() const = 0;
   /// The longest that a latest batch took, of the campaigns that are defined; nothing if none has
   /// finished one.

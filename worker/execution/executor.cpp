@@ -7,6 +7,7 @@
 #include <exception>
 #include <utility>
 
+#include "core/campaign/simulation_crash.hpp"
 #include "core/error.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/conversions.hpp"
@@ -170,6 +171,7 @@ void Executor::forget(wire::CampaignId campaign) {
   queue_.drop(campaign);
   drop_batches([&](const Batch& batch) { return batch.assignment.campaign == campaign; });
   std::erase_if(finished_, [&](const FinishedRun& run) { return run.campaign == campaign; });
+  std::erase_if(crashed_, [&](const CrashedBatch& batch) { return batch.campaign == campaign; });
   campaigns_.erase(campaign);
 }
 
@@ -182,6 +184,11 @@ void Executor::abandon() {
 std::vector<FinishedRun> Executor::take_finished() {
   const std::lock_guard lock(mutex_);
   return std::exchange(finished_, {});
+}
+
+std::vector<CrashedBatch> Executor::take_crashed() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(crashed_, {});
 }
 
 std::vector<RunningBatch> Executor::computing() const {
@@ -317,7 +324,23 @@ void Executor::compute(Batch& batch) {
     finish(batch, std::move(results), num_together);
   } catch (const Abandoned&) {
     // The thread that dropped the batch has removed it from the list.
+  } catch (const SimulationCrash& crash) {
+    note_crash(batch, crash.what());
+  } catch (const ConfigError& refusal) {  // Of parameters that were accepted for the campaign.
+    note_crash(batch, refusal.what());
   }
+}
+
+void Executor::note_crash(const Batch& batch, const char* reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (batch.is_dropped || batches_.erase(batch.number) == 0) return;
+    CrashedBatch& crashed = crashed_.emplace_back();
+    crashed.campaign = batch.assignment.campaign;
+    crashed.reason = reason;
+    for (const RunRequest& request : batch.assignment.requests) crashed.runs.push_back(request.run);
+  }
+  on_change_();
 }
 
 std::vector<RunResult> Executor::simulate(Batch& batch) {

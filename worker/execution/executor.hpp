@@ -75,6 +75,7 @@ class Executor final : public Execution {
   void forget(wire::CampaignId campaign) override;
   void abandon() override;
   [[nodiscard]] std::vector<FinishedRun> take_finished() override;
+  [[nodiscard]] std::vector<CrashedBatch> take_crashed() override;
   [[nodiscard]] std::vector<RunningBatch> computing() const override;
   [[nodiscard]] std::optional<Duration> usual_batch_time() const override;
   [[nodiscard]] std::uint64_t num_steps_done() const override { return num_steps_done_; }
@@ -135,6 +136,7 @@ class Executor final : public Execution {
   void note_steps(Batch& batch, int num_steps_now);
   /// @param num_together  Runs that shared the time of the batch.
   void finish(const Batch& batch, std::vector<RunResult> results, std::size_t num_together);
+  void note_crash(const Batch& batch, const char* reason);
   void drop_batches(const std::function<bool(const Batch&)>& is_unwanted);
   void make_room();
   [[nodiscard]] bool is_in_use(wire::CampaignId campaign) const;
@@ -156,6 +158,7 @@ class Executor final : public Execution {
   std::map<std::uint64_t, std::shared_ptr<Batch>> batches_;
   std::vector<std::shared_ptr<Batch>> checks_;  ///< Runs of devices that are to be computed again.
   std::vector<FinishedRun> finished_;
+  std::vector<CrashedBatch> crashed_;
   std::optional<std::string> failure_;
 
   std::vector<std::thread> threads_;

@@ -279,7 +279,7 @@ int end_interrupted(Store& store, const Campaign& campaign, const RunOptions& op
 int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
   const RunSet runs(given_up);
   wire::say(fmt::format(
-      "proofmass: error: {} of {} runs given up, having crashed their workers: {}\n"
+      "proofmass: error: {} of {} runs given up, having crashed: {}\n"
       "proofmass: the same command tries them again, in vain if the model itself crashed\n",
       runs.size(), num_runs, to_text(runs)));
   return exit_cannot_be_done;

@@ -16,7 +16,7 @@ TEST_F(ReplayTest, IsOfRunsThatHaveAResult) {
   const Replay again(store);
   EXPECT_EQ(again.stored_result(RunIndex{2}).run, RunIndex{2});
   EXPECT_EQ(test::error_of([&] { (void)again.stored_result(RunIndex{5}); }),
-            "run = 5 (has no result: it was given up after it had crashed workers)");
+            "run = 5 (has no result: it was given up after it had crashed)");
 }
 
 /// A result whose only error is that of a parameter, in units of its objective.

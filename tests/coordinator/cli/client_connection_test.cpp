@@ -137,7 +137,7 @@ TEST_F(ClientOfAPlayedCoordinator, SaysThatTheCoordinatorIsOfAnotherVersion) {
   (void)coordinator.receive();
   coordinator.answer("\x08\x63");  // An envelope of version 99.
   EXPECT_EQ(reply.get(),
-            failed("the coordinator is of another version: protocol_version = 99 (must be 7)"));
+            failed("the coordinator is of another version: protocol_version = 99 (must be 8)"));
 }
 
 TEST_F(ClientOfAPlayedCoordinator, SaysThatSomethingElseAnswers) {

@@ -149,7 +149,7 @@ campaign         phase      prio       done       runs    %  runs/s   time left
 ───────────────────────────────────────────────────────────────────────────────
 hardy2013        active        0         42        100   42    12.3  3 min 20 s
 second-order     paused       -5         97        100   97       -           -
-second-order: 1 run given up: too many workers crashed
+second-order: 1 run given up: crashed too often
 second-order: 2 runs without an estimate
 second-order: 10 results compared with a second computation: 3 differ (none may)
 )");
@@ -218,7 +218,7 @@ TEST(StatusTable, MarksTroubleAndNothingElse) {
   const std::string text = status_text(reply, {.paint = Paint::yes});
   const std::string bad = "\033[1;38;5;130m", plain = "\033[0m";
   for (const std::string line :
-       {"mine: nothing can be stored: disk full", "mine: 2 runs given up: too many workers crashed",
+       {"mine: nothing can be stored: disk full", "mine: 2 runs given up: crashed too often",
         "mine: 3 runs without an estimate",
         "mine: 1 result compared with a second computation: 1 differ (none may)",
         "not served, tried again: is damaged",
@@ -274,7 +274,7 @@ TEST(CampaignLine, SaysHowFarItIsAndHowFast) {
   status.set_num_given_up(2);
   EXPECT_EQ(campaign_line(status),
             "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left; 2 runs given "
-            "up: too many workers crashed; 1 result compared with a second computation: all equal");
+            "up: crashed too often; 1 result compared with a second computation: all equal");
 }
 
 TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
@@ -349,6 +349,7 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"storage_failure", "disk full"},
                          {"model_version", "ruler-1"},
                          {"missing_model", "ruler-1"},
+                         {"crashes_everywhere", false},
                          {"owner", "anna"}}}},
                       {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
                       {"num_unserved_files", 2},

@@ -84,6 +84,63 @@ TEST_F(ModelsTest, MustComputeWhatTheyDidWhereTheCampaignBegan) {
   (void)outbox.take_events();
 }
 
+// Its worker lives, and so does what else it computes.
+TEST_F(ModelsTest, ThatCrashOutsideTheirWorkerCountAgainstTheirRunsAlone) {
+  add_campaign(one, 4);
+  add_worker(first, 4);
+  outbox.forget();
+  ASSERT_EQ(runs_held_text(state, first), "0..3");
+  give_back(first, held(one, {{0}, 2}), LossReason::crashed);
+  EXPECT_EQ(campaign(one).suspects.at({0}).num_crashes, 1U);
+  EXPECT_EQ(campaign(one).suspects.at({1}).hosts.at({"", "host"}).num_alone, 0U) << "one of two";
+  EXPECT_FALSE(campaign(one).suspects.contains({2}));
+  EXPECT_EQ(state.hosts.at({"", "host"}).num_crashes, 0U);
+  EXPECT_EQ(runs_held_text(state, first), "2..3");
+  outbox.forget();
+  deliver(first, one, {2, 3});
+  EXPECT_TRUE(outbox.take_sent<proto::RunLease>(first).is_alone());
+  give_back(first, held(one, {{0}, 1}, 2), LossReason::crashed);
+  EXPECT_EQ(campaign(one).suspects.at({0}).hosts.at({"", "host"}).num_alone, 1U);
+  outbox.forget();
+}
+
+TEST_F(ModelsTest, ThatCrashAgainAndAgainPauseAtTheirWorkerAndHinderNoOthers) {
+  add_campaign_of_other_model(one, 100);
+  add_worker_with_other(first, 1);
+  for (std::uint32_t i = 1; i <= config.crashes_per_host_max; ++i) {
+    EXPECT_TRUE(can_compute(state.workers.at(first), campaign(one))) << i;
+    const auto& lease = state.leases.at(*state.workers.at(first).leases.begin());
+    give_back(first, held(one, {lease.remaining.first(), 1}, lease.known_as.value),
+              LossReason::crashed);
+    on_tick(state, now, outbox);
+  }
+  EXPECT_FALSE(can_compute(state.workers.at(first), campaign(one)));
+  EXPECT_TRUE(crashes_everywhere(state, campaign(one)));
+  EXPECT_FALSE(lacks_workers(state, campaign(one)));
+  EXPECT_EQ(outbox.take_events().back(),
+            "campaign_paused_at_worker session=00000000000003e9 crashes=5");
+  outbox.forget();
+  add_worker_with_other(second, 1);
+  EXPECT_FALSE(crashes_everywhere(state, campaign(one))) << "another process may do better";
+  outbox.forget();
+  now += config.quarantine_duration;
+  heartbeat(first);
+  heartbeat(second);
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(can_compute(state.workers.at(first), campaign(one)));
+  outbox.forget();
+}
+
+TEST_F(ModelsTest, ThatFinishARunHaveNotCrashedInARow) {
+  add_campaign_of_other_model(one, 100);
+  add_worker_with_other(first, 1);
+  give_back(first, held(one, {{0}, 1}), LossReason::crashed);
+  EXPECT_EQ(campaign(one).outside_crashes.at(session_of(first)).num_in_a_row, 1U);
+  deliver(first, one, {1});
+  EXPECT_TRUE(campaign(one).outside_crashes.empty());
+  outbox.forget();
+}
+
 // A thread of the worker computes four times as many runs of another model together.
 TEST_F(ModelsTest, TakeSeveralSlotsARunWhereOthersTakeOne) {
   const auto batch_size = static_cast<std::uint32_t>(model().batch_size());

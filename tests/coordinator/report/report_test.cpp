@@ -65,7 +65,7 @@ CampaignStatistics paper_statistics(std::uint64_t num_runs) {
 TEST(GivenUpRuns, AreNamed) {
   EXPECT_EQ(given_up_text({}), "");
   const std::vector<RunRange> runs{{{17}, 1}, {{40}, 3}};
-  EXPECT_EQ(given_up_text(runs), "          4 given up, having crashed workers: 17 40..42\n");
+  EXPECT_EQ(given_up_text(runs), "          4 given up, having crashed: 17 40..42\n");
 }
 
 TEST(GivenUpRuns, AreNamedAsFarAsTheLineHasRoom) {

@@ -245,7 +245,7 @@ TEST(MalformedRequest, OfAnotherVersionIsRefused) {
   envelope.set_protocol_version(protocol_version + 1);
   const DecodeError error = refusal_of_request(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 8 (must be 7)");
+  EXPECT_EQ(error.text, "protocol_version = 9 (must be 8)");
 }
 
 TEST(MalformedRequest, WithoutContentIsRefused) {

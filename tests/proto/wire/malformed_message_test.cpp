@@ -73,7 +73,7 @@ TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
   envelope.mutable_bye();
   const DecodeError error = refusal_of(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 1 (must be 7)");
+  EXPECT_EQ(error.text, "protocol_version = 1 (must be 8)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
@@ -295,8 +295,8 @@ TEST(MalformedGiveBack, SaysWhatAndWhy) {
   EXPECT_EQ(refusal(good_give_back, [](auto& give_back) { give_back.clear_reason(); }),
             "reason = 0 (must be one that this message may give)");
   EXPECT_EQ(refusal(good_give_back,
-                    [](auto& give_back) { give_back.set_reason(proto::LOSS_REASON_CRASHED); }),
-            "reason = 2 (must be one that this message may give)");
+                    [](auto& give_back) { give_back.set_reason(proto::LOSS_REASON_HUNG); }),
+            "reason = 4 (must be one that this message may give)");
   EXPECT_EQ(
       refusal(good_give_back, [](auto& give_back) { give_back.mutable_runs(0)->clear_attempt(); }),
       "attempt = 0 (must not be 0)");

@@ -1,3 +1,4 @@
+#include "core/campaign/simulation_crash.hpp"
 #include "core/model.hpp"
 #include "tests/test.hpp"
 #include "tests/worker/execution/executor_bench.hpp"
@@ -182,6 +183,28 @@ TEST(Executor, DropsABatchOnceAndComputesTheRunsAgainIfTheyComeAgain) {
   gate.open.release(2);
   EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{1});
   EXPECT_TRUE(bench.executor.take_finished().empty());
+}
+
+TEST(Executor, GoesOnAfterACrashOutside) {
+  Bench bench([](const Campaign&) -> PreparedCampaign {
+    return {.simulate = [](std::span<const RunRequest> requests, const auto&) {
+      if (requests.front().run == RunIndex{0}) throw SimulationCrash("it is gone");
+      if (requests.front().run == RunIndex{2}) throw ConfigError("x", "1", "must be 0");
+      return results_of(requests);
+    }};
+  });
+  submit(bench.executor, lease(0, 3));
+  EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{1});
+  std::vector<CrashedBatch> crashed;
+  while (crashed.size() < 2) {
+    std::ranges::move(bench.executor.take_crashed(), std::back_inserter(crashed));
+  }
+  EXPECT_EQ(crashed[0].campaign, first_campaign);
+  EXPECT_EQ(crashed[0].runs, std::vector<RunIndex>{{0}});
+  EXPECT_EQ(crashed[0].reason, "it is gone");
+  EXPECT_EQ(crashed[1].reason, "x = 1 (must be 0)");
+  EXPECT_TRUE(bench.executor.computing().empty());
+  EXPECT_FALSE(bench.executor.failure().has_value());
 }
 
 // The batch does not look any more whether it is wanted.

@@ -101,6 +101,22 @@ TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
+TEST_F(ConversationTest, GivesBackWhatCrashedOutsideAndGoesOn) {
+  register_with_campaign();
+  receive(lease(0, 2));
+  receive(lease(2, 3));
+  execution.begin_batch();
+  execution.crash_batch("killed by signal 6");
+  conversation->on_progress(now);
+  const auto given_back = take_sent<proto::GiveBack>();
+  EXPECT_EQ(given_back.reason(), proto::LOSS_REASON_CRASHED);
+  EXPECT_EQ(test::vector_of(given_back.runs()), held(0, 2));
+  EXPECT_EQ(conversation->num_unfinished(), 3U);
+  EXPECT_FALSE(conversation->ending().has_value());
+  EXPECT_EQ(to_text(conversation->take_events().back()),
+            "simulation_crashed first_run=0 runs=2 reason=\"killed by signal 6\"");
+}
+
 TEST_F(ConversationTest, LeavesAtOnceWhenAskedAgain) {
   register_with_campaign();
   receive(lease(0, 2));
