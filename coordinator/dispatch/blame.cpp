@@ -1,7 +1,5 @@
 #include "coordinator/dispatch/blame.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -205,13 +203,21 @@ void pause_crashing_campaigns(State& state, Outbox& outbox) {
     std::erase_if(campaign.outside_crashes, [&](const auto& item) {
       return item.second.paused_until && state.ticked_at >= *item.second.paused_until;
     });
-    for (auto& [session, crashes] : campaign.outside_crashes) {
+  }
+  for (const auto& [worker_id, worker] : state.workers) {
+    for (auto& [id, campaign] : state.campaigns) {
+      const auto found = campaign.outside_crashes.find(worker.session);
+      if (found == campaign.outside_crashes.end()) continue;
+      OutsideCrashes& crashes = found->second;
       if (crashes.paused_until || crashes.num_in_a_row < state.config.crashes_per_host_max)
         continue;
       crashes.paused_until = state.ticked_at + state.config.quarantine_duration;
+      // What a host says that has never computed anything must not keep others from trying.
+      if (!is_proven(state, worker.host)) withdraw(state, id, worker.host);
       outbox.log({.severity = Severity::error,
                   .kind = "campaign_paused_at_worker",
-                  .fields = {{"session", fmt::format("{:016x}", session.value)},
+                  .fields = {{"worker", worker_id.value},
+                             {"name", worker.name},
                              {"crashes", crashes.num_in_a_row}}},
                  id);
     }

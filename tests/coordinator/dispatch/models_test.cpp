@@ -117,8 +117,8 @@ TEST_F(ModelsTest, ThatCrashAgainAndAgainPauseAtTheirWorkerAndHinderNoOthers) {
   EXPECT_FALSE(can_compute(state.workers.at(first), campaign(one)));
   EXPECT_TRUE(crashes_everywhere(state, campaign(one)));
   EXPECT_FALSE(lacks_workers(state, campaign(one)));
-  EXPECT_EQ(outbox.take_events().back(),
-            "campaign_paused_at_worker session=00000000000003e9 crashes=5");
+  EXPECT_EQ(outbox.take_events().back(), "campaign_paused_at_worker worker=1 name=w crashes=5");
+  EXPECT_TRUE(campaign(one).suspects.empty()) << "a host that has never computed a run";
   outbox.forget();
   add_worker_with_other(second, 1);
   EXPECT_FALSE(crashes_everywhere(state, campaign(one))) << "another process may do better";
