@@ -208,7 +208,7 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   }
   campaign.suspects.erase(run);
   campaign.given_up.add({run, 1});
-  outbox.give_up(id, run);
+  outbox.write(id, GivenUpRun{run});
   outbox.log({.severity = Severity::error,
               .kind = "run_given_up",
               .fields = {{"run", run.value}, {"crashes", suspicion.num_crashes}}},

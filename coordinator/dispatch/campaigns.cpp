@@ -193,6 +193,7 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
     worker.run_time_s.erase(id);
     worker.card_work.erase(id);
     worker.unleased.erase(id);
+    worker.joined.erase(id);
     std::erase_if(worker.computing,
                   [&](const Progress& progress) { return progress.campaign == id; });
   }

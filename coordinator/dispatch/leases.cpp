@@ -78,15 +78,15 @@ RunSet promote_copies(State& state, CampaignId id, RunSet runs, Outbox& outbox) 
   return runs;
 }
 
-void record_losses(const State& state, const Lease& lease, const RunSet& runs, LossReason reason,
+void record_losses(const Lease& lease, Worker& worker, const RunSet& runs, LossReason reason,
                    bool is_blamed, Outbox& outbox) {
   for (const RunRange& range : runs.ranges()) {
-    outbox.record(lease.campaign, lease.worker,
-                  {.runs = range,
-                   .attempt = lease.attempt,
-                   .worker = state.workers.at(lease.worker).session,
-                   .reason = reason,
-                   .is_blamed = is_blamed});
+    note_joined(lease.campaign, worker, outbox);
+    outbox.write(lease.campaign, ReturnedRuns{.runs = range,
+                                              .attempt = lease.attempt,
+                                              .worker = worker.session,
+                                              .reason = reason,
+                                              .is_blamed = is_blamed});
   }
 }
 
@@ -220,6 +220,16 @@ void note_unleased(State& state, LeaseId id, RunRange runs) {
   worker.clear_at = std::max(worker.clear_at, lease.lent_at + state.config.arrival_max);
 }
 
+void note_joined(CampaignId campaign, Worker& worker, Outbox& outbox) {
+  if (!worker.joined.insert(campaign).second) return;
+  outbox.write(campaign, WorkerJoined{.session = worker.session,
+                                      .name = worker.name,
+                                      .host = worker.host_name,
+                                      .process_id = worker.process_id,
+                                      .num_slots = worker.num_slots,
+                                      .cards = worker.cards});
+}
+
 void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const RunSet& blamed,
           Outbox& outbox) {
   const Lease lease = state.leases.at(id);
@@ -227,8 +237,9 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
   const RunSet guilty = runs.overlap(blamed);
   RunSet others = runs;
   others.remove(guilty);
-  record_losses(state, lease, guilty, reason, true, outbox);
-  record_losses(state, lease, others, reason, false, outbox);
+  Worker& worker = state.workers.at(lease.worker);
+  record_losses(lease, worker, guilty, reason, true, outbox);
+  record_losses(lease, worker, others, reason, false, outbox);
   log_loss(lease, runs, reason, guilty, outbox);
   for (const RunRange& range : runs.ranges()) take_off(state, id, range);
   state.hungry.insert(lease.worker);  // It has room for others now.
@@ -328,6 +339,7 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
   }
   state.hungry.erase(id);
   state.awaited.erase(worker.session);
+  outbox.write({}, WorkerEnded{.session = worker.session, .reason = reason});
   state.workers.erase(id);
 }
 

@@ -242,8 +242,9 @@ bool is_backed_up(const State& state, const CampaignState& campaign) {
   return 2 * num_under_way >= state.config.uncommitted_max;
 }
 
-void send_lease(const State& state, LeaseId id, Outbox& outbox) {
+void send_lease(State& state, LeaseId id, Outbox& outbox) {
   const Lease& lease = state.leases.at(id);
+  note_joined(lease.campaign, state.workers.at(lease.worker), outbox);
   const Campaign& campaign = *state.campaigns.at(lease.campaign).definition;
   for (const RunRange& runs : lease.remaining.ranges()) {
     proto::Envelope envelope;

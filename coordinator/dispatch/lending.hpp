@@ -32,7 +32,7 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 [[nodiscard]] bool is_backed_up(const State& state, const CampaignState& campaign);
 
 /// Tells the worker of a new lease.
-void send_lease(const State& state, LeaseId lease, Outbox& outbox);
+void send_lease(State& state, LeaseId lease, Outbox& outbox);
 
 /// To be called whenever the phase or the priority of a campaign has changed.
 void sort_served(State& state);

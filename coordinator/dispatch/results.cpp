@@ -40,6 +40,7 @@ void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_
 struct Intake {
   State& state;
   WorkerId id;
+  Worker& worker;
   CampaignId campaign_id;
   CampaignState& campaign;
   Attempt attempt;
@@ -53,8 +54,7 @@ struct Intake {
       campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
       state.finished_at = state.ticked_at;
       if (!computed.result.is_completed()) ++campaign.num_without_estimate;
-      outbox.store(id, leased(std::move(computed)));
-      return;
+      return outbox.write(campaign_id, delivery_of(std::move(computed)));
     }
     const auto delivered = campaign.delivered.find(run);
     if (delivered == campaign.delivered.end()) {
@@ -71,8 +71,12 @@ struct Intake {
   }
 
  private:
-  [[nodiscard]] wire::LeasedResult leased(wire::ComputedRun computed) const {
-    return {.campaign = campaign_id, .attempt = attempt, .computed = std::move(computed)};
+  [[nodiscard]] Delivery delivery_of(wire::ComputedRun computed) const {
+    detail::note_joined(campaign_id, worker, outbox);
+    return {.result = std::move(computed.result),
+            .worker = worker.session,
+            .attempt = attempt,
+            .compute_s = computed.compute_s};
   }
 
   // What a worker sends again and again must not fill the memory: one that is not compared, is
@@ -80,7 +84,7 @@ struct Intake {
   void compare(wire::ComputedRun computed) {
     if (campaign.num_comparing >= state.config.uncommitted_max) return;
     ++campaign.num_comparing;
-    outbox.compare(id, leased(std::move(computed)));
+    outbox.write(campaign_id, SecondDelivery{delivery_of(std::move(computed))});
   }
 
   /// True if the run was on an audit lease of this worker.
@@ -269,7 +273,7 @@ void on_results(State& state, WorkerId id, CampaignId campaign_id, Attempt attem
   }
   count_results(state, *worker, campaign_id, results, now);
   const bool have_left_runs = have_cards_left_runs(state, *worker, campaign.lent, results);
-  Intake intake{state, id, campaign_id, campaign, attempt, outbox, {}, {}};
+  Intake intake{state, id, *worker, campaign_id, campaign, attempt, outbox, {}, {}};
   for (wire::ComputedRun& computed : results) {
     if (!is_foreign(campaign, computed)) intake.take(std::move(computed));
   }

@@ -143,6 +143,7 @@ struct Worker {
   bool is_eligible = false;
   std::uint64_t num_steps_done = 0;
   std::uint64_t num_results = 0;
+  std::set<CampaignId> joined;      ///< Campaigns whose files know it.
   std::vector<Progress> computing;  ///< As the newest heartbeat has it.
   std::set<LeaseId> leases;
   std::uint64_t num_alone = 0;  ///< Suspects on its leases; nothing else is lent with one.
@@ -347,6 +348,7 @@ struct State {
   TimePoint awaited_until{};
   /// Sessions that were lent runs before this coordinator started: which, is not known.
   std::set<SessionId> attached;
+  std::set<SessionId> absent;  ///< Of these, those that have not registered since.
   /// Runs that were taken off the leases of a session, which it may still hold; of
   /// `num_workers_max` sessions at most.
   std::map<SessionId, std::map<CampaignId, RunSet>> lent_before;

@@ -22,9 +22,8 @@ std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz)
 
 }  // namespace
 
-CampaignService::CampaignService(const ServiceContext& context, WorkerHistory& history)
+CampaignService::CampaignService(const ServiceContext& context)
     : context_(context),
-      history_(history),
       state_(context.state),
       writer_(context.writer),
       outbox_(context.outbox),

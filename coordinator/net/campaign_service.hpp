@@ -19,7 +19,6 @@
 #include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/net/timing.hpp"
-#include "coordinator/net/worker_history.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/wire/client_codec.hpp"
 
@@ -46,8 +45,7 @@ namespace proofmass::coordinator {
 ///     gone      removed by somebody                         any if it comes back
 class CampaignService {
  public:
-  /// @param history  Told which campaigns are closed; outlives this object.
-  CampaignService(const ServiceContext& context, WorkerHistory& history);
+  explicit CampaignService(const ServiceContext& context);
   ~CampaignService();  ///< Waits for statistics that are being computed.
   CampaignService(const CampaignService&) = delete;
   CampaignService& operator=(const CampaignService&) = delete;
@@ -199,7 +197,6 @@ class CampaignService {
   void say_not_closed(std::string_view reason);
 
   const ServiceContext& context_;
-  WorkerHistory& history_;
   State& state_;
   StoreWriter& writer_;
   Outbox& outbox_;

@@ -254,7 +254,6 @@ void CampaignService::close_ended(CampaignId id) {
   closed.status.set_rate_hz(0.0);
   closed.status.clear_remaining_s();
   const std::filesystem::path file = closed.file;
-  history_.note_closed(id);
   on_removed(state_, id, outbox_);
   on_ended(state_, id, closed.status.num_runs());
   served_.erase(id);
