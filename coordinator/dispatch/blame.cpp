@@ -93,7 +93,7 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
   CampaignState& campaign = state.campaigns.at(id);
   const std::uint32_t num_crashes = ++campaign.audit_crashes[run];
   if (num_crashes < state.config.crashes_per_run_max) return;
-  take_off(state, campaign.audits.at(run), {run, 1});
+  take_off(state, *campaign.audits.find(run), {run, 1});
   campaign.audit_crashes.erase(run);
   outbox.log({.severity = Severity::error,
               .kind = "audit_given_up",
@@ -106,17 +106,15 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
 RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty certainty,
                   const HostId& host, TimePoint now) {
   RunSet blamed;
-  for (const RunRange& range : accused.ranges()) {
-    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-      if (certainty == Certainty::ambiguous && campaign.suspects.contains(run)) continue;
-      Suspicion& suspicion = campaign.suspects[run];
-      Suspicion::OnHost& on_host = suspicion.hosts[host];
-      suspicion.tried_at = now;
-      ++suspicion.num_crashes;
-      ++on_host.num_crashes;
-      if (certainty == Certainty::certain) ++on_host.num_alone;
-      blamed.add({run, 1});
-    }
+  for (const RunIndex run : indices_of(accused.ranges())) {
+    if (certainty == Certainty::ambiguous && campaign.suspects.contains(run)) continue;
+    Suspicion& suspicion = campaign.suspects[run];
+    Suspicion::OnHost& on_host = suspicion.hosts[host];
+    suspicion.tried_at = now;
+    ++suspicion.num_crashes;
+    ++on_host.num_crashes;
+    if (certainty == Certainty::certain) ++on_host.num_alone;
+    blamed.add({run, 1});
   }
   return blamed;
 }
@@ -125,9 +123,8 @@ RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty cert
 RunsByCampaign split_audits(const State& state, RunsByCampaign& accused) {
   RunsByCampaign audits;
   for (auto& [id, runs] : accused) {
-    for (const auto& [run, lease] : state.campaigns.at(id).audits) {
-      if (runs.remove(run)) audits[id].add({run, 1});
-    }
+    audits[id] = runs.overlap(state.campaigns.at(id).audits.runs());
+    runs.remove(audits[id]);
   }
   std::erase_if(accused, [](const auto& item) { return item.second.empty(); });
   return audits;
@@ -151,10 +148,8 @@ RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certaint
   }
   if (!accused.empty()) return blamed;
   for (const auto& [campaign, runs] : audits) {
-    for (const RunRange& range : runs.ranges()) {
-      for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-        count_audit_crash(state, campaign, run, outbox);
-      }
+    for (const RunIndex run : indices_of(runs.ranges())) {
+      count_audit_crash(state, campaign, run, outbox);
     }
   }
   return blamed;

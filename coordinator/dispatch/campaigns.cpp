@@ -15,12 +15,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-void send_to_all(const State& state, CampaignId id, Outbox& outbox) {
-  for (const auto& [worker, content] : state.workers) {
-    detail::send_not_served(state, worker, id, outbox);
-  }
-}
-
 /// With one crash more a run is given up.
 std::uint32_t num_crashes_before_last(const State& state) {
   return std::max(state.config.crashes_per_run_max, 2U) - 1;
@@ -133,10 +127,8 @@ void on_control(State& state, CampaignId id, int priority, double audit_fraction
 void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   const RunSet runs = std::exchange(campaign.given_up, {});
-  for (const RunRange& range : runs.ranges()) {
-    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-      campaign.suspects[run].num_crashes = num_crashes_before_last(state);
-    }
+  for (const RunIndex run : indices_of(runs.ranges())) {
+    campaign.suspects[run].num_crashes = num_crashes_before_last(state);
   }
   detail::make_pending(state, id, runs, {1}, outbox);
   if (campaign.phase == Phase::finished && !runs.empty()) campaign.phase = Phase::active;
@@ -172,11 +164,11 @@ void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
 
 void on_cancel(State& state, CampaignId id, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
-  if (campaign.phase == Phase::cancelled || campaign.phase == Phase::finished) return;
+  if (has_ended(campaign.phase)) return;
   campaign.phase = Phase::cancelled;
   detail::sort_served(state);
   recall_all(state, id, outbox);
-  send_to_all(state, id, outbox);
+  detail::send_not_served(state, id, outbox);
 }
 
 void on_removed(State& state, CampaignId id, Outbox& outbox) {
@@ -197,7 +189,7 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
     std::erase_if(worker.computing,
                   [&](const Progress& progress) { return progress.campaign == id; });
   }
-  send_to_all(state, id, outbox);
+  detail::send_not_served(state, id, outbox);
 }
 
 void on_ended(State& state, CampaignId id, std::uint64_t num_runs) {

@@ -27,6 +27,12 @@ void note_slots(State& state, Worker& worker, bool is_for_cards, std::uint64_t n
   if (worker.is_eligible) state.num_idle_slots += num_idle_slots(worker);
 }
 
+/// Where the runs of such leases are; null of copies, of which a run may be on several.
+LeaseIndex* index_of(CampaignState& campaign, LeaseKind kind) {
+  if (kind == LeaseKind::copy) return nullptr;
+  return kind == LeaseKind::first ? &campaign.lent : &campaign.audits;
+}
+
 /// A copy becomes the first lease of its run.
 void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
   const Lease& old = state.leases.at(copy);
@@ -36,8 +42,7 @@ void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
               .known_as = old.known_as,
               .is_retracted = old.is_retracted,
               .remaining = RunSet(RunRange{run, 1}),
-              .lent_at = old.lent_at,
-              .audited = {}};
+              .lent_at = old.lent_at};
   take_off(state, copy, {run, 1});
   (void)open_lease(state, std::move(lease));
 }
@@ -150,18 +155,14 @@ LeaseId open_lease(State& state, Lease lease) {
   lease.num_slots = std::max(lease.num_slots, lease.num_runs * lease.slots_per_run);
   const LeaseId id{state.next_lease++};
   for (const RunRange& range : lease.remaining.ranges()) {
-    if (lease.kind == LeaseKind::first) {
-      campaign.lent.add(range, id);
+    if (LeaseIndex* const index = index_of(campaign, lease.kind)) {
+      index->add(range, id);
       continue;
     }
     for (std::uint64_t run = range.first.value; run < range.end(); ++run) {
-      if (lease.kind == LeaseKind::audit) {
-        campaign.audits.emplace(RunIndex{run}, id);
-      } else {
-        Copies& copies = campaign.copies[{run}];
-        copies.leases.push_back(id);
-        copies.newest = std::max(copies.newest, lease.attempt);
-      }
+      Copies& copies = campaign.copies[{run}];
+      copies.leases.push_back(id);
+      copies.newest = std::max(copies.newest, lease.attempt);
     }
   }
   Worker& worker = state.workers.at(lease.worker);
@@ -182,15 +183,11 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   const std::uint64_t num_slots_before = num_slots_taken(lease);
   lease.remaining.remove(runs);
   PROOFMASS_EXPECT(size_before - lease.remaining.size() == runs.count);
-  if (lease.kind == LeaseKind::first) {
-    campaign.lent.remove(runs);
+  if (LeaseIndex* const index = index_of(campaign, lease.kind)) {
+    index->remove(runs);
   } else {
     for (std::uint64_t run = runs.first.value; run < runs.end(); ++run) {
-      if (lease.kind == LeaseKind::audit) {
-        campaign.audits.erase({run});
-      } else {
-        std::erase(campaign.copies.at({run}).leases, id);
-      }
+      std::erase(campaign.copies.at({run}).leases, id);
     }
   }
   Worker& worker = state.workers.at(lease.worker);

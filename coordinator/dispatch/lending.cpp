@@ -59,8 +59,7 @@ struct Borrower {
             .is_for_cards = is_for_cards,
             .num_slots = share.slots_for(runs.size()),
             .remaining = std::move(runs),
-            .lent_at = now,
-            .audited = {}};
+            .lent_at = now};
   }
   /// A card that was idle begins to be measured anew.
   void note_card_work() const {
@@ -282,6 +281,10 @@ void send_not_served(const State& state, WorkerId worker, CampaignId id, Outbox&
   send_not_served(worker, id, {}, outbox);
 }
 
+void send_not_served(const State& state, CampaignId id, Outbox& outbox) {
+  for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
+}
+
 void send_not_served(WorkerId worker, CampaignId id, std::span<const RunRange> runs,
                      Outbox& outbox) {
   proto::Envelope envelope;
@@ -292,8 +295,7 @@ void send_not_served(WorkerId worker, CampaignId id, std::span<const RunRange> r
 
 void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
-  if (campaign.phase == Phase::finished || campaign.phase == Phase::cancelled) return;
-  if (!is_finished(campaign)) return;
+  if (has_ended(campaign.phase) || !is_finished(campaign)) return;
   campaign.phase = Phase::finished;
   sort_served(state);
   const std::uint64_t num_elsewhere = campaign.elsewhere.size();
@@ -306,7 +308,7 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
                          {"duplicates", campaign.num_duplicates},
                          {"compared", campaign.num_audited}}},
              id);
-  for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
+  send_not_served(state, id, outbox);
 }
 
 void settle(State& state, TimePoint now, Outbox& outbox) {

@@ -41,6 +41,8 @@ void sort_served(State& state);
 /// them if the campaign is finished or cancelled, and otherwise to keep their results.
 void send_not_served(const State& state, WorkerId worker, CampaignId campaign, Outbox& outbox);
 
+/// send_not_served() for all workers.
+void send_not_served(const State& state, CampaignId campaign, Outbox& outbox);
 /// Tells the worker to keep the results of these runs; without a run, of the whole campaign.
 void send_not_served(WorkerId worker, CampaignId campaign, std::span<const RunRange> runs,
                      Outbox& outbox);

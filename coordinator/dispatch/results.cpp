@@ -89,10 +89,9 @@ struct Intake {
 
   /// True if the run was on an audit lease of this worker.
   bool end_audit(RunIndex run) {
-    const auto audit = campaign.audits.find(run);
-    if (audit == campaign.audits.end()) return false;
-    if (state.leases.at(audit->second).worker != id) return false;
-    detail::take_off(state, audit->second, {run, 1});
+    const std::optional<LeaseId> audit = campaign.audits.find(run);
+    if (!audit || state.leases.at(*audit).worker != id) return false;
+    detail::take_off(state, *audit, {run, 1});
     campaign.audit_crashes.erase(run);
     return true;
   }

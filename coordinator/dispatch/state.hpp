@@ -192,7 +192,7 @@ struct Lease {
   std::uint64_t num_slots = 0;
   RunSet remaining;
   TimePoint lent_at;
-  WorkerId audited;  ///< Of an audit: whose results are compared; 0 if not known.
+  WorkerId audited = {};  ///< Of an audit: whose results are compared; 0 if not known.
 };
 
 /// Slots that the remaining runs of a lease take.
@@ -266,7 +266,7 @@ struct CampaignState {
   std::map<RunIndex, Copies> copies;                ///< Of runs in `lent`, once there was one.
   std::map<AuditKey, RunSet> to_audit;              ///< Committed, and not lent for audit yet.
   std::uint64_t num_to_audit = 0;                   ///< Runs in `to_audit`.
-  std::map<RunIndex, LeaseId> audits;               ///< Runs on audit leases.
+  LeaseIndex audits;                                ///< Runs on audit leases.
   std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in `to_audit` or `audits`.
   std::uint64_t num_comparing = 0;                  ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
