@@ -54,4 +54,9 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox);
 /// runs to workers that would take more.
 void settle(State& state, TimePoint now, Outbox& outbox);
 
+/// The end of a campaign: no run is pending, and some workers are idle while others still compute.
+/// Idle workers first receive runs that wait at other workers, and then copies of runs that take
+/// too long.
+void speculate(State& state, TimePoint now, Outbox& outbox);
+
 }  // namespace proofmass::coordinator::detail

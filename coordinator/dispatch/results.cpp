@@ -133,7 +133,6 @@ bool is_lent_to(const State& state, const CampaignState& campaign, RunIndex run,
 /// the worker: a draw takes longer than all else here.
 bool is_made_up(const State& state, const CampaignState& campaign, const RunResult& result,
                 WorkerId id) {
-  if (result.run.value >= campaign.definition->num_runs) return false;
   if (is_lent_to(state, campaign, result.run, id)) return false;
   if (campaign.committed.contains(result.run) || campaign.delivered.contains(result.run)) {
     return false;
@@ -157,7 +156,7 @@ std::string broken_rule(const State& state, const CampaignState& campaign,
     if (!broken.empty()) {
       return fmt::format("run {}: {}", computed.result.run.value, broken.front());
     }
-    if (is_made_up(state, campaign, computed.result, id)) {
+    if (!is_foreign(campaign, computed) && is_made_up(state, campaign, computed.result, id)) {
       return fmt::format("run {}: truth (must be what the run draws)", computed.result.run.value);
     }
   }
@@ -229,18 +228,15 @@ void leave_out_cards(State& state, Worker& worker, CampaignId id, Outbox& outbox
 /// The worker and its host can compute: what they show with every result.
 void count_results(State& state, Worker& worker, CampaignId id,
                    std::span<const wire::ComputedRun> results, TimePoint now) {
+  if (results.empty()) return;
   CampaignState& campaign = state.campaigns.at(id);
-  const auto num_results = static_cast<std::uint64_t>(std::ranges::count_if(
-      results, [&](const auto& computed) { return !is_foreign(campaign, computed); }));
-  if (num_results == 0) return;
   Host& host = state.hosts.at(worker.host);
   host.num_crashes = 0;
-  host.num_results += num_results;
-  worker.num_results += num_results;
+  host.num_results += results.size();
+  worker.num_results += results.size();
   worker.num_retracts = 0;
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : results) {
-    if (is_foreign(campaign, computed)) continue;
     count_run_time(state, worker, id, campaign, computed, now);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
   }
@@ -270,12 +266,11 @@ void on_results(State& state, WorkerId id, CampaignId campaign_id, Attempt attem
     outbox.send(id, wire::rejection(proto::REJECT_REASON_MALFORMED, broken));
     return on_gone(state, id, LossReason::protocol, now, outbox);
   }
+  std::erase_if(results, [&](const auto& computed) { return is_foreign(campaign, computed); });
   count_results(state, *worker, campaign_id, results, now);
   const bool have_left_runs = have_cards_left_runs(state, *worker, campaign.lent, results);
   Intake intake{state, id, *worker, campaign_id, campaign, attempt, outbox, {}, {}};
-  for (wire::ComputedRun& computed : results) {
-    if (!is_foreign(campaign, computed)) intake.take(std::move(computed));
-  }
+  for (wire::ComputedRun& computed : results) intake.take(std::move(computed));
   if (have_left_runs) leave_out_cards(state, *worker, campaign_id, outbox);
   if (!intake.durable.empty()) {
     send_acks(state, campaign_id, {{id, std::move(intake.durable)}}, outbox);

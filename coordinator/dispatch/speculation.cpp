@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/speculation.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <map>

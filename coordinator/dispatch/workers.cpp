@@ -12,7 +12,6 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/speculation.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/conversions.hpp"

@@ -183,6 +183,8 @@ class CampaignService {
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);
   void begin_summary(CampaignId id, Served& served);
+  /// True if no result is on its way, no statistics are to be computed, and nobody changes it.
+  [[nodiscard]] static bool expects_nothing(const CampaignState& campaign, const Served& served);
   /// True if nothing of the campaign is to be stored or computed, and nobody changes it.
   [[nodiscard]] bool is_settled(CampaignId id, const Served& served) const;
   /// True if the campaign is finished, its statistics are there, and nothing is under way.
