@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/error.hpp"
+#include "coordinator/dispatch/shares.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -26,13 +26,11 @@ RunsByCampaign computed_runs(const State& state, const Worker& worker) {
   std::uint64_t num_left = worker.num_slots;
   for (const LeaseId id : worker.leases) {
     const Lease& lease = state.leases.at(id);
+    if (num_left == 0) break;
     RunSet remaining = lease.remaining;
-    while (num_left > 0 && !remaining.empty()) {
-      const std::uint64_t slots = lease.slots_per_run;
-      const RunRange range = remaining.take_first(std::max<std::uint64_t>(1, num_left / slots));
-      computed[lease.campaign].add(range);
-      num_left -= std::min(num_left, range.count * slots);
-    }
+    const RunSet begun = remaining.take_first(ratio_rounded_up(num_left, lease.slots_per_run));
+    computed[lease.campaign].add(begun);
+    num_left -= std::min(num_left, begun.size() * lease.slots_per_run);
   }
   return computed;
 }

@@ -50,25 +50,18 @@ void restore_audits(CampaignState& campaign, const StoredCampaign& stored) {
   if (!to_audit.empty()) detail::add_to_audit(campaign, unknown, to_audit);
 }
 
-/// Takes back all leases of a campaign.
+/// Takes back all leases of a campaign. Where one that was the first for its runs ends while copies
+/// remain, another first one is opened behind it.
 void recall(State& state, CampaignId id, Outbox& outbox) {
-  std::vector<LeaseId> leases;
-  for (const auto& [lease_id, lease] : state.leases) {
-    if (lease.campaign == id) leases.push_back(lease_id);
+  for (auto next = state.leases.begin(); next != state.leases.end();) {
+    const LeaseId lease = next->first;
+    if (next->second.campaign == id) {
+      const RunSet runs = next->second.remaining;
+      for (const RunRange& range : runs.ranges()) detail::note_unleased(state, lease, range);
+      detail::lose(state, lease, runs, LossReason::retracted, {}, outbox);
+    }
+    next = state.leases.upper_bound(lease);
   }
-  for (const LeaseId lease : leases) {
-    const auto found = state.leases.find(lease);
-    if (found == state.leases.end()) continue;
-    const RunSet runs = found->second.remaining;
-    for (const RunRange& range : runs.ranges()) detail::note_unleased(state, lease, range);
-    detail::lose(state, lease, runs, LossReason::retracted, {}, outbox);
-  }
-}
-
-/// What follows a first lease that ends while copies remain is another first lease.
-void recall_all(State& state, CampaignId id, Outbox& outbox) {
-  const CampaignState& campaign = state.campaigns.at(id);
-  while (!campaign.lent.empty() || !campaign.audits.empty()) recall(state, id, outbox);
 }
 
 }  // namespace
@@ -167,14 +160,14 @@ void on_cancel(State& state, CampaignId id, Outbox& outbox) {
   if (has_ended(campaign.phase)) return;
   campaign.phase = Phase::cancelled;
   detail::sort_served(state);
-  recall_all(state, id, outbox);
+  recall(state, id, outbox);
   detail::send_not_served(state, id, outbox);
 }
 
 void on_removed(State& state, CampaignId id, Outbox& outbox) {
   const CampaignState& campaign = state.campaigns.at(id);
   PROOFMASS_EXPECT(campaign.delivered.empty());
-  recall_all(state, id, outbox);
+  recall(state, id, outbox);
   if (has_ended(campaign.phase)) state.ended[id] = campaign.definition->num_runs;
   state.campaigns.erase(id);
   std::erase(state.order, id);

@@ -25,14 +25,6 @@ void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& 
   }
 }
 
-RunSet take_first(RunSet& runs, std::uint64_t count_max) {
-  RunSet taken;
-  while (taken.size() < count_max && !runs.empty()) {
-    taken.add(runs.take_first(count_max - taken.size()));
-  }
-  return taken;
-}
-
 /// One worker that is being lent runs of one campaign, for its processors or its cards.
 struct Borrower {
   State& state;
@@ -81,7 +73,7 @@ void lend_pending(const Borrower& borrower) {
   while (borrower.missing() > 0 && !pending.empty()) {
     const auto newest = std::prev(pending.end());
     const Attempt attempt = newest->first;
-    RunSet runs = take_first(newest->second, borrower.missing_of_lease());
+    RunSet runs = newest->second.take_first(borrower.missing_of_lease());
     if (newest->second.empty()) pending.erase(newest);
     borrower.open(borrower.lease_of(std::move(runs), attempt));
   }
@@ -107,7 +99,7 @@ void lend_audits(const Borrower& borrower) {
       next = to_audit.begin();
     }
     const AuditKey key = next->first;
-    RunSet runs = take_first(next->second, borrower.missing_of_lease());
+    RunSet runs = next->second.take_first(borrower.missing_of_lease());
     borrower.campaign.num_to_audit -= runs.size();
     if (next->second.empty()) to_audit.erase(next);
     Lease lease = borrower.lease_of(std::move(runs), key.attempt);

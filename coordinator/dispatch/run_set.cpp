@@ -31,15 +31,8 @@ void RunSet::add(const RunSet& runs) {
 }
 
 bool RunSet::remove(RunIndex run) {
-  auto found = ends_.upper_bound(run.value);
-  if (found == ends_.begin()) return false;
-  --found;
-  const auto [first, end] = *found;
-  if (run.value >= end) return false;
-  ends_.erase(found);
-  if (first < run.value) ends_.emplace(first, run.value);
-  if (run.value + 1 < end) ends_.emplace(run.value + 1, end);
-  --size_;
+  if (!contains(run)) return false;
+  remove(RunRange{run, 1});
   return true;
 }
 
@@ -63,14 +56,15 @@ void RunSet::remove(const RunSet& runs) {
   for (const auto& [first, end] : runs.ends_) remove({.first = {first}, .count = end - first});
 }
 
-RunRange RunSet::take_first(std::uint64_t count_max) {
-  PROOFMASS_EXPECT(!empty() && count_max > 0);
-  const auto [first, end] = *ends_.begin();
-  const std::uint64_t count = std::min(count_max, end - first);
-  ends_.erase(ends_.begin());
-  if (first + count < end) ends_.emplace(first + count, end);
-  size_ -= count;
-  return {.first = {first}, .count = count};
+RunSet RunSet::take_first(std::uint64_t count_max) {
+  RunSet taken;
+  while (taken.size() < count_max && !empty()) {
+    const auto [first, end] = *ends_.begin();
+    const RunRange part{{first}, std::min(count_max - taken.size(), end - first)};
+    taken.add(part);
+    remove(part);
+  }
+  return taken;
 }
 
 bool RunSet::contains(RunIndex run) const {

@@ -31,10 +31,8 @@ class RunSet {
   /// Removes those runs of the range that are in the set.
   void remove(RunRange range);
   void remove(const RunSet& runs);
-  /// Removes and returns the longest range at the beginning of the set with at most `count_max`
-  /// runs. @pre Not empty; count_max > 0.
-  [[nodiscard]] RunRange take_first(std::uint64_t count_max);
-
+  /// Removes and returns the first `count_max` runs, or all if they are fewer.
+  [[nodiscard]] RunSet take_first(std::uint64_t count_max);
   /// Removes and returns the last `count` runs. @pre There are that many.
   [[nodiscard]] RunSet take_last(std::uint64_t count);
 

@@ -21,7 +21,7 @@ TEST(RunSet, HoldsABillionRunsAsOneRange) {
   RunSet runs(range(0, num_runs_max));
   EXPECT_EQ(runs.size(), num_runs_max);
   EXPECT_EQ(runs.ranges().size(), 1U);
-  EXPECT_EQ(runs.take_first(10), range(0, 10));
+  EXPECT_EQ(runs.take_first(10), RunSet(range(0, 10)));
   EXPECT_EQ(runs.ranges().size(), 1U);
 }
 
