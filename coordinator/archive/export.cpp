@@ -27,33 +27,6 @@ using detail::Hdf5Handle;
 
 constexpr hsize_t chunk_rows = 2048;
 
-/// A dataset with one number a run, written a chunk at a time.
-template <typename Number>
-class Column {
- public:
-  /// @param stored  Type in the file, @param given that of Number.
-  Column(const Hdf5File& file, hid_t group, const std::string& name, hid_t stored, hid_t given)
-      : dataset_(file, group, name, {.stored = stored, .given = given, .chunk_rows = chunk_rows}) {
-    rows_.reserve(chunk_rows);
-  }
-
-  [[nodiscard]] hid_t dataset() const { return dataset_.id(); }
-
-  void add(Number value) {
-    rows_.push_back(value);
-    if (rows_.size() == chunk_rows) flush();
-  }
-
-  void flush() {
-    dataset_.append(rows_.data(), rows_.size());
-    rows_.clear();
-  }
-
- private:
-  GrowingDataset dataset_;
-  std::vector<Number> rows_;
-};
-
 /// A type of the numbers from `first` on with these names.
 Hdf5Handle enumeration_type(const Hdf5File& file, std::uint8_t first,
                             const std::vector<std::string_view>& names) {
@@ -80,21 +53,22 @@ Hdf5Handle position_type(const Hdf5File& file, std::vector<std::string_view> nam
   return enumeration_type(file, 0, names);
 }
 
-/// All datasets of an export.
+/// All datasets of an export, with one number a run each.
 class Columns {
  public:
   Columns(const Hdf5File& file, const ResultSchema& schema, std::shared_ptr<const Campaign> draws)
-      : value_columns_(value_columns(schema)),
+      : file_(file),
+        value_columns_(value_columns(schema)),
         draws_(std::move(draws)),
         status_type_(status_type(file)),
         loss_cause_type_(position_type(file, schema.loss_causes)),
-        loss_session_type_(position_type(file, schema.loss_sessions)),
-        run_index_(file, file.root(), "run_index", H5T_STD_U64LE, H5T_NATIVE_UINT64),
-        status_(file, file.root(), "status", status_type_, status_type_),
-        num_draws_(file, file.root(), "num_draws", H5T_STD_U32LE, H5T_NATIVE_UINT32),
-        num_rounds_(file, file.root(), "num_rounds", H5T_STD_U32LE, H5T_NATIVE_UINT32),
-        loss_cause_(file, file.root(), "loss_cause", loss_cause_type_, loss_cause_type_),
-        loss_session_(file, file.root(), "loss_session", loss_session_type_, loss_session_type_) {
+        loss_session_type_(position_type(file, schema.loss_sessions)) {
+    make(file.root(), "run_index", H5T_STD_U64LE, H5T_NATIVE_UINT64);
+    make(file.root(), "status", status_type_, status_type_);
+    make(file.root(), "num_draws", H5T_STD_U32LE, H5T_NATIVE_UINT32);
+    make(file.root(), "num_rounds", H5T_STD_U32LE, H5T_NATIVE_UINT32);
+    make(file.root(), "loss_cause", loss_cause_type_, loss_cause_type_);
+    make(file.root(), "loss_session", loss_session_type_, loss_session_type_);
     Hdf5Handle group;
     std::string_view group_name;
     for (const ValueColumn& column : value_columns_) {
@@ -102,66 +76,58 @@ class Columns {
         group_name = name_of(column.kind);
         group = file.make_group(std::string(group_name));
       }
-      values_.emplace_back(file, group, column.own_name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
-      file.set_text(values_.back().dataset(), "unit", std::string(column.unit));
+      make_value(group, column.own_name, column.unit);
     }
-    if (draws_ != nullptr) add_draw_columns(file);
+    if (draws_ == nullptr) return;
+    group = file.make_group("draw");
+    for (const DrawnQuantity& drawn : draws_->model().drawn()) {
+      make_value(group, std::string(drawn.name), drawn.unit);
+    }
   }
 
   void add(const RunResult& result) {
-    run_index_.add(result.run.value);
-    status_.add(static_cast<std::uint8_t>(result.status));
-    num_draws_.add(result.num_draws);
-    num_rounds_.add(result.num_rounds);
+    auto column = columns_.begin();
+    const auto put = [&](auto number) { (column++)->add(number); };
+    put(result.run.value);
+    put(static_cast<std::uint8_t>(result.status));
+    put(result.num_draws);
+    put(result.num_rounds);
     const bool is_lost = result.status == RunStatus::lost;
-    loss_cause_.add(static_cast<std::uint8_t>(result.loss.cause));
-    loss_session_.add(is_lost ? static_cast<std::uint8_t>(result.loss.session) : std::uint8_t{0});
-    for (std::size_t i = 0; i < values_.size(); ++i) {
-      values_[i].add(value_columns_[i].value_in(result).value_or(no_meaning));
-    }
+    put(static_cast<std::uint8_t>(result.loss.cause));
+    put(is_lost ? static_cast<std::uint8_t>(result.loss.session) : std::uint8_t{0});
+    for (const ValueColumn& value : value_columns_)
+      put(value.value_in(result).value_or(no_meaning));
     if (draws_ == nullptr) return;
     const std::vector<double> drawn = draws_->draw(result.run).values;
-    for (std::size_t i = 0; i < drawn_values_.size(); ++i) {
-      drawn_values_[i].add(drawn.empty() ? no_meaning : drawn[i]);
-    }
+    for (std::size_t i = 0; column != columns_.end(); ++i)
+      put(drawn.empty() ? no_meaning : drawn[i]);
   }
 
   void flush() {
-    run_index_.flush();
-    status_.flush();
-    num_draws_.flush();
-    num_rounds_.flush();
-    loss_cause_.flush();
-    loss_session_.flush();
-    for (Column<double>& column : values_) column.flush();
-    for (Column<double>& column : drawn_values_) column.flush();
+    for (GrowingDataset& column : columns_) column.flush();
   }
 
  private:
   static constexpr double no_meaning = std::numeric_limits<double>::quiet_NaN();
 
-  void add_draw_columns(const Hdf5File& file) {
-    const Hdf5Handle group = file.make_group("draw");
-    for (const DrawnQuantity& drawn : draws_->model().drawn()) {
-      drawn_values_.emplace_back(file, group, std::string(drawn.name), H5T_IEEE_F64LE,
-                                 H5T_NATIVE_DOUBLE);
-      file.set_text(drawn_values_.back().dataset(), "unit", std::string(drawn.unit));
-    }
+  /// @param stored  Type in the file, @param given of the numbers that are put.
+  void make(hid_t group, const std::string& name, hid_t stored, hid_t given) {
+    const detail::DatasetFormat format{.stored = stored, .given = given, .chunk_rows = chunk_rows};
+    columns_.emplace_back(file_, group, name, format);
   }
 
+  void make_value(hid_t group, const std::string& name, std::string_view unit) {
+    make(group, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
+    file_.set_text(columns_.back().id(), "unit", std::string(unit));
+  }
+
+  const Hdf5File& file_;
   std::vector<ValueColumn> value_columns_;
   std::shared_ptr<const Campaign> draws_;  ///< Null without columns of drawn values.
   Hdf5Handle status_type_;
   Hdf5Handle loss_cause_type_;
   Hdf5Handle loss_session_type_;
-  Column<std::uint64_t> run_index_;
-  Column<std::uint8_t> status_;
-  Column<std::uint32_t> num_draws_;
-  Column<std::uint32_t> num_rounds_;
-  Column<std::uint8_t> loss_cause_;
-  Column<std::uint8_t> loss_session_;
-  std::vector<Column<double>> values_;
-  std::vector<Column<double>> drawn_values_;
+  std::vector<GrowingDataset> columns_;
 };
 
 void write_results(const Hdf5File& file, const Store& store, const IsStopped& is_stopped,

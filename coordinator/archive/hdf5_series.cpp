@@ -40,22 +40,17 @@ class SignalTable {
                  {.stored = sample_type(file, *group.info, H5T_IEEE_F64LE),
                   .given = given_,
                   .chunk_rows = samples_per_block}) {
-    rows_.reserve(samples_per_block * (group.info->signals.size() + 1));
     describe(file);
   }
 
   void add(const RecordedSample& sample) {
-    rows_.push_back(sample.time_s);
     const auto values = sample.values.subspan(group_.first_value, group_.info->signals.size());
-    rows_.insert(rows_.end(), values.begin(), values.end());
-    if (++num_rows_ == samples_per_block) flush();
+    row_.assign(1, sample.time_s);
+    row_.insert(row_.end(), values.begin(), values.end());
+    dataset_.add(std::as_bytes(std::span(row_)));
   }
 
-  void flush() {
-    dataset_.append(rows_.data(), num_rows_);
-    rows_.clear();
-    num_rows_ = 0;
-  }
+  void flush() { dataset_.flush(); }
 
  private:
   /// Attributes, of which each has a text for each field.
@@ -75,8 +70,7 @@ class SignalTable {
   SignalSelection::Group group_;
   Hdf5Handle given_;
   GrowingDataset dataset_;
-  std::vector<double> rows_;
-  hsize_t num_rows_ = 0;
+  std::vector<double> row_;
 };
 
 void describe_run(const Hdf5File& file, const SeriesOrigin& origin, const Recording& recording) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/error.hpp"
+#include "coordinator/dispatch/shares.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -26,13 +26,11 @@ RunsByCampaign computed_runs(const State& state, const Worker& worker) {
   std::uint64_t num_left = worker.num_slots;
   for (const LeaseId id : worker.leases) {
     const Lease& lease = state.leases.at(id);
+    if (num_left == 0) break;
     RunSet remaining = lease.remaining;
-    while (num_left > 0 && !remaining.empty()) {
-      const std::uint64_t slots = lease.slots_per_run;
-      const RunRange range = remaining.take_first(std::max<std::uint64_t>(1, num_left / slots));
-      computed[lease.campaign].add(range);
-      num_left -= std::min(num_left, range.count * slots);
-    }
+    const RunSet begun = remaining.take_first(ratio_rounded_up(num_left, lease.slots_per_run));
+    computed[lease.campaign].add(begun);
+    num_left -= std::min(num_left, begun.size() * lease.slots_per_run);
   }
   return computed;
 }
@@ -93,7 +91,7 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
   CampaignState& campaign = state.campaigns.at(id);
   const std::uint32_t num_crashes = ++campaign.audit_crashes[run];
   if (num_crashes < state.config.crashes_per_run_max) return;
-  take_off(state, campaign.audits.at(run), {run, 1});
+  take_off(state, *campaign.audits.find(run), {run, 1});
   campaign.audit_crashes.erase(run);
   outbox.log({.severity = Severity::error,
               .kind = "audit_given_up",
@@ -106,17 +104,15 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
 RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty certainty,
                   const HostId& host, TimePoint now) {
   RunSet blamed;
-  for (const RunRange& range : accused.ranges()) {
-    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-      if (certainty == Certainty::ambiguous && campaign.suspects.contains(run)) continue;
-      Suspicion& suspicion = campaign.suspects[run];
-      Suspicion::OnHost& on_host = suspicion.hosts[host];
-      suspicion.tried_at = now;
-      ++suspicion.num_crashes;
-      ++on_host.num_crashes;
-      if (certainty == Certainty::certain) ++on_host.num_alone;
-      blamed.add({run, 1});
-    }
+  for (const RunIndex run : indices_of(accused.ranges())) {
+    if (certainty == Certainty::ambiguous && campaign.suspects.contains(run)) continue;
+    Suspicion& suspicion = campaign.suspects[run];
+    Suspicion::OnHost& on_host = suspicion.hosts[host];
+    suspicion.tried_at = now;
+    ++suspicion.num_crashes;
+    ++on_host.num_crashes;
+    if (certainty == Certainty::certain) ++on_host.num_alone;
+    blamed.add({run, 1});
   }
   return blamed;
 }
@@ -125,9 +121,8 @@ RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty cert
 RunsByCampaign split_audits(const State& state, RunsByCampaign& accused) {
   RunsByCampaign audits;
   for (auto& [id, runs] : accused) {
-    for (const auto& [run, lease] : state.campaigns.at(id).audits) {
-      if (runs.remove(run)) audits[id].add({run, 1});
-    }
+    audits[id] = runs.overlap(state.campaigns.at(id).audits.runs());
+    runs.remove(audits[id]);
   }
   std::erase_if(accused, [](const auto& item) { return item.second.empty(); });
   return audits;
@@ -143,10 +138,8 @@ RunsByCampaign blame_all(State& state, const HostId& host, RunsByCampaign accuse
   }
   if (!accused.empty()) return blamed;
   for (const auto& [campaign, runs] : audits) {
-    for (const RunRange& range : runs.ranges()) {
-      for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-        count_audit_crash(state, campaign, run, outbox);
-      }
+    for (const RunIndex run : indices_of(runs.ranges())) {
+      count_audit_crash(state, campaign, run, outbox);
     }
   }
   return blamed;
@@ -258,7 +251,7 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   }
   campaign.suspects.erase(run);
   campaign.given_up.add({run, 1});
-  outbox.give_up(id, run);
+  outbox.write(id, GivenUpRun{run});
   outbox.log({.severity = Severity::error,
               .kind = "run_given_up",
               .fields = {{"run", run.value}, {"crashes", suspicion.num_crashes}}},

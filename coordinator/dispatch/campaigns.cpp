@@ -15,12 +15,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-void send_to_all(const State& state, CampaignId id, Outbox& outbox) {
-  for (const auto& [worker, content] : state.workers) {
-    detail::send_not_served(state, worker, id, outbox);
-  }
-}
-
 /// With one crash more a run is given up.
 std::uint32_t num_crashes_before_last(const State& state) {
   return std::max(state.config.crashes_per_run_max, 2U) - 1;
@@ -56,25 +50,18 @@ void restore_audits(CampaignState& campaign, const StoredCampaign& stored) {
   if (!to_audit.empty()) detail::add_to_audit(campaign, unknown, to_audit);
 }
 
-/// Takes back all leases of a campaign.
+/// Takes back all leases of a campaign. Where one that was the first for its runs ends while copies
+/// remain, another first one is opened behind it.
 void recall(State& state, CampaignId id, Outbox& outbox) {
-  std::vector<LeaseId> leases;
-  for (const auto& [lease_id, lease] : state.leases) {
-    if (lease.campaign == id) leases.push_back(lease_id);
+  for (auto next = state.leases.begin(); next != state.leases.end();) {
+    const LeaseId lease = next->first;
+    if (next->second.campaign == id) {
+      const RunSet runs = next->second.remaining;
+      for (const RunRange& range : runs.ranges()) detail::note_unleased(state, lease, range);
+      detail::lose(state, lease, runs, LossReason::retracted, {}, outbox);
+    }
+    next = state.leases.upper_bound(lease);
   }
-  for (const LeaseId lease : leases) {
-    const auto found = state.leases.find(lease);
-    if (found == state.leases.end()) continue;
-    const RunSet runs = found->second.remaining;
-    for (const RunRange& range : runs.ranges()) detail::note_unleased(state, lease, range);
-    detail::lose(state, lease, runs, LossReason::retracted, {}, outbox);
-  }
-}
-
-/// What follows a first lease that ends while copies remain is another first lease.
-void recall_all(State& state, CampaignId id, Outbox& outbox) {
-  const CampaignState& campaign = state.campaigns.at(id);
-  while (!campaign.lent.empty() || !campaign.audits.empty()) recall(state, id, outbox);
 }
 
 }  // namespace
@@ -133,10 +120,8 @@ void on_control(State& state, CampaignId id, int priority, double audit_fraction
 void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   const RunSet runs = std::exchange(campaign.given_up, {});
-  for (const RunRange& range : runs.ranges()) {
-    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
-      campaign.suspects[run].num_crashes = num_crashes_before_last(state);
-    }
+  for (const RunIndex run : indices_of(runs.ranges())) {
+    campaign.suspects[run].num_crashes = num_crashes_before_last(state);
   }
   detail::make_pending(state, id, runs, {1}, outbox);
   if (campaign.phase == Phase::finished && !runs.empty()) campaign.phase = Phase::active;
@@ -172,17 +157,17 @@ void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
 
 void on_cancel(State& state, CampaignId id, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
-  if (campaign.phase == Phase::cancelled || campaign.phase == Phase::finished) return;
+  if (has_ended(campaign.phase)) return;
   campaign.phase = Phase::cancelled;
   detail::sort_served(state);
-  recall_all(state, id, outbox);
-  send_to_all(state, id, outbox);
+  recall(state, id, outbox);
+  detail::send_not_served(state, id, outbox);
 }
 
 void on_removed(State& state, CampaignId id, Outbox& outbox) {
   const CampaignState& campaign = state.campaigns.at(id);
   PROOFMASS_EXPECT(campaign.delivered.empty());
-  recall_all(state, id, outbox);
+  recall(state, id, outbox);
   if (has_ended(campaign.phase)) state.ended[id] = campaign.definition->num_runs;
   state.campaigns.erase(id);
   std::erase(state.order, id);
@@ -193,10 +178,11 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
     worker.run_time_s.erase(id);
     worker.card_work.erase(id);
     worker.unleased.erase(id);
+    worker.joined.erase(id);
     std::erase_if(worker.computing,
                   [&](const Progress& progress) { return progress.campaign == id; });
   }
-  send_to_all(state, id, outbox);
+  detail::send_not_served(state, id, outbox);
 }
 
 void on_ended(State& state, CampaignId id, std::uint64_t num_runs) {

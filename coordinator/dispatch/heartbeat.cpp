@@ -99,8 +99,7 @@ struct Adoption {
                              .is_retracted = is_paused,
                              .is_adopted = true,
                              .remaining = runs,
-                             .lent_at = now,
-                             .audited = {}});
+                             .lent_at = now});
   }
 };
 
@@ -199,8 +198,7 @@ void repeat_retracts(const State& state, WorkerId id, Outbox& outbox) {
 
 bool is_wanted(const State& state, CampaignId id) {
   const auto found = state.campaigns.find(id);
-  return found != state.campaigns.end() && found->second.phase != Phase::cancelled &&
-         found->second.phase != Phase::finished;
+  return found != state.campaigns.end() && !has_ended(found->second.phase);
 }
 
 /// Runs of one campaign that the worker holds.

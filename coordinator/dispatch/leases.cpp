@@ -27,6 +27,12 @@ void note_slots(State& state, Worker& worker, bool is_for_cards, std::uint64_t n
   if (worker.is_eligible) state.num_idle_slots += num_idle_slots(worker);
 }
 
+/// Where the runs of such leases are; null of copies, of which a run may be on several.
+LeaseIndex* index_of(CampaignState& campaign, LeaseKind kind) {
+  if (kind == LeaseKind::copy) return nullptr;
+  return kind == LeaseKind::first ? &campaign.lent : &campaign.audits;
+}
+
 /// A copy becomes the first lease of its run.
 void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
   const Lease& old = state.leases.at(copy);
@@ -36,8 +42,7 @@ void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
               .known_as = old.known_as,
               .is_retracted = old.is_retracted,
               .remaining = RunSet(RunRange{run, 1}),
-              .lent_at = old.lent_at,
-              .audited = {}};
+              .lent_at = old.lent_at};
   take_off(state, copy, {run, 1});
   (void)open_lease(state, std::move(lease));
 }
@@ -78,15 +83,15 @@ RunSet promote_copies(State& state, CampaignId id, RunSet runs, Outbox& outbox) 
   return runs;
 }
 
-void record_losses(const State& state, const Lease& lease, const RunSet& runs, LossReason reason,
+void record_losses(const Lease& lease, Worker& worker, const RunSet& runs, LossReason reason,
                    bool is_blamed, Outbox& outbox) {
   for (const RunRange& range : runs.ranges()) {
-    outbox.record(lease.campaign, lease.worker,
-                  {.runs = range,
-                   .attempt = lease.attempt,
-                   .worker = state.workers.at(lease.worker).session,
-                   .reason = reason,
-                   .is_blamed = is_blamed});
+    note_joined(lease.campaign, worker, outbox);
+    outbox.write(lease.campaign, ReturnedRuns{.runs = range,
+                                              .attempt = lease.attempt,
+                                              .worker = worker.session,
+                                              .reason = reason,
+                                              .is_blamed = is_blamed});
   }
 }
 
@@ -150,18 +155,14 @@ LeaseId open_lease(State& state, Lease lease) {
   lease.num_slots = std::max(lease.num_slots, lease.num_runs * lease.slots_per_run);
   const LeaseId id{state.next_lease++};
   for (const RunRange& range : lease.remaining.ranges()) {
-    if (lease.kind == LeaseKind::first) {
-      campaign.lent.add(range, id);
+    if (LeaseIndex* const index = index_of(campaign, lease.kind)) {
+      index->add(range, id);
       continue;
     }
     for (std::uint64_t run = range.first.value; run < range.end(); ++run) {
-      if (lease.kind == LeaseKind::audit) {
-        campaign.audits.emplace(RunIndex{run}, id);
-      } else {
-        Copies& copies = campaign.copies[{run}];
-        copies.leases.push_back(id);
-        copies.newest = std::max(copies.newest, lease.attempt);
-      }
+      Copies& copies = campaign.copies[{run}];
+      copies.leases.push_back(id);
+      copies.newest = std::max(copies.newest, lease.attempt);
     }
   }
   Worker& worker = state.workers.at(lease.worker);
@@ -182,15 +183,11 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   const std::uint64_t num_slots_before = num_slots_taken(lease);
   lease.remaining.remove(runs);
   PROOFMASS_EXPECT(size_before - lease.remaining.size() == runs.count);
-  if (lease.kind == LeaseKind::first) {
-    campaign.lent.remove(runs);
+  if (LeaseIndex* const index = index_of(campaign, lease.kind)) {
+    index->remove(runs);
   } else {
     for (std::uint64_t run = runs.first.value; run < runs.end(); ++run) {
-      if (lease.kind == LeaseKind::audit) {
-        campaign.audits.erase({run});
-      } else {
-        std::erase(campaign.copies.at({run}).leases, id);
-      }
+      std::erase(campaign.copies.at({run}).leases, id);
     }
   }
   Worker& worker = state.workers.at(lease.worker);
@@ -220,6 +217,16 @@ void note_unleased(State& state, LeaseId id, RunRange runs) {
   worker.clear_at = std::max(worker.clear_at, lease.lent_at + state.config.arrival_max);
 }
 
+void note_joined(CampaignId campaign, Worker& worker, Outbox& outbox) {
+  if (!worker.joined.insert(campaign).second) return;
+  outbox.write(campaign, WorkerJoined{.session = worker.session,
+                                      .name = worker.name,
+                                      .host = worker.host_name,
+                                      .process_id = worker.process_id,
+                                      .num_slots = worker.num_slots,
+                                      .cards = worker.cards});
+}
+
 void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const RunSet& blamed,
           Outbox& outbox) {
   const Lease lease = state.leases.at(id);
@@ -227,8 +234,9 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
   const RunSet guilty = runs.overlap(blamed);
   RunSet others = runs;
   others.remove(guilty);
-  record_losses(state, lease, guilty, reason, true, outbox);
-  record_losses(state, lease, others, reason, false, outbox);
+  Worker& worker = state.workers.at(lease.worker);
+  record_losses(lease, worker, guilty, reason, true, outbox);
+  record_losses(lease, worker, others, reason, false, outbox);
   log_loss(lease, runs, reason, guilty, outbox);
   for (const RunRange& range : runs.ranges()) take_off(state, id, range);
   state.hungry.insert(lease.worker);  // It has room for others now.
@@ -331,6 +339,7 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
   }
   state.hungry.erase(id);
   state.awaited.erase(worker.session);
+  outbox.write({}, WorkerEnded{.session = worker.session, .reason = reason});
   state.workers.erase(id);
 }
 

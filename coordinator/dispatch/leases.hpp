@@ -32,6 +32,10 @@ void take_off(State& state, LeaseId lease, RunRange runs);
 /// To be called before runs are taken off a lease while their worker may still compute them.
 void note_unleased(State& state, LeaseId lease, RunRange runs);
 
+/// To be called when a worker is lent runs of a campaign, and before anything of it is written to
+/// the campaign's file: the file then knows it. A worker that was lent none changes no file.
+void note_joined(CampaignId campaign, Worker& worker, Outbox& outbox);
+
 /// The worker will not deliver these runs of a lease: they become pending again, or go on at a
 /// worker that has a copy.
 /// @param blamed  Runs against which the loss counts; of this campaign.

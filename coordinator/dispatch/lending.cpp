@@ -25,14 +25,6 @@ void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& 
   }
 }
 
-RunSet take_first(RunSet& runs, std::uint64_t count_max) {
-  RunSet taken;
-  while (taken.size() < count_max && !runs.empty()) {
-    taken.add(runs.take_first(count_max - taken.size()));
-  }
-  return taken;
-}
-
 /// One worker that is being lent runs of one campaign, for its processors or its cards.
 struct Borrower {
   State& state;
@@ -59,8 +51,7 @@ struct Borrower {
             .is_for_cards = is_for_cards,
             .num_slots = share.slots_for(runs.size()),
             .remaining = std::move(runs),
-            .lent_at = now,
-            .audited = {}};
+            .lent_at = now};
   }
   /// A card that was idle begins to be measured anew.
   void note_card_work() const {
@@ -82,7 +73,7 @@ void lend_pending(const Borrower& borrower) {
   while (borrower.missing() > 0 && !pending.empty()) {
     const auto newest = std::prev(pending.end());
     const Attempt attempt = newest->first;
-    RunSet runs = take_first(newest->second, borrower.missing_of_lease());
+    RunSet runs = newest->second.take_first(borrower.missing_of_lease());
     if (newest->second.empty()) pending.erase(newest);
     borrower.open(borrower.lease_of(std::move(runs), attempt));
   }
@@ -108,7 +99,7 @@ void lend_audits(const Borrower& borrower) {
       next = to_audit.begin();
     }
     const AuditKey key = next->first;
-    RunSet runs = take_first(next->second, borrower.missing_of_lease());
+    RunSet runs = next->second.take_first(borrower.missing_of_lease());
     borrower.campaign.num_to_audit -= runs.size();
     if (next->second.empty()) to_audit.erase(next);
     Lease lease = borrower.lease_of(std::move(runs), key.attempt);
@@ -242,8 +233,9 @@ bool is_backed_up(const State& state, const CampaignState& campaign) {
   return 2 * num_under_way >= state.config.uncommitted_max;
 }
 
-void send_lease(const State& state, LeaseId id, Outbox& outbox) {
+void send_lease(State& state, LeaseId id, Outbox& outbox) {
   const Lease& lease = state.leases.at(id);
+  note_joined(lease.campaign, state.workers.at(lease.worker), outbox);
   const Campaign& campaign = *state.campaigns.at(lease.campaign).definition;
   for (const RunRange& runs : lease.remaining.ranges()) {
     proto::Envelope envelope;
@@ -281,6 +273,10 @@ void send_not_served(const State& state, WorkerId worker, CampaignId id, Outbox&
   send_not_served(worker, id, {}, outbox);
 }
 
+void send_not_served(const State& state, CampaignId id, Outbox& outbox) {
+  for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
+}
+
 void send_not_served(WorkerId worker, CampaignId id, std::span<const RunRange> runs,
                      Outbox& outbox) {
   proto::Envelope envelope;
@@ -291,8 +287,7 @@ void send_not_served(WorkerId worker, CampaignId id, std::span<const RunRange> r
 
 void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
-  if (campaign.phase == Phase::finished || campaign.phase == Phase::cancelled) return;
-  if (!is_finished(campaign)) return;
+  if (has_ended(campaign.phase) || !is_finished(campaign)) return;
   campaign.phase = Phase::finished;
   sort_served(state);
   const std::uint64_t num_elsewhere = campaign.elsewhere.size();
@@ -305,7 +300,7 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
                          {"duplicates", campaign.num_duplicates},
                          {"compared", campaign.num_audited}}},
              id);
-  for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
+  send_not_served(state, id, outbox);
 }
 
 void settle(State& state, TimePoint now, Outbox& outbox) {

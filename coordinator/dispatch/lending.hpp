@@ -32,7 +32,7 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 [[nodiscard]] bool is_backed_up(const State& state, const CampaignState& campaign);
 
 /// Tells the worker of a new lease.
-void send_lease(const State& state, LeaseId lease, Outbox& outbox);
+void send_lease(State& state, LeaseId lease, Outbox& outbox);
 
 /// To be called whenever the phase or the priority of a campaign has changed.
 void sort_served(State& state);
@@ -41,6 +41,8 @@ void sort_served(State& state);
 /// them if the campaign is finished or cancelled, and otherwise to keep their results.
 void send_not_served(const State& state, WorkerId worker, CampaignId campaign, Outbox& outbox);
 
+/// send_not_served() for all workers.
+void send_not_served(const State& state, CampaignId campaign, Outbox& outbox);
 /// Tells the worker to keep the results of these runs; without a run, of the whole campaign.
 void send_not_served(WorkerId worker, CampaignId campaign, std::span<const RunRange> runs,
                      Outbox& outbox);
@@ -51,5 +53,10 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox);
 /// To be called after runs were lost or given up: ends campaigns that are finished now, and lends
 /// runs to workers that would take more.
 void settle(State& state, TimePoint now, Outbox& outbox);
+
+/// The end of a campaign: no run is pending, and some workers are idle while others still compute.
+/// Idle workers first receive runs that wait at other workers, and then copies of runs that take
+/// too long.
+void speculate(State& state, TimePoint now, Outbox& outbox);
 
 }  // namespace proofmass::coordinator::detail

@@ -35,18 +35,13 @@ class Outbox {
   virtual void send_definition(wire::WorkerId worker, wire::CampaignId campaign,
                                std::uint64_t offset,
                                const std::shared_ptr<const Campaign>& definition) = 0;
-  /// Must lead to on_committed() with this run once the result is durable, or to the end of the
-  /// service. Called at most once for a run.
-  virtual void store(wire::WorkerId worker, wire::LeasedResult result) = 0;
-  /// Must lead to on_compared() with the run once the result has been compared with the stored one.
-  /// Called for runs that were handed to store() before, or committed.
-  virtual void compare(wire::WorkerId worker, wire::LeasedResult result) = 0;
-  /// Keeps for the history of attempts that runs came back. It need not be durable at once.
-  /// @param worker  Which held them, in the session that is named.
-  virtual void record(wire::CampaignId campaign, wire::WorkerId worker,
-                      const ReturnedRuns& returned) = 0;
-  /// The run crashed too many workers: keeps it as given up, so that the campaign can end.
-  virtual void give_up(wire::CampaignId campaign, RunIndex run) = 0;
+  /// Keeps an entry in the file of the campaign, or in all files that it concerns (WorkerEnded) if
+  /// the campaign is 0. A Delivery must lead to on_committed() with its run once it is durable, or
+  /// to the end of the service; there is at most one of a run. A SecondDelivery, of a run with a
+  /// Delivery before it or committed, must lead to on_compared(). The others need not be durable at
+  /// once.
+  virtual void write(wire::CampaignId campaign, Entry entry) = 0;
+
   virtual void log(Event event, wire::CampaignId campaign) = 0;
   /// An event that concerns all campaigns.
   void log(Event event) { log(std::move(event), wire::CampaignId{}); }

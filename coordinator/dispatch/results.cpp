@@ -40,6 +40,7 @@ void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_
 struct Intake {
   State& state;
   WorkerId id;
+  Worker& worker;
   CampaignId campaign_id;
   CampaignState& campaign;
   Attempt attempt;
@@ -53,8 +54,7 @@ struct Intake {
       campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
       state.finished_at = state.ticked_at;
       if (!computed.result.is_completed()) ++campaign.num_without_estimate;
-      outbox.store(id, leased(std::move(computed)));
-      return;
+      return outbox.write(campaign_id, delivery_of(std::move(computed)));
     }
     const auto delivered = campaign.delivered.find(run);
     if (delivered == campaign.delivered.end()) {
@@ -71,8 +71,12 @@ struct Intake {
   }
 
  private:
-  [[nodiscard]] wire::LeasedResult leased(wire::ComputedRun computed) const {
-    return {.campaign = campaign_id, .attempt = attempt, .computed = std::move(computed)};
+  [[nodiscard]] Delivery delivery_of(wire::ComputedRun computed) const {
+    detail::note_joined(campaign_id, worker, outbox);
+    return {.result = std::move(computed.result),
+            .worker = worker.session,
+            .attempt = attempt,
+            .compute_s = computed.compute_s};
   }
 
   // What a worker sends again and again must not fill the memory: one that is not compared, is
@@ -80,15 +84,14 @@ struct Intake {
   void compare(wire::ComputedRun computed) {
     if (campaign.num_comparing >= state.config.uncommitted_max) return;
     ++campaign.num_comparing;
-    outbox.compare(id, leased(std::move(computed)));
+    outbox.write(campaign_id, SecondDelivery{delivery_of(std::move(computed))});
   }
 
   /// True if the run was on an audit lease of this worker.
   bool end_audit(RunIndex run) {
-    const auto audit = campaign.audits.find(run);
-    if (audit == campaign.audits.end()) return false;
-    if (state.leases.at(audit->second).worker != id) return false;
-    detail::take_off(state, audit->second, {run, 1});
+    const std::optional<LeaseId> audit = campaign.audits.find(run);
+    if (!audit || state.leases.at(*audit).worker != id) return false;
+    detail::take_off(state, *audit, {run, 1});
     campaign.audit_crashes.erase(run);
     return true;
   }
@@ -130,7 +133,6 @@ bool is_lent_to(const State& state, const CampaignState& campaign, RunIndex run,
 /// the worker: a draw takes longer than all else here.
 bool is_made_up(const State& state, const CampaignState& campaign, const RunResult& result,
                 WorkerId id) {
-  if (result.run.value >= campaign.definition->num_runs) return false;
   if (is_lent_to(state, campaign, result.run, id)) return false;
   if (campaign.committed.contains(result.run) || campaign.delivered.contains(result.run)) {
     return false;
@@ -154,7 +156,7 @@ std::string broken_rule(const State& state, const CampaignState& campaign,
     if (!broken.empty()) {
       return fmt::format("run {}: {}", computed.result.run.value, broken.front());
     }
-    if (is_made_up(state, campaign, computed.result, id)) {
+    if (!is_foreign(campaign, computed) && is_made_up(state, campaign, computed.result, id)) {
       return fmt::format("run {}: truth (must be what the run draws)", computed.result.run.value);
     }
   }
@@ -226,19 +228,16 @@ void leave_out_cards(State& state, Worker& worker, CampaignId id, Outbox& outbox
 /// The worker and its host can compute: what they show with every result.
 void count_results(State& state, Worker& worker, CampaignId id,
                    std::span<const wire::ComputedRun> results, TimePoint now) {
+  if (results.empty()) return;
   CampaignState& campaign = state.campaigns.at(id);
-  const auto num_results = static_cast<std::uint64_t>(std::ranges::count_if(
-      results, [&](const auto& computed) { return !is_foreign(campaign, computed); }));
-  if (num_results == 0) return;
   Host& host = state.hosts.at(worker.host);
   host.num_crashes = 0;
-  host.num_results += num_results;
-  worker.num_results += num_results;
+  host.num_results += results.size();
+  worker.num_results += results.size();
   campaign.outside_crashes.erase(worker.session);
   worker.num_retracts = 0;
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : results) {
-    if (is_foreign(campaign, computed)) continue;
     count_run_time(state, worker, id, campaign, computed, now);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
   }
@@ -268,12 +267,11 @@ void on_results(State& state, WorkerId id, CampaignId campaign_id, Attempt attem
     outbox.send(id, wire::rejection(proto::REJECT_REASON_MALFORMED, broken));
     return on_gone(state, id, LossReason::protocol, now, outbox);
   }
+  std::erase_if(results, [&](const auto& computed) { return is_foreign(campaign, computed); });
   count_results(state, *worker, campaign_id, results, now);
   const bool have_left_runs = have_cards_left_runs(state, *worker, campaign.lent, results);
-  Intake intake{state, id, campaign_id, campaign, attempt, outbox, {}, {}};
-  for (wire::ComputedRun& computed : results) {
-    if (!is_foreign(campaign, computed)) intake.take(std::move(computed));
-  }
+  Intake intake{state, id, *worker, campaign_id, campaign, attempt, outbox, {}, {}};
+  for (wire::ComputedRun& computed : results) intake.take(std::move(computed));
   if (have_left_runs) leave_out_cards(state, *worker, campaign_id, outbox);
   if (!intake.durable.empty()) {
     send_acks(state, campaign_id, {{id, std::move(intake.durable)}}, outbox);

@@ -18,7 +18,7 @@ void on_results(State& state, WorkerId id, CampaignId campaign, Attempt attempt,
                 std::vector<wire::ComputedRun> results, TimePoint now, Outbox& outbox);
 
 /// Results that went to the store are durable: acknowledges them.
-/// @pre Each run was handed to Outbox::store() and is named here for the first time.
+/// @pre Each run had a Delivery and is named here for the first time.
 void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, TimePoint now,
                   Outbox& outbox);
 /// A result was compared with the stored one.

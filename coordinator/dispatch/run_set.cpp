@@ -31,15 +31,8 @@ void RunSet::add(const RunSet& runs) {
 }
 
 bool RunSet::remove(RunIndex run) {
-  auto found = ends_.upper_bound(run.value);
-  if (found == ends_.begin()) return false;
-  --found;
-  const auto [first, end] = *found;
-  if (run.value >= end) return false;
-  ends_.erase(found);
-  if (first < run.value) ends_.emplace(first, run.value);
-  if (run.value + 1 < end) ends_.emplace(run.value + 1, end);
-  --size_;
+  if (!contains(run)) return false;
+  remove(RunRange{run, 1});
   return true;
 }
 
@@ -63,14 +56,15 @@ void RunSet::remove(const RunSet& runs) {
   for (const auto& [first, end] : runs.ends_) remove({.first = {first}, .count = end - first});
 }
 
-RunRange RunSet::take_first(std::uint64_t count_max) {
-  PROOFMASS_EXPECT(!empty() && count_max > 0);
-  const auto [first, end] = *ends_.begin();
-  const std::uint64_t count = std::min(count_max, end - first);
-  ends_.erase(ends_.begin());
-  if (first + count < end) ends_.emplace(first + count, end);
-  size_ -= count;
-  return {.first = {first}, .count = count};
+RunSet RunSet::take_first(std::uint64_t count_max) {
+  RunSet taken;
+  while (taken.size() < count_max && !empty()) {
+    const auto [first, end] = *ends_.begin();
+    const RunRange part{{first}, std::min(count_max - taken.size(), end - first)};
+    taken.add(part);
+    remove(part);
+  }
+  return taken;
 }
 
 bool RunSet::contains(RunIndex run) const {
@@ -133,59 +127,24 @@ std::string to_text(const RunSet& runs) {
 }
 
 void LeaseIndex::add(RunRange runs, LeaseId lease) {
-  const auto next = entries_.lower_bound(runs.first.value);
-  PROOFMASS_EXPECT(next == entries_.end() || next->first >= runs.end());
-  PROOFMASS_EXPECT(next == entries_.begin() || std::prev(next)->second.end <= runs.first.value);
-  entries_.emplace_hint(next, runs.first.value, Entry{.end = runs.end(), .lease = lease});
-  size_ += runs.count;
+  const std::uint64_t num_before = runs_.size();
+  runs_.add(runs);
+  PROOFMASS_EXPECT(runs_.size() - num_before == runs.count);
+  leases_.emplace(runs.first.value, lease);
 }
 
 void LeaseIndex::remove(RunRange runs) {
-  std::uint64_t first = runs.first.value;
-  while (first < runs.end()) {
-    auto found = entries_.upper_bound(first);
-    PROOFMASS_EXPECT(found != entries_.begin());
-    --found;
-    const std::uint64_t entry_first = found->first;
-    const Entry entry = found->second;
-    PROOFMASS_EXPECT(first < entry.end);
-    const std::uint64_t end = std::min(entry.end, runs.end());
-    auto next = entries_.erase(found);
-    if (end < entry.end) next = entries_.emplace_hint(next, end, entry);
-    if (entry_first < first) {
-      entries_.emplace_hint(next, entry_first, Entry{.end = first, .lease = entry.lease});
-    }
-    size_ -= end - first;
-    first = end;
-  }
+  // Of a lease that goes on behind the range, the next run is the first now.
+  if (const auto behind = find({runs.end()})) leases_.emplace(runs.end(), *behind);
+  leases_.erase(leases_.lower_bound(runs.first.value), leases_.lower_bound(runs.end()));
+  const std::uint64_t num_before = runs_.size();
+  runs_.remove(runs);
+  PROOFMASS_EXPECT(num_before - runs_.size() == runs.count);
 }
 
 std::optional<LeaseId> LeaseIndex::find(RunIndex run) const {
-  const auto next = entries_.upper_bound(run.value);
-  if (next == entries_.begin()) return std::nullopt;
-  const Entry& entry = std::prev(next)->second;
-  if (run.value >= entry.end) return std::nullopt;
-  return entry.lease;
-}
-
-RunSet LeaseIndex::overlap(RunRange runs) const {
-  RunSet overlap;
-  auto entry = entries_.upper_bound(runs.first.value);
-  if (entry != entries_.begin()) --entry;
-  for (; entry != entries_.end() && entry->first < runs.end(); ++entry) {
-    const std::uint64_t first = std::max(entry->first, runs.first.value);
-    const std::uint64_t end = std::min(entry->second.end, runs.end());
-    if (first < end) overlap.add({.first = {first}, .count = end - first});
-  }
-  return overlap;
-}
-
-RunSet LeaseIndex::runs() const {
-  RunSet runs;
-  for (const auto& [first, entry] : entries_) {
-    runs.add({.first = {first}, .count = entry.end - first});
-  }
-  return runs;
+  if (!runs_.contains(run)) return std::nullopt;
+  return std::prev(leases_.upper_bound(run.value))->second;
 }
 
 }  // namespace proofmass::coordinator

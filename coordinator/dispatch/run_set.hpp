@@ -31,10 +31,8 @@ class RunSet {
   /// Removes those runs of the range that are in the set.
   void remove(RunRange range);
   void remove(const RunSet& runs);
-  /// Removes and returns the longest range at the beginning of the set with at most `count_max`
-  /// runs. @pre Not empty; count_max > 0.
-  [[nodiscard]] RunRange take_first(std::uint64_t count_max);
-
+  /// Removes and returns the first `count_max` runs, or all if they are fewer.
+  [[nodiscard]] RunSet take_first(std::uint64_t count_max);
   /// Removes and returns the last `count` runs. @pre There are that many.
   [[nodiscard]] RunSet take_last(std::uint64_t count);
 
@@ -64,7 +62,7 @@ struct LeaseId {
   auto operator<=>(const LeaseId&) const = default;
 };
 
-/// Which lease each of a campaign's lent runs is on. Kept as ranges, like RunSet.
+/// Which lease each of some runs of a campaign is on.
 class LeaseIndex {
  public:
   /// @pre None of the runs is in the index.
@@ -73,19 +71,12 @@ class LeaseIndex {
   void remove(RunRange runs);
 
   [[nodiscard]] std::optional<LeaseId> find(RunIndex run) const;
-  /// The runs of the range that are in the index.
-  [[nodiscard]] RunSet overlap(RunRange runs) const;
-  [[nodiscard]] bool empty() const { return entries_.empty(); }
-  [[nodiscard]] std::uint64_t size() const { return size_; }  ///< Number of runs.
-  [[nodiscard]] RunSet runs() const;
+  [[nodiscard]] const RunSet& runs() const { return runs_; }
+  [[nodiscard]] bool empty() const { return runs_.empty(); }
 
  private:
-  struct Entry {
-    std::uint64_t end = 0;  ///< One past the last run.
-    LeaseId lease;
-  };
-  std::map<std::uint64_t, Entry> entries_;  ///< By their first run.
-  std::uint64_t size_ = 0;
+  RunSet runs_;
+  std::map<std::uint64_t, LeaseId> leases_;  ///< By the first run of each of its ranges.
 };
 
 }  // namespace proofmass::coordinator

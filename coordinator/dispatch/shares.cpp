@@ -43,7 +43,7 @@ std::uint64_t num_waiting_in_all(const State& state, const Worker& worker,
 
 /// Rounds that all workers may have without more results than the memory should hold.
 std::uint64_t rounds_with_room(const State& state, const CampaignState& campaign) {
-  const std::uint64_t num_uncommitted = campaign.lent.size() + campaign.delivered.size();
+  const std::uint64_t num_uncommitted = campaign.lent.runs().size() + campaign.delivered.size();
   const std::uint64_t room_max = state.config.uncommitted_max;
   const std::uint64_t room = room_max - std::min(room_max, num_uncommitted);
   return std::max<std::uint64_t>(2, room / (2 * state.num_slots));

@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/speculation.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -163,8 +161,7 @@ class Copying {
                                                 .known_as = attempt,
                                                 .kind = LeaseKind::copy,
                                                 .remaining = std::move(runs),
-                                                .lent_at = now_,
-                                                .audited = {}});
+                                                .lent_at = now_});
       send_lease(state_, lease, outbox);
     }
     if (!runs_.empty()) detail::lend(state_, id_, now_, outbox);

@@ -16,6 +16,7 @@ State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, T
   State state;
   state.config = config;
   state.attached = awaited;
+  state.absent = awaited;
   state.awaited = std::move(awaited);
   state.awaited_until = now + config.reattach_wait;
   state.num_slots_expected = config.num_slots_expected;

@@ -145,6 +145,7 @@ struct Worker {
   bool is_eligible = false;
   std::uint64_t num_steps_done = 0;
   std::uint64_t num_results = 0;
+  std::set<CampaignId> joined;      ///< Campaigns whose files know it.
   std::vector<Progress> computing;  ///< As the newest heartbeat has it.
   std::set<LeaseId> leases;
   std::uint64_t num_alone = 0;  ///< Suspects on its leases; nothing else is lent with one.
@@ -193,7 +194,7 @@ struct Lease {
   std::uint64_t num_slots = 0;
   RunSet remaining;
   TimePoint lent_at;
-  WorkerId audited;  ///< Of an audit: whose results are compared; 0 if not known.
+  WorkerId audited = {};  ///< Of an audit: whose results are compared; 0 if not known.
 };
 
 /// Slots that the remaining runs of a lease take.
@@ -274,7 +275,7 @@ struct CampaignState {
   std::map<RunIndex, Copies> copies;                    ///< Of runs in `lent`, once there was one.
   std::map<AuditKey, RunSet> to_audit;                  ///< Committed, and not lent for audit yet.
   std::uint64_t num_to_audit = 0;                       ///< Runs in `to_audit`.
-  std::map<RunIndex, LeaseId> audits;                   ///< Runs on audit leases.
+  LeaseIndex audits;                                    ///< Runs on audit leases.
   std::map<RunIndex, std::uint32_t> audit_crashes;      ///< Of runs in `to_audit` or `audits`.
   std::uint64_t num_comparing = 0;                      ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
@@ -356,6 +357,7 @@ struct State {
   TimePoint awaited_until{};
   /// Sessions that were lent runs before this coordinator started: which, is not known.
   std::set<SessionId> attached;
+  std::set<SessionId> absent;  ///< Of these, those that have not registered since.
   /// Runs that were taken off the leases of a session, which it may still hold; of
   /// `num_workers_max` sessions at most.
   std::map<SessionId, std::map<CampaignId, RunSet>> lent_before;

@@ -12,7 +12,6 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/speculation.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/conversions.hpp"
@@ -114,6 +113,7 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   for (const proto::OtherModel& other : hello.other_models()) {
     worker.models.push_back({other.version(), other.reference_digest()});
   }
+  state.absent.erase(session);
   worker.registered_at = now;
   worker.heard_at = now;
   worker.heartbeat_at = now;
@@ -224,6 +224,15 @@ void end_quarantines(State& state, Outbox& outbox) {
     }
     return is_over;
   });
+}
+
+/// Once all that should be attached have said what they hold, or had the time to, the others are
+/// gone.
+void end_absent(State& state, Outbox& outbox) {
+  if (!state.awaited.empty()) return;
+  for (const SessionId session : std::exchange(state.absent, {})) {
+    outbox.write({}, WorkerEnded{.session = session, .reason = LossReason::silent});
+  }
 }
 
 void send_to_all(const State& state, const proto::Envelope& message, Outbox& outbox) {
@@ -408,7 +417,8 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
   end_quarantines(state, outbox);
   detail::give_up_untried(state, outbox);
   detail::pause_crashing_campaigns(state, outbox);
-  if (!state.awaited.empty() && now >= state.awaited_until) state.awaited.clear();
+  if (now >= state.awaited_until) state.awaited.clear();
+  end_absent(state, outbox);
   const Duration lost_after =
       state.is_behind ? state.config.lost_after_if_behind : state.config.lost_after;
   std::vector<WorkerId> silent;
@@ -438,6 +448,13 @@ void on_stop(State& state, Outbox& outbox) {
   state.is_lending = false;
   state.is_stopped = true;
   send_to_all(state, stop_message(), outbox);
+}
+
+void on_end(State& state, Outbox& outbox) {
+  end_absent(state, outbox);
+  for (const auto& [id, worker] : state.workers) {
+    outbox.write({}, WorkerEnded{.session = worker.session, .reason = LossReason::drained});
+  }
 }
 
 }  // namespace proofmass::coordinator

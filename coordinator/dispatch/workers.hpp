@@ -67,6 +67,8 @@ void on_tick(State& state, TimePoint now, Outbox& outbox);
 void on_drain(State& state, Outbox& outbox);
 /// Lends nothing more. Workers drop what they hold and end.
 void on_stop(State& state, Outbox& outbox);
+/// The last event, when all has been stored: workers that have not left are noted as leaving.
+void on_end(State& state, Outbox& outbox);
 
 namespace detail {
 

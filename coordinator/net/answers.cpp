@@ -372,26 +372,22 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
   make_room();
   const auto is_cancelled = std::make_shared<std::atomic<bool>>(false);
   const auto compute = [order, id, is_cancelled]() -> Computed {
-    try {
-      const CopyRemover remover{order.copy};
-      std::unique_ptr<UnnamedFile> file = make_unnamed_file(order.directory);
-      AnswerProcess process(order, *file);
-      process.set_limits(order);
-      const std::optional<int> status =
-          process.follow(Clock::now() + order.duration_max, *is_cancelled);
-      const int exit_code = exit_code_of(status, order);
-      if (order.copy && exit_code != 0) throw Error(process.error_text());
-      if (order.copy) {
-        const int descriptor = open(order.copy->c_str(), O_RDONLY | O_CLOEXEC);
-        if (descriptor < 0) fail(order.copy->string());
-        file = std::make_unique<UnnamedFile>(descriptor);
-      }
-      proto::AnswerReply reply = reply_about(*file, order, exit_code, process.error_text());
-      reply.set_answer_id(id);
-      return {.failure = {}, .file = std::move(file), .reply = std::move(reply)};
-    } catch (const std::exception& error) {
-      return {.failure = error.what(), .file = nullptr, .reply = {}};
+    const CopyRemover remover{order.copy};
+    std::unique_ptr<UnnamedFile> file = make_unnamed_file(order.directory);
+    AnswerProcess process(order, *file);
+    process.set_limits(order);
+    const std::optional<int> status =
+        process.follow(Clock::now() + order.duration_max, *is_cancelled);
+    const int exit_code = exit_code_of(status, order);
+    if (order.copy && exit_code != 0) throw Error(process.error_text());
+    if (order.copy) {
+      const int descriptor = open(order.copy->c_str(), O_RDONLY | O_CLOEXEC);
+      if (descriptor < 0) fail(order.copy->string());
+      file = std::make_unique<UnnamedFile>(descriptor);
     }
+    proto::AnswerReply reply = reply_about(*file, order, exit_code, process.error_text());
+    reply.set_answer_id(id);
+    return {.file = std::move(file), .reply = std::move(reply)};
   };
   computing_.push_back({.owner = asker.name,
                         .respond = std::move(respond),
@@ -429,18 +425,19 @@ void Answers::review() {
 }
 
 void Answers::finish(Computing& computing) {
-  Computed computed = computing.result.get();
-  if (!computed.failure.empty()) return computing.respond(wire::error_reply(computed.failure));
-  // A client that lacks nothing, of an empty answer for example, reads no part of it.
-  kept_.emplace(computed.reply.answer_id(),
-                Kept{.owner = computing.owner,
-                     .file = std::move(computed.file),
-                     .size = computed.reply.size(),
-                     .read_at = context_.now(),
-                     .is_read = computed.reply.offset() >= computed.reply.size()});
-  proto::ReplyEnvelope reply;
-  *reply.mutable_answer() = std::move(computed.reply);
-  computing.respond(std::move(reply));
+  respond_or_say_why(computing.respond, [&] {
+    Computed computed = computing.result.get();
+    // A client that lacks nothing, of an empty answer for example, reads no part of it.
+    kept_.emplace(computed.reply.answer_id(),
+                  Kept{.owner = computing.owner,
+                       .file = std::move(computed.file),
+                       .size = computed.reply.size(),
+                       .read_at = context_.now(),
+                       .is_read = computed.reply.offset() >= computed.reply.size()});
+    proto::ReplyEnvelope reply;
+    *reply.mutable_answer() = std::move(computed.reply);
+    computing.respond(std::move(reply));
+  });
 }
 
 }  // namespace proofmass::coordinator

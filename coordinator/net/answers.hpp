@@ -58,7 +58,6 @@ class Answers {
  private:
   /// What came of a question.
   struct Computed {
-    std::string failure;  ///< Why there is no answer; else empty.
     std::unique_ptr<UnnamedFile> file;
     proto::AnswerReply reply;
   };

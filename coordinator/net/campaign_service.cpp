@@ -22,9 +22,8 @@ std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz)
 
 }  // namespace
 
-CampaignService::CampaignService(const ServiceContext& context, WorkerHistory& history)
+CampaignService::CampaignService(const ServiceContext& context)
     : context_(context),
-      history_(history),
       state_(context.state),
       writer_(context.writer),
       outbox_(context.outbox),
@@ -65,7 +64,7 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   status.set_num_done(campaign.committed.size());
   status.set_num_without_estimate(campaign.num_without_estimate);
   status.set_num_given_up(campaign.given_up.size());
-  status.set_num_lent(campaign.lent.size());
+  status.set_num_lent(campaign.lent.runs().size());
   status.set_num_duplicates(campaign.num_duplicates);
   status.set_num_audited(campaign.num_audited);
   status.set_num_mismatches(campaign.num_mismatches);

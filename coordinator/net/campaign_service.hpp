@@ -19,7 +19,6 @@
 #include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/net/timing.hpp"
-#include "coordinator/net/worker_history.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/wire/client_codec.hpp"
 
@@ -46,8 +45,7 @@ namespace proofmass::coordinator {
 ///     gone      removed by somebody                         any if it comes back
 class CampaignService {
  public:
-  /// @param history  Told which campaigns are closed; outlives this object.
-  CampaignService(const ServiceContext& context, WorkerHistory& history);
+  explicit CampaignService(const ServiceContext& context);
   ~CampaignService();  ///< Waits for statistics that are being computed.
   CampaignService(const CampaignService&) = delete;
   CampaignService& operator=(const CampaignService&) = delete;
@@ -185,6 +183,8 @@ class CampaignService {
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);
   void begin_summary(CampaignId id, Served& served);
+  /// True if no result is on its way, no statistics are to be computed, and nobody changes it.
+  [[nodiscard]] static bool expects_nothing(const CampaignState& campaign, const Served& served);
   /// True if nothing of the campaign is to be stored or computed, and nobody changes it.
   [[nodiscard]] bool is_settled(CampaignId id, const Served& served) const;
   /// True if the campaign is finished, its statistics are there, and nothing is under way.
@@ -199,7 +199,6 @@ class CampaignService {
   void say_not_closed(std::string_view reason);
 
   const ServiceContext& context_;
-  WorkerHistory& history_;
   State& state_;
   StoreWriter& writer_;
   Outbox& outbox_;

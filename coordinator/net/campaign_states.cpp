@@ -188,12 +188,15 @@ void CampaignService::add_unserved(proto::StatusReply& reply) const {
 
 // From served to closed.
 
+bool CampaignService::expects_nothing(const CampaignState& campaign, const Served& served) {
+  return campaign.delivered.empty() && campaign.num_comparing == 0 && !served.is_summary_due &&
+         !served.summary.valid() && !served.is_held;
+}
+
 bool CampaignService::is_settled(CampaignId id, const Served& served) const {
   const CampaignState& campaign = state_.campaigns.at(id);
-  const bool has_statistics = !served.is_summary_due && !served.summary.valid();
-  const bool is_quiet =
-      campaign.delivered.empty() && campaign.num_comparing == 0 && campaign.storage_failure.empty();
-  return has_statistics && is_quiet && !served.is_held && served.written.phase == phase_of(id);
+  return expects_nothing(campaign, served) && campaign.storage_failure.empty() &&
+         served.written.phase == phase_of(id);
 }
 
 bool CampaignService::is_finished_and_settled(CampaignId id, const Served& served) const {
@@ -219,10 +222,8 @@ void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now
 
 void CampaignService::review_rest(CampaignId id, Served& served) {
   const CampaignState& campaign = state_.campaigns.at(id);
-  const bool is_quiet = campaign.lent.empty() && campaign.audits.empty() &&
-                        campaign.delivered.empty() && campaign.num_comparing == 0;
-  const bool is_at_rest = is_quiet && phase_of(id) != Phase::active && !served.is_summary_due &&
-                          !served.summary.valid() && !served.is_held;
+  const bool is_at_rest = expects_nothing(campaign, served) && campaign.lent.empty() &&
+                          campaign.audits.empty() && phase_of(id) != Phase::active;
   if (is_at_rest && !served.is_at_rest) writer_.rest(id);
   served.is_at_rest = is_at_rest;
 }
@@ -254,7 +255,6 @@ void CampaignService::close_ended(CampaignId id) {
   closed.status.set_rate_hz(0.0);
   closed.status.clear_remaining_s();
   const std::filesystem::path file = closed.file;
-  history_.note_closed(id);
   on_removed(state_, id, outbox_);
   on_ended(state_, id, closed.status.num_runs());
   served_.erase(id);

@@ -11,18 +11,6 @@ namespace proofmass::coordinator {
 /// Answers a request, now or later; called once, in the service's thread.
 using Respond = std::function<void(proto::ReplyEnvelope)>;
 
-/// The reply of an action, or the reason why it throws. What is done for a request in its
-/// background part goes through here, because a client waits for as long as its request is not
-/// answered.
-[[nodiscard]] inline proto::ReplyEnvelope outcome_of(
-    const std::function<proto::ReplyEnvelope()>& action) {
-  try {
-    return action();
-  } catch (const std::exception& error) {
-    return wire::error_reply(error.what());
-  }
-}
-
 /// Why an action throws; empty if it does not.
 [[nodiscard]] inline std::string failure_of(const std::function<void()>& action) {
   try {
@@ -33,7 +21,8 @@ using Respond = std::function<void(proto::ReplyEnvelope)>;
   }
 }
 
-/// Lets an action respond; if it throws instead, responds with the reason.
+/// Lets an action respond; if it throws instead, responds with the reason: a client waits for as
+/// long as its request is not answered.
 inline void respond_or_say_why(const Respond& respond, const std::function<void()>& action) {
   try {
     action();

@@ -49,12 +49,6 @@ const Address* Peers::address_of(WorkerId worker) const {
   return found == peers_.end() ? nullptr : &found->second.address;
 }
 
-std::optional<wire::SessionId> Peers::session_of(WorkerId worker) const {
-  const auto found = peers_.find(worker);
-  if (found == peers_.end()) return std::nullopt;
-  return found->second.session;
-}
-
 std::optional<WorkerId> Peers::worker_of(wire::SessionId session) const {
   const auto found = by_session_.find(session.value);
   if (found == by_session_.end()) return std::nullopt;

@@ -65,7 +65,6 @@ class Peers {
   [[nodiscard]] const Address* address_of(wire::WorkerId worker) const;
 
   /// Nothing if the peer has been forgotten.
-  [[nodiscard]] std::optional<wire::SessionId> session_of(wire::WorkerId worker) const;
   [[nodiscard]] std::optional<wire::WorkerId> worker_of(wire::SessionId session) const;
 
   /// All whose addresses are known.

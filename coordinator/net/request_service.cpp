@@ -405,10 +405,8 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
     if (!failure.empty() && !made.empty()) remove_made(made);
     return [this, name, look, made, failure, respond] {
       under_way_.erase(name);
-      respond(outcome_of([&] {
-        if (!failure.empty()) return wire::error_reply(failure);
-        return serve(std::move(*look), made);
-      }));
+      if (!failure.empty()) return respond(wire::error_reply(failure));
+      respond_or_say_why(respond, [&] { respond(serve(std::move(*look), made)); });
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();
@@ -453,10 +451,10 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
         campaigns_.let_go(id);
         return respond(wire::error_reply(failure));
       }
-      respond(outcome_of([&] {
+      respond_or_say_why(respond, [&] {
         campaigns_.change(id, definition, plan, request->message.submit());
-        return campaigns_.done_reply(id);
-      }));
+        respond(campaigns_.done_reply(id));
+      });
     };
   };
   if (!context_.background.post(work)) {

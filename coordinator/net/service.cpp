@@ -20,7 +20,6 @@
 #include "coordinator/net/service_sockets.hpp"
 #include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_gateway.hpp"
-#include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
 #include "proto/link/faults.hpp"
 
@@ -50,10 +49,9 @@ class Service::Impl final : public Outbox {
         sockets_(config, log_),
         state_(initial_state(config.dispatch, sessions_of(campaigns), now())),
         writer_([this] { sockets_.wake(); }, config.writer),
-        history_(state_, writer_, sessions_of(campaigns)),
         worker_gateway_(state_, start_.epoch, worker_callbacks()),
         context_{config_, start_, state_, writer_, background_, *this, [this] { return now(); }},
-        campaign_service_(context_, history_),
+        campaign_service_(context_),
         request_service_(context_, campaign_service_),
         client_gateway_(background_, client_callbacks()),
         background_([this] { sockets_.wake(); }) {
@@ -92,15 +90,12 @@ class Service::Impl final : public Outbox {
   void worker_ended(WorkerId worker, LossReason reason) {
     // What it sent before it ended may still be waiting in the socket.
     receive_from_workers();
-    history_.note_reason(worker, reason);
     on_gone(state_, worker, reason, now(), *this);
   }
 
   // Outbox.
 
   void send(WorkerId worker, proto::Envelope message) override {
-    if (message.has_welcome()) history_.note_registered(worker);
-    if (message.has_run_lease()) history_.note_lent({message.run_lease().campaign()}, worker);
     worker_gateway_.send(worker, std::move(message));
   }
 
@@ -109,27 +104,11 @@ class Service::Impl final : public Outbox {
     worker_gateway_.send_definition(worker, campaign, offset, definition);
   }
 
-  void store(WorkerId worker, wire::LeasedResult result) override {
-    const CampaignId campaign = result.campaign;
-    writer_.write(campaign, delivery_of(worker, std::move(result)));
-    if (expects_no_result(state_.campaigns.at(campaign))) writer_.hurry(campaign);
+  void write(CampaignId campaign, Entry entry) override {
+    const bool is_delivery = std::holds_alternative<Delivery>(entry);
+    writer_.write(campaign, std::move(entry));
+    if (is_delivery && expects_no_result(state_.campaigns.at(campaign))) writer_.hurry(campaign);
   }
-
-  void compare(WorkerId worker, wire::LeasedResult result) override {
-    const CampaignId campaign = result.campaign;
-    writer_.write(campaign, SecondDelivery{delivery_of(worker, std::move(result))});
-  }
-
-  void record(CampaignId campaign, WorkerId worker, const ReturnedRuns& returned) override {
-    history_.note_lent(campaign, worker);
-    history_.note_reason(worker, returned.reason);
-    writer_.write(campaign, returned);
-  }
-
-  void give_up(CampaignId campaign, RunIndex run) override {
-    writer_.write(campaign, GivenUpRun{run});
-  }
-
   using Outbox::log;
   void log(Event event, CampaignId campaign) override {
     if (campaign == CampaignId{} || campaign_service_.is_served(campaign)) {
@@ -175,9 +154,7 @@ class Service::Impl final : public Outbox {
                   Authenticator* const authenticator = sockets_.authenticator();
                   return authenticator == nullptr ||
                          authenticator->is_allowed(wire::Domain::workers, key, time);
-                },
-            .on_leaving = [this](WorkerId worker,
-                                 LossReason reason) { history_.note_reason(worker, reason); }};
+                }};
   }
 
   ClientGateway::Callbacks client_callbacks() {
@@ -196,16 +173,6 @@ class Service::Impl final : public Outbox {
                 },
             .now = [this] { return now(); },
             .paths = paths_};
-  }
-
-  Delivery delivery_of(WorkerId worker, wire::LeasedResult&& result) {
-    history_.note_lent(result.campaign, worker);
-    const auto session = worker_gateway_.peers().session_of(worker);
-    PROOFMASS_EXPECT(session.has_value());
-    return {.result = std::move(result.computed.result),
-            .worker = *session,
-            .attempt = result.attempt,
-            .compute_s = result.computed.compute_s};
   }
 
   /// Carries out what is asked for; true if nothing remains to be done.
@@ -239,7 +206,6 @@ class Service::Impl final : public Outbox {
     campaign_service_.review_directory();
     request_service_.review();
     client_gateway_.review();
-    history_.review();
     if (ticked_at_ - reviewed_at_ < review_interval) return;
     reviewed_at_ = ticked_at_;
     review();
@@ -333,7 +299,7 @@ class Service::Impl final : public Outbox {
     campaign_service_.review();  // Statistics are made while the workers end.
     if (!leaves_workers) dismiss_workers();
     settle_background();
-    if (!leaves_workers) history_.end_all(LossReason::drained);
+    if (!leaves_workers) on_end(state_, *this);
   }
 
   /// Until all have gone: what is sent just before a socket is closed is sometimes lost, and a
@@ -366,7 +332,6 @@ class Service::Impl final : public Outbox {
   ServiceSockets sockets_;
   State state_;
   StoreWriter writer_;
-  WorkerHistory history_;
   WorkerGateway worker_gateway_;
   ServiceContext context_;
   CampaignService campaign_service_;

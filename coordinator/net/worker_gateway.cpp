@@ -81,9 +81,6 @@ void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outb
   if (envelope->epoch() != epoch_.value && !envelope->has_hello()) {
     return reject_unregistered(*worker, outbox);
   }
-  if (envelope->has_bye()) {
-    callbacks_.on_leaving(*worker, wire::loss_reason(envelope->bye().reason()));
-  }
   if (envelope->has_result_batch()) wire::kill_point(KillPoint::after_receive);
   on_message(state_, *worker, host_of(message.from), *envelope, now, outbox);
 }
@@ -123,7 +120,6 @@ void WorkerGateway::close_out(const Address& from, proto::RejectReason reason,
   const auto worker = peers_.worker_at(from.routing_id);
   if (worker) {
     send(*worker, std::move(reject));
-    callbacks_.on_leaving(*worker, LossReason::protocol);
     on_gone(state_, *worker, LossReason::protocol, now, outbox);
     peers_.forget(*worker);
   } else {

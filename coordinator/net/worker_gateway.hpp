@@ -63,8 +63,6 @@ class WorkerGateway {
     std::function<bool(const std::string& routing_id, const std::string& bytes)> transmit;
     /// True if the public key is authorized, and has not been revoked.
     std::function<bool(const std::string& key, TimePoint now)> is_allowed;
-    /// Told why a worker leaves, before the dispatch is.
-    std::function<void(WorkerId worker, LossReason reason)> on_leaving;
   };
 
   /// @param state  Outlives the gateway.

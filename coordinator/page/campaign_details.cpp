@@ -28,7 +28,7 @@ constexpr int reading_niceness = 10;
 constexpr std::chrono::seconds pause_without_memory(2);
 
 /// Goes on after the last event that is kept, or begins anew if that is not in the file.
-void append_events(const CampaignHistory& history, std::deque<StoredEvent>& events) {
+void append_events(const Store& history, std::deque<StoredEvent>& events) {
   std::vector<StoredEvent> found;
   if (!events.empty()) {
     found = history.events_after(events.back().id - 1, page_events_max);
@@ -60,11 +60,11 @@ std::shared_ptr<const Part> read_part(const CampaignRecord& campaign, const Part
 std::shared_ptr<const CampaignEvents> read_events_of(const CampaignRecord& campaign,
                                                      const CampaignEvents* before) {
   return read_part(campaign, before, [&](CampaignEvents& now) {
-    const CampaignHistory history(campaign.file);
+    const Store history = Store::open_read_only(campaign.file);
     append_events(history, now.events);
     now.losses = history.losses();
     now.ends = history.ends_without_estimate();
-    now.given_up = history.given_up(page_given_up_max);
+    now.given_up = history.given_up_records(page_given_up_max);
     now.attempts = history.recent_attempts(page_attempts_max, page_losses_max);
   });
 }

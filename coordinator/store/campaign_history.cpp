@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 
 namespace proofmass::coordinator {
@@ -125,22 +124,13 @@ std::optional<std::string> utc_of(const Database& database, std::string_view bou
 
 }  // namespace
 
-CampaignHistory::CampaignHistory(const std::filesystem::path& file) {
-  detail::check_presence(file);
-  database_ = std::make_unique<Database>(file, detail::Access::read_only);
-  (void)detail::prepare_reader(*database_, file);
-}
-
-CampaignHistory::~CampaignHistory() = default;
-
-std::vector<StoredEvent> CampaignHistory::events_after(std::uint64_t id,
-                                                       std::size_t count_max) const {
+std::vector<StoredEvent> Store::events_after(std::uint64_t id, std::size_t count_max) const {
   const auto event = [](const Statement& row) {
     return StoredEvent{
         .id = row.count(0), .time_utc = row.text(1), .kind = row.text(2), .text = row.text(3)};
   };
   std::vector<StoredEvent> events =
-      rows_of(*database_,
+      rows_of(impl_->database,
               "SELECT event_id, time_utc, kind, text FROM event WHERE event_id > ? "
               "ORDER BY event_id DESC LIMIT ?",
               event, id, std::uint64_t{count_max});
@@ -148,10 +138,10 @@ std::vector<StoredEvent> CampaignHistory::events_after(std::uint64_t id,
   return events;
 }
 
-std::vector<LossCount> CampaignHistory::losses() const { return losses_by(*database_, "reason"); }
+std::vector<LossCount> Store::losses() const { return losses_by(impl_->database, "reason"); }
 
 // The condition of the inner query is that of an index: completed runs are not looked at.
-std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
+std::vector<EndCount> Store::ends_without_estimate() const {
   const auto end = [](const Statement& row) {
     const std::uint64_t status = row.count(0);
     return EndCount{.status = status == 2   ? "not converged"
@@ -163,7 +153,7 @@ std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
                     .num_runs = row.count(3)};
   };
   return rows_of(
-      *database_,
+      impl_->database,
       "SELECT status, cause, session, count(*) FROM "
       "(SELECT r.status, ifnull(h.loss_cause, '') AS cause, ifnull(h.loss_session, '') AS session "
       " FROM run_result AS r LEFT JOIN loop_health AS h USING (run_index) "
@@ -172,27 +162,26 @@ std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
       end);
 }
 
-std::vector<GivenUpRecord> CampaignHistory::given_up(std::size_t count_max) const {
+std::vector<GivenUpRecord> Store::given_up_records(std::size_t count_max) const {
   const auto run = [](const Statement& row) {
     return GivenUpRecord{.run = {row.count(0)},
                          .reason = row.text(1),
                          .num_attempts = row.count(2),
                          .given_up_utc = row.text(3)};
   };
-  return rows_of(*database_,
+  return rows_of(impl_->database,
                  "SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure "
                  "ORDER BY run_index LIMIT ?",
                  run, std::uint64_t{count_max});
 }
 
-RecentAttempts CampaignHistory::recent_attempts(std::size_t num_runs_max,
-                                                std::size_t num_losses_max) const {
-  const detail::ReadTransaction one_state(*database_);
-  RecentAttempts attempts{.computed = computed_runs(*database_, num_runs_max),
-                          .lost = lost_attempts(*database_, num_losses_max),
+RecentAttempts Store::recent_attempts(std::size_t num_runs_max, std::size_t num_losses_max) const {
+  const detail::ReadTransaction one_state(impl_->database);
+  RecentAttempts attempts{.computed = computed_runs(impl_->database, num_runs_max),
+                          .lost = lost_attempts(impl_->database, num_losses_max),
                           .workers = {}};
-  attempts.workers = worker_records(*database_, attempts);
-  const std::uint64_t num_runs = database_->count("SELECT count(*) FROM delivery");
+  attempts.workers = worker_records(impl_->database, attempts);
+  const std::uint64_t num_runs = impl_->database.count("SELECT count(*) FROM delivery");
   attempts.num_runs_left_out = num_runs - std::min<std::uint64_t>(num_runs, num_runs_max);
   return attempts;
 }

@@ -2,8 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,10 +9,6 @@
 #include "coordinator/store/records.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/messages.hpp"
-
-namespace proofmass::coordinator::detail {
-class Database;
-}  // namespace proofmass::coordinator::detail
 
 namespace proofmass::coordinator {
 
@@ -75,35 +69,6 @@ struct RecentAttempts {
   std::vector<LostAttempt> lost = {};       ///< The newest first.
   std::vector<WorkerRecord> workers = {};   ///< The workers of `computed` and `lost`, by key.
   std::uint64_t num_runs_left_out = 0;      ///< Older delivered runs.
-};
-
-/// Reads what happened to a campaign from its database, also while a coordinator writes to it. For
-/// one thread. All functions throw StoreError if the file cannot be read.
-class CampaignHistory {
- public:
-  /// @throws StoreError as Store::open_read_only() does.
-  explicit CampaignHistory(const std::filesystem::path& file);
-  ~CampaignHistory();
-  CampaignHistory(const CampaignHistory&) = delete;
-  CampaignHistory& operator=(const CampaignHistory&) = delete;
-
-  /// The newest `count_max` events after the one with this id, in order.
-  [[nodiscard]] std::vector<StoredEvent> events_after(std::uint64_t id,
-                                                      std::size_t count_max) const;
-  /// By reason, the one with the most runs first.
-  [[nodiscard]] std::vector<LossCount> losses() const;
-  /// The ways in which finished runs ended without an estimate that converged, the most frequent
-  /// first.
-  [[nodiscard]] std::vector<EndCount> ends_without_estimate() const;
-  /// The first `count_max` runs that were given up.
-  [[nodiscard]] std::vector<GivenUpRecord> given_up(std::size_t count_max) const;
-  /// @param num_runs_max    How many of the newest delivered runs are looked at.
-  /// @param num_losses_max  How many of the newest losses are looked at.
-  [[nodiscard]] RecentAttempts recent_attempts(std::size_t num_runs_max,
-                                               std::size_t num_losses_max) const;
-
- private:
-  std::unique_ptr<detail::Database> database_;
 };
 
 }  // namespace proofmass::coordinator

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <span>
 
 #include "core/error.hpp"
@@ -67,22 +68,9 @@ std::span<const double> values_in(const RunResult& result, ValueKind kind) {
 }  // namespace
 
 std::string_view name_of(ValueKind kind) {
-  switch (kind) {
-    case ValueKind::truth:
-      return "truth";
-    case ValueKind::estimate:
-      return "estimate";
-    case ValueKind::error:
-      return "error";
-    case ValueKind::standard_error:
-      return "standard_error";
-    case ValueKind::fit:
-      return "fit";
-    case ValueKind::health:
-      return "health";
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
+  constexpr std::array<std::string_view, 6> names{"truth",          "estimate", "error",
+                                                  "standard_error", "fit",      "health"};
+  return names.at(static_cast<std::size_t>(kind));
 }
 
 std::optional<double> ValueColumn::value_in(const RunResult& result) const {

@@ -31,6 +31,10 @@ class Database;
 namespace proofmass::coordinator {
 
 struct CampaignRecord;
+struct EndCount;
+struct GivenUpRecord;
+struct RecentAttempts;
+struct StoredEvent;
 
 /// Results of a campaign database, one after the other, of one state of the file. The Store that
 /// made it outlives it.
@@ -171,6 +175,22 @@ class Store {
 
   /// How the runs were computed. Takes 0.1 s for a million runs.
   [[nodiscard]] CampaignExecution execution() const;
+  /// Losses by reason, the one with the most runs first.
+  [[nodiscard]] std::vector<LossCount> losses() const;
+
+  // What is in campaign_history.hpp.
+  /// The newest `count_max` events after the one with this id, in order.
+  [[nodiscard]] std::vector<StoredEvent> events_after(std::uint64_t id,
+                                                      std::size_t count_max) const;
+  /// The ways in which finished runs ended without an estimate that converged, the most frequent
+  /// first.
+  [[nodiscard]] std::vector<EndCount> ends_without_estimate() const;
+  /// The first `count_max` runs that were given up.
+  [[nodiscard]] std::vector<GivenUpRecord> given_up_records(std::size_t count_max) const;
+  /// @param num_runs_max    How many of the newest delivered runs are looked at.
+  /// @param num_losses_max  How many of the newest losses are looked at.
+  [[nodiscard]] RecentAttempts recent_attempts(std::size_t num_runs_max,
+                                               std::size_t num_losses_max) const;
 
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;

@@ -75,9 +75,8 @@ wire::SessionId session_of(const std::string& digits) {
 CampaignControl Store::control() const { return detail::read_control(impl_->database); }
 
 StopPlan Store::stop_plan() const {
-  Statement select =
-      impl_->database.prepare("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
-  if (!select.step()) impl_->database.refuse_as_damaged("it has no campaign");
+  const Statement select =
+      impl_->database.first_row("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
   return {.stop_rule = select.text(0),
           .num_runs_max = select.optional_count(1),
           .failures_max = select.optional_count(2)};

@@ -57,15 +57,8 @@ struct StoreRecovered {
   wire::CampaignId campaign;
 };
 
-/// Something to be logged about a file, said once until it is over:
-///
-///     write_ahead_log_grown   A program has been reading one state of the file for long. What was
-///                             written since stays in the log until it ends; nothing is lost but
-///                             space on the disk. Over with write_ahead_log_shrunk.
-///     write_ahead_log_kept    Nothing more is expected of the file, but its log cannot be folded
-///                             in while a program reads an old state. Until then the file must be
-///                             copied together with its log. Tried again after each `retry_after`.
-///                             Over with write_ahead_log_folded.
+/// Something to be logged about a file, said once until it is over; README.md (The writer) names
+/// the events of a log that cannot be folded in.
 struct FileEvent {
   wire::CampaignId campaign;
   wire::Event event;

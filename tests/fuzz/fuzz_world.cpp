@@ -81,22 +81,22 @@ class World final : public coordinator::Outbox {
                        const std::shared_ptr<const Campaign>& definition) override {
     gateway_.send_definition(worker, campaign, offset, definition);
   }
-  void store(wire::WorkerId, wire::LeasedResult result) override {
-    const auto& run = result.computed.result.run;
-    PROOFMASS_EXPECT(run.value < fuzz_num_runs);
-    PROOFMASS_EXPECT(handed_over_.emplace(result.campaign, run).second);
-    to_commit_.push_back(std::move(result));
-  }
-  void compare(wire::WorkerId worker, wire::LeasedResult result) override {
-    to_compare_.emplace_back(worker, std::move(result));
-  }
-  void record(CampaignId, wire::WorkerId, const coordinator::ReturnedRuns& returned) override {
-    PROOFMASS_EXPECT(returned.runs.count > 0 && returned.runs.end() <= fuzz_num_runs);
-    summary_.num_lost += returned.runs.count;
-  }
-  void give_up(CampaignId, RunIndex run) override {
-    PROOFMASS_EXPECT(run.value < fuzz_num_runs);
-    ++summary_.num_given_up;
+  void write(CampaignId campaign, coordinator::Entry entry) override {
+    using namespace coordinator;
+    if (const auto* const delivery = std::get_if<Delivery>(&entry)) {
+      const RunIndex run = delivery->result.run;
+      PROOFMASS_EXPECT(run.value < fuzz_num_runs);
+      PROOFMASS_EXPECT(handed_over_.emplace(campaign, run).second);
+      to_commit_.emplace_back(campaign, run);
+    } else if (const auto* const second = std::get_if<SecondDelivery>(&entry)) {
+      to_compare_.emplace_back(campaign, second->delivery.result.run);
+    } else if (const auto* const returned = std::get_if<ReturnedRuns>(&entry)) {
+      PROOFMASS_EXPECT(returned->runs.count > 0 && returned->runs.end() <= fuzz_num_runs);
+      summary_.num_lost += returned->runs.count;
+    } else if (const auto* const given_up = std::get_if<GivenUpRun>(&entry)) {
+      PROOFMASS_EXPECT(given_up->run.value < fuzz_num_runs);
+      ++summary_.num_given_up;
+    }
   }
   void log(coordinator::Event event, wire::CampaignId) override {
     // A line of the log is one line.
@@ -110,8 +110,7 @@ class World final : public coordinator::Outbox {
                   note_sent(bytes);
                   return true;
                 },
-            .is_allowed = [](const std::string&, TimePoint) { return true; },
-            .on_leaving = [](wire::WorkerId, wire::LossReason) {}};
+            .is_allowed = [](const std::string&, TimePoint) { return true; }};
   }
 
   void note_sent(std::string_view bytes) {
@@ -227,8 +226,8 @@ class World final : public coordinator::Outbox {
   void commit(std::size_t count_max) {
     std::map<CampaignId, std::vector<RunIndex>> committed;
     for (std::size_t i = 0; i < count_max && !to_commit_.empty(); ++i) {
-      const wire::LeasedResult& result = to_commit_.front();
-      committed[result.campaign].push_back(result.computed.result.run);
+      const auto [campaign, run] = to_commit_.front();
+      committed[campaign].push_back(run);
       to_commit_.pop_front();
       ++summary_.num_committed;
     }
@@ -237,10 +236,10 @@ class World final : public coordinator::Outbox {
 
   void compare_next(bool is_equal) {
     if (to_compare_.empty()) return;
-    const auto [worker, result] = std::move(to_compare_.front());
+    const auto [campaign, run] = to_compare_.front();
     to_compare_.pop_front();
     ++summary_.num_compared;
-    on_compared(state_, result.campaign, result.computed.result.run, worker, is_equal, now_, *this);
+    on_compared(state_, campaign, run, {}, is_equal, now_, *this);
   }
 
   void elapse(TimePoint::duration duration) {
@@ -269,8 +268,8 @@ class World final : public coordinator::Outbox {
   coordinator::WorkerGateway gateway_;
   coordinator::FactoryReports factories_;
   std::set<std::pair<CampaignId, RunIndex>> handed_over_;
-  std::deque<wire::LeasedResult> to_commit_;
-  std::deque<std::pair<wire::WorkerId, wire::LeasedResult>> to_compare_;
+  std::deque<std::pair<CampaignId, RunIndex>> to_commit_;
+  std::deque<std::pair<CampaignId, RunIndex>> to_compare_;
   bool is_failing_ = false;
   FuzzSummary summary_;
 };

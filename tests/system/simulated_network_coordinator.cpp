@@ -316,32 +316,34 @@ void PlayedCoordinator::flush(wire::CampaignId id) {
   after_event();
 }
 
-void PlayedCoordinator::store(wire::WorkerId, wire::LeasedResult result) {
-  const RunIndex run = result.computed.result.run;
-  EXPECT_EQ(result.computed.result.truth,
-            files_.at(result.campaign).stored.definition->draw(run).truth)
+void PlayedCoordinator::write(wire::CampaignId campaign, coordinator::Entry entry) {
+  std::visit([&](const auto& kind) { store(campaign, kind); }, entry);
+}
+
+void PlayedCoordinator::store(wire::CampaignId id, const coordinator::Delivery& delivery) {
+  const RunIndex run = delivery.result.run;
+  EXPECT_EQ(delivery.result.truth, files_.at(id).stored.definition->draw(run).truth)
       << "a forged result is stored";
-  write_later(result.campaign, [this, id = result.campaign, run](PlayedFile& file) {
+  write_later(id, [this, id, run](PlayedFile& file) {
     ++file.num_commits[run];
     file.given_up.erase(run);
     on_committed(life_->state, id, std::vector{run}, agenda_.now(), *this);
   });
 }
 
-void PlayedCoordinator::compare(wire::WorkerId worker, wire::LeasedResult result) {
-  const RunIndex run = result.computed.result.run;
-  write_later(result.campaign, [this, id = result.campaign, worker, run](PlayedFile& file) {
+void PlayedCoordinator::store(wire::CampaignId id, const coordinator::SecondDelivery& second) {
+  const RunIndex run = second.delivery.result.run;
+  write_later(id, [this, id, run](PlayedFile& file) {
     EXPECT_TRUE(file.num_commits.contains(run)) << "compared with nothing";
     file.compared.insert(run);
-    on_compared(life_->state, id, run, worker, true, agenda_.now(), *this);
+    on_compared(life_->state, id, run, {}, true, agenda_.now(), *this);
   });
 }
 
-void PlayedCoordinator::record(wire::CampaignId campaign, wire::WorkerId worker,
-                               const coordinator::ReturnedRuns& loss) {
+void PlayedCoordinator::store(wire::CampaignId campaign, const coordinator::ReturnedRuns& loss) {
   ++num_events_[std::string(wire::name_of(loss.reason))];
   const bool is_of_a_crash = coordinator::is_blamed(loss.reason);
-  const bool is_honest = life_->peers.at(worker).is_honest;
+  const bool is_honest = life_->peers.at(life_->workers.at(loss.worker)).is_honest;
   EXPECT_TRUE(may_crash_ || !is_of_a_crash || !is_honest) << "a liar has ended an honest worker";
   if (!loss.is_blamed) return;
   write_later(campaign, [loss](PlayedFile& file) {
@@ -354,8 +356,8 @@ void PlayedCoordinator::record(wire::CampaignId campaign, wire::WorkerId worker,
   });
 }
 
-void PlayedCoordinator::give_up(wire::CampaignId campaign, RunIndex run) {
-  write_later(campaign, [run](PlayedFile& file) {
+void PlayedCoordinator::store(wire::CampaignId campaign, const coordinator::GivenUpRun& given_up) {
+  write_later(campaign, [run = given_up.run](PlayedFile& file) {
     if (!file.num_commits.contains(run)) file.given_up.insert(run);
   });
 }

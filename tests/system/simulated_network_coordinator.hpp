@@ -107,11 +107,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   void send(wire::WorkerId worker, proto::Envelope message) override;
   void send_definition(wire::WorkerId worker, wire::CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override;
-  void store(wire::WorkerId, wire::LeasedResult result) override;
-  void compare(wire::WorkerId worker, wire::LeasedResult result) override;
-  void record(wire::CampaignId campaign, wire::WorkerId worker,
-              const coordinator::ReturnedRuns& returned) override;
-  void give_up(wire::CampaignId campaign, RunIndex run) override;
+  void write(wire::CampaignId campaign, coordinator::Entry entry) override;
   void log(coordinator::Event event, wire::CampaignId campaign) override;
 
  private:
@@ -136,6 +132,13 @@ class PlayedCoordinator final : public coordinator::Outbox {
   wire::WorkerId meet(wire::SessionId session, const coordinator::HostId& from);
   void serve(wire::CampaignId id);
   void go_on();
+  // Kinds of entries that are looked at.
+  void store(wire::CampaignId campaign, const coordinator::Delivery& delivery);
+  void store(wire::CampaignId campaign, const coordinator::SecondDelivery& second);
+  void store(wire::CampaignId campaign, const coordinator::ReturnedRuns& loss);
+  void store(wire::CampaignId campaign, const coordinator::GivenUpRun& given_up);
+  template <typename Other>
+  void store(wire::CampaignId, const Other&) {}
   void check_sent(wire::WorkerId worker, const proto::Envelope& message) const;
   void check_lease(const proto::RunLease& lease) const;
   void check_forget(const proto::Forget& forget) const;

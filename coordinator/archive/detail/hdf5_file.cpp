@@ -98,7 +98,7 @@ void Hdf5File::set(hid_t object, const char* name, hid_t stored, hid_t given, Hd
 
 GrowingDataset::GrowingDataset(const Hdf5File& file, hid_t group, const std::string& name,
                                const DatasetFormat& format)
-    : file_(&file), given_(format.given) {
+    : file_(&file), format_(format) {
   const hsize_t none = 0, unlimited = H5S_UNLIMITED;
   const Hdf5Handle space = file.handle(H5Screate_simple(1, &none, &unlimited), H5Sclose);
   const Hdf5Handle properties = file.handle(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
@@ -109,15 +109,23 @@ GrowingDataset::GrowingDataset(const Hdf5File& file, hid_t group, const std::str
       H5Dclose);
 }
 
-void GrowingDataset::append(const void* rows, hsize_t count) {
-  if (count == 0) return;
-  const hsize_t num_all = num_written_ + count;
+void GrowingDataset::add(std::span<const std::byte> row) {
+  rows_.insert(rows_.end(), row.begin(), row.end());
+  if (++num_rows_ == format_.chunk_rows) flush();
+}
+
+void GrowingDataset::flush() {
+  if (num_rows_ == 0) return;
+  const hsize_t num_all = num_written_ + num_rows_;
   file_->check(H5Dset_extent(dataset_, &num_all));
-  const Hdf5Handle memory = file_->handle(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const Hdf5Handle memory = file_->handle(H5Screate_simple(1, &num_rows_, nullptr), H5Sclose);
   const Hdf5Handle space = file_->handle(H5Dget_space(dataset_), H5Sclose);
-  file_->check(H5Sselect_hyperslab(space, H5S_SELECT_SET, &num_written_, nullptr, &count, nullptr));
-  file_->check(H5Dwrite(dataset_, given_, memory, space, H5P_DEFAULT, rows));
+  file_->check(
+      H5Sselect_hyperslab(space, H5S_SELECT_SET, &num_written_, nullptr, &num_rows_, nullptr));
+  file_->check(H5Dwrite(dataset_, format_.given, memory, space, H5P_DEFAULT, rows_.data()));
   num_written_ = num_all;
+  num_rows_ = 0;
+  rows_.clear();
 }
 
 void describe_campaign(const Hdf5File& file, const Store& store) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -85,7 +86,7 @@ struct DatasetFormat {
   hsize_t chunk_rows = 1;
 };
 
-/// A dataset of one dimension that grows at its end.
+/// A dataset of one dimension that grows at its end, a chunk at a time.
 class GrowingDataset {
  public:
   GrowingDataset(const Hdf5File& file, hid_t group, const std::string& name,
@@ -93,13 +94,20 @@ class GrowingDataset {
 
   [[nodiscard]] hid_t id() const { return dataset_; }
 
-  /// @param rows  `count` rows of the type in memory. Multiples of a chunk are written the fastest.
-  void append(const void* rows, hsize_t count);
+  /// Adds a row of the type in memory. It is written when a chunk is full, or by flush().
+  void add(std::span<const std::byte> row);
+  template <typename Number>
+  void add(const Number& number) {
+    add(std::as_bytes(std::span(&number, 1)));
+  }
+  void flush();
 
  private:
   const Hdf5File* file_;
-  hid_t given_;
+  DatasetFormat format_;
   Hdf5Handle dataset_;
+  std::vector<std::byte> rows_;  ///< That wait.
+  hsize_t num_rows_ = 0;         ///< Of them.
   hsize_t num_written_ = 0;
 };
 

@@ -47,8 +47,8 @@ void insert_data_tables(Database& database, const Campaign& campaign) {
         fmt::format("INSERT INTO {} VALUES ({})", schema.table, places(num_columns + 1)));
     auto value = table->values.begin();
     for (std::uint64_t position = 1; value != table->values.end(); ++position) {
-      insert.bind(1, position);
-      for (int column = 0; column < num_columns; ++column) insert.bind(column + 2, *value++);
+      insert.put(position);
+      for (int column = 0; column < num_columns; ++column) insert.put(*value++);
       insert.finish();
     }
   }
@@ -165,8 +165,8 @@ std::uint64_t reference_digest_in(const Database& database, const std::string& t
 }
 
 CampaignControl read_control(const Database& database) {
-  Statement select = database.prepare("SELECT phase, priority, audit_fraction FROM campaign");
-  if (!select.step()) database.refuse_as_damaged("it has no campaign");
+  const Statement select =
+      database.first_row("SELECT phase, priority, audit_fraction FROM campaign");
   const std::int64_t priority = select.integer(1);
   const double audit_fraction = select.real(2);
   if (priority < std::numeric_limits<int>::min() || priority > std::numeric_limits<int>::max()) {
@@ -186,9 +186,7 @@ void write_control(const Database& database, const CampaignControl& control) {
 }
 
 std::optional<std::uint64_t> read_num_runs_fixed(const Database& database) {
-  Statement select = database.prepare("SELECT num_runs_fixed FROM campaign");
-  if (!select.step()) database.refuse_as_damaged("it has no campaign");
-  return select.optional_count(0);
+  return database.first_row("SELECT num_runs_fixed FROM campaign").optional_count(0);
 }
 
 void fix_num_runs(const Database& database) {
@@ -201,15 +199,12 @@ void fix_num_runs(const Database& database) {
 
 void replace_stop_check(const Database& database, std::uint64_t num_runs,
                         std::string_view statistic, const StopCheck& check) {
-  const bool is_bounded = check.interval.has_value();
   database
       .prepare(
           "INSERT OR REPLACE INTO stop_check (statistic, num_runs, estimate, lower, upper,"
           " relative_half_width, is_reached) VALUES (?, ?, ?, ?, ?, ?, ?)")
-      .run(statistic, num_runs, check.estimate,
-           is_bounded ? std::optional(check.interval->lower) : std::nullopt,
-           is_bounded ? std::optional(check.interval->upper) : std::nullopt,
-           check.relative_half_width, std::int64_t{check.is_reached});
+      .run(statistic, num_runs, check.estimate, check.interval, check.relative_half_width,
+           std::int64_t{check.is_reached});
 }
 
 }  // namespace proofmass::coordinator::detail

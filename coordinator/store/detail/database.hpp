@@ -52,9 +52,17 @@ class Statement {
   /// Binds all parameters in order.
   template <typename... Values>
   void bind_all(const Values&... values) {
-    int position = 0;
-    (bind(++position, values), ...);
+    num_bound_ = 0;
+    (put(values), ...);
   }
+
+  /// Binds the next parameters after those that were put since the statement last ended.
+  template <typename Value>
+  void put(const Value& value) {
+    bind(++num_bound_, value);
+  }
+  /// Two parameters.
+  void put(const std::optional<Interval>& interval);
 
   void bind(int position, std::int64_t value);
   /// @throws StoreError if the value is not below 2⁶³.
@@ -102,6 +110,7 @@ class Statement {
 
   const Database* database_;
   std::unique_ptr<sqlite3_stmt, FinalizeStatement> statement_;
+  int num_bound_ = 0;
 };
 
 /// One connection to one database file, for one thread.
@@ -125,8 +134,10 @@ class Database {
   [[nodiscard]] bool execute_unless_busy(const std::string& sql);
   [[nodiscard]] Statement prepare(std::string_view sql) const;
 
-  /// First column of the first row of a query.
-  /// @throws StoreError if there is no row: the file is damaged.
+  /// A query at its first row.
+  /// @throws StoreError if there is none: the file is damaged.
+  [[nodiscard]] Statement first_row(std::string_view sql) const;
+  /// First column of that row.
   [[nodiscard]] std::int64_t integer(std::string_view sql) const;
   [[nodiscard]] std::uint64_t count(std::string_view sql) const;  ///< As Statement::count().
   [[nodiscard]] std::string text(std::string_view sql) const;
@@ -189,8 +200,6 @@ class Database {
   };
 
   void open(Access access);
-  /// A query at its first row, which there must be.
-  [[nodiscard]] Statement first_row(std::string_view sql) const;
   [[noreturn]] void refuse_copy(int code) const;
 
   std::filesystem::path path_;

@@ -142,8 +142,6 @@ EntryRows::EntryRows(const Database& database, const ResultSchema& results)
       largest_errors_(database, results),
       workers_(database),
       insert_delivery_(database.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)")),
-      select_failures_(database.prepare("SELECT EXISTS (SELECT 1 FROM run_failure)")),
-      delete_failure_(database.prepare("DELETE FROM run_failure WHERE run_index = ?")),
       insert_audit_(database.prepare(insert_audit_sql)),
       insert_attempt_(database.prepare(
           "INSERT INTO attempt (first_run, num_runs, attempt, worker_key, reason, is_blamed,"
@@ -156,8 +154,7 @@ EntryRows::EntryRows(const Database& database, const ResultSchema& results)
 
 CommitSummary EntryRows::write(std::span<const Entry> entries) {
   now_unix_s_ = static_cast<std::int64_t>(std::time(nullptr));
-  has_failures_ = select_failures_.step() && select_failures_.integer(0) != 0;
-  select_failures_.finish();
+  has_failures_ = database_.integer("SELECT EXISTS (SELECT 1 FROM run_failure)") != 0;
   for (const Entry& entry : entries) {
     std::visit([this](const auto& kind) { write_entry(kind); }, entry);
   }
@@ -180,7 +177,9 @@ void EntryRows::write_entry(const Delivery& delivery) {
   const std::int64_t worker = workers_.key_of(delivery.worker);
   insert_delivery_.run(delivery.result.run.value, worker, delivery.attempt.value,
                        delivery.compute_s, now_unix_s_);
-  if (has_failures_) delete_failure_.run(delivery.result.run.value);
+  if (has_failures_) {
+    database_.prepare("DELETE FROM run_failure WHERE run_index = ?").run(delivery.result.run.value);
+  }
   largest_errors_.add(delivery.result);
   workers_.count_result(worker, delivery.compute_s);
   ++summary_.num_new;

@@ -104,8 +104,6 @@ class EntryRows {
   LargestErrorRows largest_errors_;
   WorkerRows workers_;
   Statement insert_delivery_;
-  Statement select_failures_;
-  Statement delete_failure_;
   Statement insert_audit_;
   Statement insert_attempt_;
   Statement trim_attempts_;

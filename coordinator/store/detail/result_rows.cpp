@@ -246,30 +246,26 @@ ResultRows::ResultRows(const Database& database, const ResultSchema& results)
 }
 
 bool ResultRows::insert(const RunResult& result) {
-  insert_.bind(1, result.run.value);
-  insert_.bind(2, static_cast<std::int64_t>(result.status));
-  insert_.bind(3, result.num_draws);
-  insert_.bind(4, result.num_rounds);
-  int position = num_leading_columns;
+  insert_.bind_all(result.run.value, static_cast<std::int64_t>(result.status), result.num_draws,
+                   result.num_rounds);
   for (const ValueColumn& column : columns_.values) {
     // An error is computed when it is read.
     if (column.kind == ValueKind::error || is_of_standard_errors(column)) continue;
-    insert_.bind(++position, column.value_in(result));
+    insert_.put(column.value_in(result));
   }
   const bool is_lost = result.status == RunStatus::lost;
   const auto choice = [&](std::uint32_t value) {
     return is_lost ? std::optional(std::uint64_t{value}) : std::nullopt;
   };
-  insert_.bind(++position, choice(result.loss.cause));
-  insert_.bind(++position, choice(result.loss.session));
+  insert_.put(choice(result.loss.cause));
+  insert_.put(choice(result.loss.session));
   for (const ValueColumn& column : columns_.values) {
-    if (is_of_standard_errors(column)) insert_.bind(++position, column.value_in(result));
+    if (is_of_standard_errors(column)) insert_.put(column.value_in(result));
   }
   if (columns_.num_correlations > 0) {
     const std::string correlations = format_correlations(result.correlations);
-    insert_.bind(++position, result.correlations.empty()
-                                 ? std::optional<std::string_view>()
-                                 : std::optional<std::string_view>(correlations));
+    insert_.put(result.correlations.empty() ? std::optional<std::string_view>()
+                                            : std::optional<std::string_view>(correlations));
   }
   insert_.finish();
   return database_.num_changes() == 1;

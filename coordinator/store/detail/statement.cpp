@@ -60,9 +60,15 @@ bool Statement::step() {
   return false;
 }
 
+void Statement::put(const std::optional<Interval>& interval) {
+  put(interval ? std::optional(interval->lower) : std::nullopt);
+  put(interval ? std::optional(interval->upper) : std::nullopt);
+}
+
 void Statement::finish() {
   while (step()) {
   }
+  num_bound_ = 0;
 }
 
 double Statement::real(int column) const { return sqlite3_column_double(statement_.get(), column); }

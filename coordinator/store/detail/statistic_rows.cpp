@@ -26,56 +26,30 @@ std::optional<double> entry_of(const std::optional<Budget>& budget, std::size_t 
 
 constexpr int num_statistic_columns = 33;
 
-/// Binds the columns of `statistic` one after the other.
-class StatisticRow {
- public:
-  explicit StatisticRow(Statement insert) : insert_(std::move(insert)) {}
+void put(const ErrorStatistic& error, Statement& row) {
+  row.put(error.bias);
+  row.put(error.bias_interval);
+  row.put(error.rms);
+  row.put(error.standard_deviation);
+  row.put(error.deviation_interval);
+  row.put(error.skewness);
+}
 
-  template <typename Value>
-  void put(const Value& value) {
-    insert_.bind(++position_, value);
+void put(const AccuracyStatistic& accuracy, Statement& row) {
+  row.put(accuracy.worst);
+  row.put(accuracy.worst_run.value);
+  row.put(accuracy.num_beyond_objective);
+  row.put(std::optional(accuracy.beyond_objective));
+  row.put(accuracy.mean);
+  row.put(accuracy.mean_interval);
+  row.put(accuracy.standard_deviation);
+  row.put(accuracy.deviation_interval);
+  for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    row.put(percentile.value);
+    row.put(percentile.interval);
   }
-
-  void put(const std::optional<Interval>& interval) {
-    put(interval ? std::optional(interval->lower) : std::nullopt);
-    put(interval ? std::optional(interval->upper) : std::nullopt);
-  }
-
-  void put(const ErrorStatistic& error) {
-    put(error.bias);
-    put(error.bias_interval);
-    put(error.rms);
-    put(error.standard_deviation);
-    put(error.deviation_interval);
-    put(error.skewness);
-  }
-
-  void put(const AccuracyStatistic& accuracy) {
-    put(accuracy.worst);
-    put(accuracy.worst_run.value);
-    put(accuracy.num_beyond_objective);
-    put(std::optional(accuracy.beyond_objective));
-    put(accuracy.mean);
-    put(accuracy.mean_interval);
-    put(accuracy.standard_deviation);
-    put(accuracy.deviation_interval);
-    for (const PercentileStatistic& percentile : accuracy.percentiles) {
-      put(percentile.value);
-      put(percentile.interval);
-    }
-    put(accuracy.error);
-  }
-
-  void insert() {
-    PROOFMASS_EXPECT(position_ == num_statistic_columns);
-    insert_.finish();
-    position_ = 0;
-  }
-
- private:
-  Statement insert_;
-  int position_ = 0;
-};
+  put(accuracy.error, row);
+}
 
 bool is_worse(const RankedRun& left, const RankedRun& right) {
   if (left.magnitude != right.magnitude) return left.magnitude > right.magnitude;
@@ -88,20 +62,19 @@ void replace_statistics(Database& database, const ResultSchema& results,
                         const CampaignStatistics& statistics) {
   database.execute("DELETE FROM statistic");
   if (statistics.num_estimated == 0) return;
-  StatisticRow row(database.prepare(
-      fmt::format("INSERT INTO statistic VALUES ({})", places(num_statistic_columns))));
+  Statement row = database.prepare(
+      fmt::format("INSERT INTO statistic VALUES ({})", places(num_statistic_columns)));
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
     row.put(results.quantities[i].name);
     row.put(statistics.num_estimated);
-    row.put(statistics.accuracy[i]);
-    row.insert();
+    put(statistics.accuracy[i], row);
+    row.finish();
   }
 }
 
 void replace_summary(const Database& database, const CampaignStatistics& statistics,
                      const ResultDigests& digests) {
   const std::uint64_t num_given_up = database.count("SELECT count(*) FROM run_failure");
-  const std::optional<Interval> share = statistics.within_objectives(num_given_up);
   database
       .prepare(
           "INSERT OR REPLACE INTO summary (summary_id, num_finished, num_estimated,"
@@ -111,8 +84,8 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
           " VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .run(statistics.num_runs, statistics.num_estimated, statistics.num_not_converged,
            statistics.num_not_finite, statistics.num_no_draw, statistics.num_lost, num_given_up,
-           statistics.num_within_objectives, share ? std::optional(share->lower) : std::nullopt,
-           share ? std::optional(share->upper) : std::nullopt, digests.results, digests.health);
+           statistics.num_within_objectives, statistics.within_objectives(num_given_up),
+           digests.results, digests.health);
 }
 
 void replace_warnings(Database& database, const ResultSchema& results,

@@ -67,7 +67,7 @@ TEST_F(AuditTest, IsNotDoneByAFirstWorkerThatRepeatsItself) {
   deliver(first, one, {0});
   commit(one);
   deliver(first, one, {0});
-  EXPECT_EQ(campaign(one).audits.size(), 1U);
+  EXPECT_EQ(campaign(one).audits.runs().size(), 1U);
   EXPECT_EQ(campaign(one).num_duplicates, 1U);
   outbox.forget();
 }
@@ -112,8 +112,8 @@ TEST_F(AuditTest, ThatIsLostIsLentAgain) {
   outbox.forget();
   add_worker(third);
   EXPECT_EQ(state.workers.at(third).num_lent + state.workers.at(first).num_lent, 1U);
-  EXPECT_EQ(campaign(one).audits.size(), 1U);
-  EXPECT_EQ(state.leases.at(campaign(one).audits.at({0})).attempt, Attempt{3});
+  EXPECT_EQ(campaign(one).audits.runs().size(), 1U);
+  EXPECT_EQ(state.leases.at(*campaign(one).audits.find({0})).attempt, Attempt{3});
   outbox.forget();
 }
 
@@ -122,7 +122,7 @@ TEST_F(AuditTest, ThatCrashesEveryWorkerIsGivenUp) {
   complete(first, one, {0});
   Strings events;
   for (int i = 0; i < 8 && !campaign(one).audits.empty(); ++i) {
-    const WorkerId id = state.leases.at(campaign(one).audits.at({0})).worker;
+    const WorkerId id = state.leases.at(*campaign(one).audits.find({0})).worker;
     state.hosts.at({"", "host"}).num_crashes = 0;
     crash(id);
     events = outbox.take_events();
@@ -140,8 +140,8 @@ TEST_F(AuditTest, OfWhatWasStoredBeforeTheRestartIsDoneByAnybody) {
   stored.finished = {{{0}, 3}};
   stored.compared = {{{1}, 1}};
   on_campaign(state, two, stored, now, outbox);
-  EXPECT_EQ(campaign(two).audits.size() + campaign(two).num_to_audit, 2U);
-  EXPECT_FALSE(campaign(two).audits.contains({1}));
+  EXPECT_EQ(campaign(two).audits.runs().size() + campaign(two).num_to_audit, 2U);
+  EXPECT_FALSE(campaign(two).audits.runs().contains({1}));
   outbox.forget();
 }
 

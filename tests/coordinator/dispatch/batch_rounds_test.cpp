@@ -172,16 +172,13 @@ class PlayedFleet final : public Outbox {
   }
   void send_definition(WorkerId, CampaignId, std::uint64_t,
                        const std::shared_ptr<const Campaign>&) override {}
-  void store(WorkerId, wire::LeasedResult result) override {
-    stored_.push_back(result.computed.result.run);
+  void write(CampaignId, Entry entry) override {
+    if (const auto* const delivery = std::get_if<Delivery>(&entry)) {
+      stored_.push_back(delivery->result.run);
+    } else {
+      EXPECT_TRUE(std::holds_alternative<WorkerJoined>(entry)) << "computed twice, or lost";
+    }
   }
-  void compare(WorkerId, wire::LeasedResult) override {
-    ADD_FAILURE() << "a run was computed twice";
-  }
-  void record(CampaignId, WorkerId, const ReturnedRuns&) override {
-    ADD_FAILURE() << "runs were lost";
-  }
-  void give_up(CampaignId, RunIndex) override { ADD_FAILURE() << "a run was given up"; }
   void log(Event, CampaignId) override {}
 
  private:

@@ -42,8 +42,8 @@ TEST_F(ModelsTest, AreLentToWorkersThatHaveThem) {
   for (const auto& [id, lease] : state.leases) {
     EXPECT_EQ(lease.campaign, lease.worker == first ? two : one);
   }
-  EXPECT_EQ(campaign(one).lent.size(), 4U);
-  EXPECT_EQ(campaign(two).lent.size(), 4U);
+  EXPECT_EQ(campaign(one).lent.runs().size(), 4U);
+  EXPECT_EQ(campaign(two).lent.runs().size(), 4U);
 }
 
 // However long it takes: an idle worker that cannot help takes nothing off another one.

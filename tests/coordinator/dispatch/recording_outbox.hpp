@@ -7,15 +7,10 @@
 
 namespace proofmass::test {
 
-/// A result that was handed over, and whose it is.
-struct RecordedResult : wire::LeasedResult {
-  wire::WorkerId worker;
-};
-
-/// Runs that came back without a result.
-struct RecordedLoss : coordinator::ReturnedRuns {
+/// An entry of a campaign's file.
+template <typename Kind>
+struct Recorded : Kind {
   wire::CampaignId campaign;
-  wire::WorkerId by;
 };
 
 /// Writes down what the dispatch does. Everything must be taken before the next event: what nobody
@@ -29,17 +24,22 @@ class RecordingOutbox final : public coordinator::Outbox {
                        const std::shared_ptr<const Campaign>& definition) override {
     definitions_.push_back({worker, campaign, offset, definition});
   }
-  void store(wire::WorkerId worker, wire::LeasedResult result) override {
-    stored_.push_back({std::move(result), worker});
+  void write(wire::CampaignId campaign, coordinator::Entry entry) override {
+    using namespace coordinator;
+    if (auto* const delivery = std::get_if<Delivery>(&entry)) {
+      stored_.push_back({std::move(*delivery), campaign});
+    } else if (auto* const second = std::get_if<SecondDelivery>(&entry)) {
+      compared_.push_back({std::move(second->delivery), campaign});
+    } else if (const auto* const returned = std::get_if<ReturnedRuns>(&entry)) {
+      losses_.push_back({*returned, campaign});
+    } else if (const auto* const given_up = std::get_if<GivenUpRun>(&entry)) {
+      given_up_.push_back(given_up->run);
+    } else if (const auto* const joined = std::get_if<WorkerJoined>(&entry)) {
+      joined_.push_back({*joined, campaign});
+    } else {
+      ended_.push_back(std::get<WorkerEnded>(entry));
+    }
   }
-  void compare(wire::WorkerId worker, wire::LeasedResult result) override {
-    compared_.push_back({std::move(result), worker});
-  }
-  void record(wire::CampaignId campaign, wire::WorkerId worker,
-              const coordinator::ReturnedRuns& returned) override {
-    losses_.push_back({returned, campaign, worker});
-  }
-  void give_up(wire::CampaignId, RunIndex run) override { given_up_.push_back(run); }
   void log(coordinator::Event event, wire::CampaignId) override {
     events_.push_back(to_text(event));
   }
@@ -82,11 +82,21 @@ class RecordingOutbox final : public coordinator::Outbox {
   std::vector<RunIndex> take_stored() { return runs_of(std::exchange(stored_, {})); }
   /// Runs handed over to be compared since the last call.
   std::vector<RunIndex> take_compared() { return runs_of(std::exchange(compared_, {})); }
-  std::vector<RecordedLoss> take_losses() { return std::exchange(losses_, {}); }
+  std::vector<Recorded<coordinator::ReturnedRuns>> take_losses() {
+    return std::exchange(losses_, {});
+  }
   std::vector<RunIndex> take_given_up() { return std::exchange(given_up_, {}); }
   std::vector<std::string> take_events() { return std::exchange(events_, {}); }
 
-  [[nodiscard]] const std::vector<RecordedResult>& stored() const { return stored_; }
+  /// Workers of which files were told; not looked at by expect_nothing_more().
+  std::vector<Recorded<coordinator::WorkerJoined>> take_joined() {
+    return std::exchange(joined_, {});
+  }
+  std::vector<coordinator::WorkerEnded> take_ended() { return std::exchange(ended_, {}); }
+
+  [[nodiscard]] const std::vector<Recorded<coordinator::Delivery>>& stored() const {
+    return stored_;
+  }
   [[nodiscard]] std::size_t num_sent() const { return sent_.size(); }
 
   /// Drops all that has been written down: what another test checks.
@@ -96,6 +106,8 @@ class RecordingOutbox final : public coordinator::Outbox {
     stored_.clear();
     compared_.clear();
     losses_.clear();
+    joined_.clear();
+    ended_.clear();
     given_up_.clear();
     events_.clear();
   }
@@ -115,17 +127,19 @@ class RecordingOutbox final : public coordinator::Outbox {
   }
 
  private:
-  static std::vector<RunIndex> runs_of(const std::vector<RecordedResult>& results) {
+  static std::vector<RunIndex> runs_of(const std::vector<Recorded<coordinator::Delivery>>& all) {
     std::vector<RunIndex> runs;
-    for (const auto& result : results) runs.push_back(result.computed.result.run);
+    for (const auto& delivery : all) runs.push_back(delivery.result.run);
     return runs;
   }
 
   std::vector<std::pair<wire::WorkerId, proto::Envelope>> sent_;
   std::vector<SentDefinition> definitions_;
-  std::vector<RecordedResult> stored_;
-  std::vector<RecordedResult> compared_;
-  std::vector<RecordedLoss> losses_;
+  std::vector<Recorded<coordinator::Delivery>> stored_;
+  std::vector<Recorded<coordinator::Delivery>> compared_;
+  std::vector<Recorded<coordinator::ReturnedRuns>> losses_;
+  std::vector<Recorded<coordinator::WorkerJoined>> joined_;
+  std::vector<coordinator::WorkerEnded> ended_;
   std::vector<RunIndex> given_up_;
   std::vector<std::string> events_;
 };

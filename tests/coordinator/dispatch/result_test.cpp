@@ -17,7 +17,7 @@ TEST_F(ResultTest, IsAcknowledgedAfterTheCommitAndNotBefore) {
   deliver(first, one, {0});
   ASSERT_EQ(outbox.stored().size(), 1U);
   EXPECT_EQ(outbox.stored()[0].campaign, one);
-  EXPECT_EQ(outbox.stored()[0].worker, first);
+  EXPECT_EQ(outbox.stored()[0].worker, session_of(first));
   EXPECT_EQ(outbox.stored()[0].attempt, Attempt{1});
   EXPECT_EQ(taken_lease(first), (RunRange{{1}, 2}));
   EXPECT_EQ(outbox.num_sent(), 0U);

@@ -157,7 +157,6 @@ TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt)
   EXPECT_EQ(losses[0].campaign, one);
   EXPECT_EQ(losses[0].runs, (RunRange{{0}, 1}));
   EXPECT_EQ(losses[0].attempt, Attempt{1});
-  EXPECT_EQ(losses[0].by, first);
   EXPECT_EQ(losses[0].worker, session_of(first));
   EXPECT_EQ(losses[0].reason, LossReason::silent);
   EXPECT_FALSE(losses[0].is_blamed);
@@ -219,6 +218,48 @@ TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
   EXPECT_EQ(outbox.take_events(), (Strings{"worker_left worker=1 name=w reason=walltime",
                                            "runs_lost worker=1 runs=0 attempt=1 reason=walltime"}));
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::walltime);
+}
+
+TEST_F(WorkerTest, FilesKnowTheWorkersThatWereLentRunsAndHowTheyEnded) {
+  const auto known = [&] {
+    std::set<std::pair<CampaignId, SessionId>> all;
+    for (const auto& worker : outbox.take_joined()) all.emplace(worker.campaign, worker.session);
+    return all;
+  };
+  using Known = std::set<std::pair<CampaignId, SessionId>>;
+  add_campaign(one, 1);
+  add_worker(first);
+  add_worker(second);
+  EXPECT_EQ(known(), (Known{{one, session_of(first)}})) << "the second was lent nothing";
+  on_cancel(state, one, outbox);
+  on_removed(state, one, outbox);
+  add_campaign(one, 2);
+  EXPECT_EQ(known(), (Known{{one, session_of(first)}, {one, session_of(second)}}))
+      << "another file of the campaign";
+  on_bye(state, first, LossReason::walltime, now, outbox);
+  add_worker(third);
+  on_end(state, outbox);
+  std::map<SessionId, LossReason> ended;
+  for (const auto& worker : outbox.take_ended()) ended.emplace(worker.session, worker.reason);
+  EXPECT_EQ(ended, (std::map<SessionId, LossReason>{{session_of(first), LossReason::walltime},
+                                                    {session_of(second), LossReason::drained},
+                                                    {session_of(third), LossReason::drained}}));
+  outbox.forget();
+}
+
+TEST_F(WorkerTest, ThatIsAwaitedAndDoesNotComeHasEnded) {
+  begin({session_of(first), session_of(second)});
+  add_campaign(one, 1);
+  add_busy_worker(first);
+  on_tick(state, now, outbox);
+  EXPECT_EQ(outbox.take_ended().size(), 0U) << "the second may still come";
+  now += config.reattach_wait;
+  on_tick(state, now, outbox);
+  const auto ended = outbox.take_ended();
+  ASSERT_EQ(ended.size(), 1U);
+  EXPECT_EQ(ended[0].session, session_of(second));
+  EXPECT_EQ(ended[0].reason, LossReason::silent);
+  outbox.forget();
 }
 
 TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {

@@ -13,7 +13,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::SessionId;
 using wire::WorkerId;
 
 Address at(const std::string& routing_id, const std::string& key = "") {
@@ -25,7 +24,6 @@ TEST(Peers, GiveEachSessionAWorkerOfItsOwn) {
   EXPECT_EQ(peers.meet({11}, 1, at("a")), WorkerId{1});
   EXPECT_EQ(peers.meet({12}, 1, at("b")), WorkerId{2});
   EXPECT_EQ(peers.meet({11}, 2, at("a")), WorkerId{1});
-  EXPECT_EQ(peers.session_of({2}), SessionId{12});
   EXPECT_EQ(peers.worker_of({12}), WorkerId{2});
   EXPECT_EQ(peers.workers(), (std::vector<WorkerId>{{1}, {2}}));
 }
@@ -85,7 +83,6 @@ TEST(Peers, ForgetAWorkerAltogether) {
   peers.forget({1});
   EXPECT_EQ(peers.address_of({1}), nullptr);
   EXPECT_EQ(peers.worker_at("a"), std::nullopt);
-  EXPECT_EQ(peers.session_of({1}), std::nullopt);
   EXPECT_EQ(peers.meet({11}, 1, at("a")), WorkerId{2});
 }
 

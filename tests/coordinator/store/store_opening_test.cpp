@@ -205,7 +205,7 @@ class CampaignHistoryTest : public test::StoreTest {
 
 TEST_F(CampaignHistoryTest, HasTheEventsAfterOne) {
   for (int i = 0; i < 5; ++i) store.record_event("event", fmt::format("number {}", i));
-  const CampaignHistory history(file());
+  const Store history = Store::open_read_only(file());
   const std::vector<StoredEvent> all = history.events_after(0, 100);
   ASSERT_EQ(all.size(), 5U);
   EXPECT_EQ(all[0].text, "number 0");
@@ -232,14 +232,14 @@ TEST_F(CampaignHistoryTest, CountsLossesByReasonAndBlame) {
     }
     return words;
   };
-  EXPECT_EQ(in_words(CampaignHistory(file()).losses()), "silent 2 15 0;crashed 2 3 1;");
+  EXPECT_EQ(in_words(Store::open_read_only(file()).losses()), "silent 2 15 0;crashed 2 3 1;");
   EXPECT_EQ(in_words(store.execution().losses), "silent 2 15 0;crashed 1 2 0;crashed 1 1 1;");
 }
 
 TEST_F(CampaignHistoryTest, CountsHowRunsEndedWithoutAnEstimate) {
   write({delivery_of(0), failed(1, RunStatus::not_converged), failed(2, RunStatus::not_finite),
          failed(3, RunStatus::no_draw), failed(4, RunStatus::no_draw)});
-  const std::vector<EndCount> ends = CampaignHistory(file()).ends_without_estimate();
+  const std::vector<EndCount> ends = Store::open_read_only(file()).ends_without_estimate();
   ASSERT_EQ(ends.size(), 3U);
   EXPECT_EQ(ends[0].status, "no draw");
   EXPECT_EQ(ends[0].num_runs, 2U);
@@ -253,7 +253,7 @@ TEST_F(CampaignHistoryTest, NamesRunsThatWereGivenUp) {
   for (const std::uint64_t run : {7U, 3U, 5U}) {
     write({lost_runs(run, 1, wire::LossReason::crashed, true), GivenUpRun{{run}}});
   }
-  const std::vector<GivenUpRecord> runs = CampaignHistory(file()).given_up(2);
+  const std::vector<GivenUpRecord> runs = Store::open_read_only(file()).given_up_records(2);
   ASSERT_EQ(runs.size(), 2U);
   EXPECT_EQ(runs[0].run.value, 3U);
   EXPECT_EQ(runs[1].run.value, 5U);
@@ -270,7 +270,7 @@ TEST_F(CampaignHistoryTest, JoinsTheRunsOfABatch) {
   entries.emplace_back(single);
   write(entries);
   change("UPDATE delivery SET received_unix_s = 2000");
-  const RecentAttempts attempts = CampaignHistory(file()).recent_attempts(100, 100);
+  const RecentAttempts attempts = Store::open_read_only(file()).recent_attempts(100, 100);
   ASSERT_EQ(attempts.computed.size(), 2U);
   EXPECT_THAT(attempts.computed[0].runs, ElementsAre(RunIndex{4}, RunIndex{5}, RunIndex{6}));
   EXPECT_DOUBLE_EQ(attempts.computed[0].compute_s, 1.5);
@@ -289,7 +289,7 @@ TEST_F(CampaignHistoryTest, HasTheNewestAttemptsAndCountsTheOthers) {
   }
   write(entries);
   change("UPDATE delivery SET received_unix_s = 1000 + run_index");
-  const RecentAttempts attempts = CampaignHistory(file()).recent_attempts(8, 2);
+  const RecentAttempts attempts = Store::open_read_only(file()).recent_attempts(8, 2);
   EXPECT_EQ(attempts.num_runs_left_out, 12U);
   ASSERT_EQ(attempts.computed.size(), 8U);
   EXPECT_EQ(attempts.computed.front().runs.front().value, 19U);
