@@ -23,10 +23,10 @@ Table facts(std::string id, std::string caption, std::vector<Row> rows) {
 }
 
 std::string digest_words(const Review& review) {
-  return review.digest_check == DigestCheck::holds
-             ? review.results.digests.results + " (equal to the stored one)"
-             : review.results.digests.results +
-                   " (not checked: there is no stored one of these runs)";
+  return review.results.digests.results +
+         (review.results.digest_check == DigestCheck::holds
+              ? " (equal to the stored one)"
+              : " (not checked: there is no stored one of these runs)");
 }
 
 std::string hours(double seconds) { return figure_text(seconds / 3600.0) + " h"; }
@@ -62,8 +62,7 @@ std::string name_in_symbols(const ResultSchema& schema, std::string_view name) {
 }
 
 Table review_budget_table(const Review& review) {
-  Table table =
-      budget_table(review.schema, review.budget, review.results.statistics, review.results.totals);
+  Table table = budget_table(review);
   for (std::string& note : table.notes) note = with_powers_of_ten(note);
   return table;
 }
@@ -91,20 +90,21 @@ Table cause_table(const Review& review) {
 Table identity_table(const Review& review) {
   const CampaignIdentity& identity = review.identity;
   const CampaignStatistics& statistics = review.results.statistics;
-  Table table = facts(
-      "identity", "The campaign",
-      {{"campaign", identity.name},
-       {"seed", std::to_string(identity.seed)},
-       {"runs", fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
-                            identity.num_runs, statistics.num_estimated)},
-       {"not converged", std::to_string(statistics.num_not_converged)},
-       {"with a warning", std::to_string(review.results.warnings.num_runs)},
-       {"without an estimate", review.missing.total() == 0 ? "none" : reasons_text(review.missing)},
-       {"model", identity.model_version},
-       {"build", identity.build},
-       {"created", identity.created_utc},
-       {"SHA-256 of the results", digest_words(review)},
-       {"SHA-256 of the definition", identity.definition_digest}});
+  const MissingEstimates& missing = review.results.missing;
+  Table table =
+      facts("identity", "The campaign",
+            {{"campaign", identity.name},
+             {"seed", std::to_string(identity.seed)},
+             {"runs", fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
+                                  identity.num_runs, statistics.num_estimated)},
+             {"not converged", std::to_string(statistics.num_not_converged)},
+             {"with a warning", std::to_string(review.results.warnings.num_runs)},
+             {"without an estimate", missing.total() == 0 ? "none" : reasons_text(missing)},
+             {"model", identity.model_version},
+             {"build", identity.build},
+             {"created", identity.created_utc},
+             {"SHA-256 of the results", digest_words(review)},
+             {"SHA-256 of the definition", identity.definition_digest}});
   if (identity.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
   if (!review.stop.empty()) table.rows.push_back({"stop rule", review.stop});
   if (!identity.note.empty()) table.rows.push_back({"note", identity.note});
@@ -124,7 +124,7 @@ Table execution_table(const Review& review) {
        {"results of a later attempt than the first", std::to_string(execution.num_retried)},
        {"results computed a second time",
         fmt::format("{}, {} of them differed", execution.num_audited, execution.num_contradicting)},
-       {"runs given up", std::to_string(review.missing.num_given_up)}});
+       {"runs given up", std::to_string(review.results.missing.num_given_up)}});
   for (const LossCount& loss : execution.losses) {
     table.rows.push_back(
         {fmt::format("lost: {}", loss.reason),

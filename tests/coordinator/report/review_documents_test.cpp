@@ -171,7 +171,7 @@ TEST_F(ReviewSummary, SaysWhatIsMissing) {
   store.extend(test::campaign_of(30), canonical_definition(test::campaign_of(30)));
   Review review = review_of(store, 30);
   EXPECT_EQ(sentences_of(review)[1], "The campaign is not finished: 20 of 30 draws are done.");
-  review.missing.num_given_up = 1;
+  review.results.missing.num_given_up = 1;
   EXPECT_EQ(sentences_of(review)[1],
             "The campaign is not finished: 21 of 30 draws are done, 1 of them without an estimate "
             "(1 given up), which counts as an exceedance.");
