@@ -15,7 +15,7 @@ std::string report_text(const Review& review, Paint paint) {
   const ReadResults& results = review.results;
   std::string text =
       wire::visible_lines(summary_text(review)) + given_up_text(results.given_up, paint) +
-      note_text(review.identity.note) +
+      note_text(review.note) +
       wire::visible_lines(warnings_text(review.schema, results.warnings) + review.stop);
   std::vector<Table> tables = accuracy_tables(review);
   const auto further = std::back_inserter(tables);
@@ -34,17 +34,16 @@ std::string note_text(const std::string& note) {
 }
 
 std::string summary_text(const Review& review) {
-  const CampaignIdentity& identity = review.identity;
   const CampaignStatistics& statistics = review.results.statistics;
-  std::string text = fmt::format("Campaign  {}\n", identity.name);
-  if (!identity.is_imported) text += fmt::format("Seed      {}\n", identity.seed);
+  std::string text = fmt::format("Campaign  {}\n", review.name);
+  if (!review.is_imported) text += fmt::format("Seed      {}\n", review.seed);
   text += fmt::format("Digest    {}\n", review.results.digests.results);
   if (review.results.digest_check == DigestCheck::not_checked) {
     text += fmt::format("          (not checked: no stored one of these {} runs)\n",
                         statistics.num_runs);
   }
   text += fmt::format("Runs      {} finished of {}, {} completed\n", statistics.num_runs,
-                      identity.num_runs, statistics.num_estimated);
+                      review.num_runs, statistics.num_estimated);
   if (statistics.num_estimated < statistics.num_runs) {
     const MissingEstimates& missing = review.results.missing;
     text += fmt::format(

@@ -188,12 +188,12 @@ std::string report_json(const Review& review, std::span<const StatedRequirement>
   const ReadResults& results = review.results;
   const CampaignStatistics& statistics = results.statistics;
   const MissingEstimates& missing = results.missing;
-  Json json{{"campaign", review.identity.name},
-            {"seed", std::to_string(review.identity.seed)},
+  Json json{{"campaign", review.name},
+            {"seed", std::to_string(review.seed)},
             {"digest", results.digests.results},
-            {"note", review.identity.note},
+            {"note", review.note},
             {"is_digest_checked", results.digest_check == DigestCheck::holds},
-            {"num_runs", review.identity.num_runs},
+            {"num_runs", review.num_runs},
             {"num_finished", statistics.num_runs},
             {"num_with_estimate", statistics.num_estimated},
             {"num_not_converged", missing.num_not_converged},

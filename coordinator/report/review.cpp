@@ -9,22 +9,18 @@
 namespace proofmass::coordinator {
 namespace {
 
-CampaignIdentity identity_of(const Store& store, const Campaign& campaign) {
-  return {.name = store.name(),
-          .seed = store.seed(),
-          .num_runs = store.num_runs(),
-          .model_version = store.model_version(),
-          .is_of_program = !store.model().description().empty(),
-          .is_imported = store.model().is_imported(),
-          .note = campaign.note(),
-          .build = store.build(),
-          .created_utc = store.created_utc(),
-          .definition_digest = store.table_digest()};
-}
-
 Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDepth depth,
                          std::vector<StatedRequirement> stated) {
-  Review review{.identity = identity_of(store, campaign),
+  Review review{.name = store.name(),
+                .seed = store.seed(),
+                .num_runs = store.num_runs(),
+                .model_version = store.model_version(),
+                .is_of_program = !store.model().description().empty(),
+                .is_imported = store.model().is_imported(),
+                .note = campaign.note(),
+                .build = store.build(),
+                .created_utc = store.created_utc(),
+                .definition_digest = store.table_digest(),
                 .schema = store.schema(),
                 .objectives = campaign.objectives(),
                 .interpretation = campaign.interpretation(),

@@ -17,8 +17,10 @@
 
 namespace proofmass::coordinator {
 
-/// What a campaign database says of itself. Any of these texts may come from a stranger.
-struct CampaignIdentity {
+/// Everything that reports and their charts are made of.
+struct Review {
+  std::string database = {};  ///< As commands name it; whoever read the review knows that.
+  // What the database says of itself. Any of these texts may come from a stranger.
   std::string name = {};
   std::uint64_t seed = 0;
   std::uint64_t num_runs = 0;  ///< Wanted.
@@ -29,12 +31,6 @@ struct CampaignIdentity {
   std::string build = {};
   std::string created_utc = {};
   std::string definition_digest = {};
-};
-
-/// Everything that reports and their charts are made of.
-struct Review {
-  std::string database = {};  ///< As commands name it; whoever read the review knows that.
-  CampaignIdentity identity = {};
   ResultSchema schema = {};  ///< What the results are.
   ReadResults results = {};
   std::vector<double> objectives = {};  ///< Of each quantity, SI.

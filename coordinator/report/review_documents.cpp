@@ -195,7 +195,7 @@ std::vector<Section> sections_of(const Review& review) {
 
 std::string summary_markup(const Review& review, std::span<const Section> sections) {
   std::string html =
-      fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.identity.name));
+      fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.name));
   for (const auto& [text, source] : review_summary(review)) {
     const auto section = std::ranges::find(sections, source, &Section::title);
     html += fmt::format("<li>{} (<a href=\"#{}\">{}</a>)</li>\n", markup_text(text), section->id,
@@ -228,7 +228,7 @@ std::string review_html(const Review& review) {
       "<header>\n{}<nav aria-label=\"Sections\"><ul>\n{}</ul></nav>\n</header>\n"
       "<main id=\"content\">\n{}</main>\n<footer><p>Made by Proofmass from {}.</p></footer>\n"
       "</body>\n</html>\n",
-      policy, markup_text(review.identity.name), review_style(), page_style,
+      policy, markup_text(review.name), review_style(), page_style,
       summary_markup(review, sections), navigation, content, markup_text(review.database));
 }
 
@@ -283,7 +283,7 @@ std::string code_span(std::string_view text) {
 }  // namespace
 
 std::string review_markdown(const Review& review) {
-  std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.identity.name));
+  std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.name));
   for (const auto& [sentence, source] : review_summary(review)) {
     text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
   }

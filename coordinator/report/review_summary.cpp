@@ -54,7 +54,7 @@ std::string question(const Review& review) {
 
 std::string draws(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  const std::uint64_t num_wanted = review.identity.num_runs;
+  const std::uint64_t num_wanted = review.num_runs;
   const std::uint64_t num_done = statistics.num_runs + review.results.missing.num_given_up;
   const std::uint64_t num_missing = num_done - statistics.num_estimated;
   std::string text = num_done < num_wanted

@@ -88,26 +88,25 @@ Table cause_table(const Review& review) {
 }
 
 Table identity_table(const Review& review) {
-  const CampaignIdentity& identity = review.identity;
   const CampaignStatistics& statistics = review.results.statistics;
   const MissingEstimates& missing = review.results.missing;
   Table table =
       facts("identity", "The campaign",
-            {{"campaign", identity.name},
-             {"seed", std::to_string(identity.seed)},
+            {{"campaign", review.name},
+             {"seed", std::to_string(review.seed)},
              {"runs", fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
-                                  identity.num_runs, statistics.num_estimated)},
+                                  review.num_runs, statistics.num_estimated)},
              {"not converged", std::to_string(statistics.num_not_converged)},
              {"with a warning", std::to_string(review.results.warnings.num_runs)},
              {"without an estimate", missing.total() == 0 ? "none" : reasons_text(missing)},
-             {"model", identity.model_version},
-             {"build", identity.build},
-             {"created", identity.created_utc},
+             {"model", review.model_version},
+             {"build", review.build},
+             {"created", review.created_utc},
              {"SHA-256 of the results", digest_words(review)},
-             {"SHA-256 of the definition", identity.definition_digest}});
-  if (identity.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
+             {"SHA-256 of the definition", review.definition_digest}});
+  if (review.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
   if (!review.stop.empty()) table.rows.push_back({"stop rule", review.stop});
-  if (!identity.note.empty()) table.rows.push_back({"note", identity.note});
+  if (!review.note.empty()) table.rows.push_back({"note", review.note});
   return table;
 }
 
@@ -162,12 +161,12 @@ Table host_table(const Review& review) {
 
 std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
   const std::string database = wire::shell_word(review.database);
-  if (review.identity.is_imported) {
+  if (review.is_imported) {
     return {{fmt::format("proofmass verify {}", database), "checks the database"},
             {fmt::format("proofmass report {} --html report.html", database),
              "makes this report anew"}};
   }
-  const char* const program = review.identity.is_of_program ? " --model-program PROGRAM" : "";
+  const char* const program = review.is_of_program ? " --model-program PROGRAM" : "";
   std::vector<std::pair<std::string, std::string>> commands{
       {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),
        "checks the database, simulates a tenth of the runs again and compares all bits"},

@@ -29,7 +29,9 @@ MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) 
 /// What is seen of a campaign with these statistics.
 Review review_of(const Campaign& campaign, const CampaignStatistics& statistics,
                  std::uint64_t num_given_up = 0) {
-  Review review{.identity = {.name = "hardy2013", .seed = 1, .num_runs = 100},
+  Review review{.name = "hardy2013",
+                .seed = 1,
+                .num_runs = 100,
                 .schema = test::schema(),
                 .objectives = campaign.objectives(),
                 .budget = campaign.error_budget()};
@@ -170,9 +172,9 @@ TEST(Report, FitsATerminal) {
     EXPECT_THAT(lines_of(terminal_text(budget_table(review))), Each(FitsATerminal()));
   }
   Review review = review_of(MicroscopeCampaign{}, statistics);
-  review.identity = {.name = std::string(64, 'n'),
-                     .seed = std::numeric_limits<std::uint64_t>::max(),
-                     .num_runs = most};
+  review.name = std::string(64, 'n');
+  review.seed = std::numeric_limits<std::uint64_t>::max();
+  review.num_runs = most;
   review.results.digests.results = std::string(64, 'f');
   review.results.statistics.num_estimated = most / 4;
   review.results.missing = {

@@ -27,7 +27,7 @@ TEST_F(ReviewHtml, ShowsTextOfStrangersAsText) {
                             {{.id = test::hostile_text,
                               .text = test::hostile_text,
                               .requirement = "k2c < 10 for 95% with 90%"}});
-  review.database = review.identity.name = review.identity.build = test::hostile_text;
+  review.database = review.name = review.build = test::hostile_text;
   const std::string html = review_html(review);
   EXPECT_EQ(test::malformed_part(as_xml(html)), "");
   EXPECT_THAT(html, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("\x1b"))));
