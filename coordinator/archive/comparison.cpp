@@ -234,9 +234,7 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
                            const IsStopped& is_stopped) {
   if (is_stopped()) throw Interrupted();
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-  CheckedResults checked = read_checked_results(store, *campaign);
-  const MissingEstimates missing =
-      missing_in(checked.results.statistics, num_runs_in(checked.given_up));
+  ReadResults results = read_checked_results(store, *campaign);
   const auto open_results = [&store, is_stopped]() -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
     return [reader = std::make_shared<ResultReader>(store.results()), is_stopped] {
@@ -246,10 +244,10 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
   };
   return {.member = {.file = file,
                      .num_runs = store.num_runs(),
-                     .statistics = std::move(checked.results.statistics),
-                     .digest = checked.results.digests.results,
+                     .statistics = std::move(results.statistics),
+                     .digest = results.digests.results,
                      .why_not_independent = why_not_independent(*campaign),
-                     .missing = missing,
+                     .missing = results.missing,
                      .quantities = store.schema().quantities,
                      .objectives = campaign->objectives(),
                      .comparison = std::nullopt},

@@ -192,14 +192,15 @@ void write_texts(const path& folder, std::span<const std::string> authors,
   const Store store = Store::open_read_only(folder / database_name);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   write_campaign(*campaign, folder);
-  Review review = read_review(store, *campaign, database_name, {}, WithCauses::yes);
+  Review review = read_review(store, *campaign, ReviewDepth::causes);
+  review.database = database_name;
   review.spectra = worst_run_spectra(store, review, is_stopped);
   const std::string digest = digest_of(store);
   const auto write = [&](const char* name, const std::string& text) {
     write_file(folder / name, text, wire::IfThere::keep);
   };
   write("report.html", review_html(review));
-  write("report.txt", report_text(store, *campaign));
+  write("report.txt", report_text(review));
   write("README.md", readme_of(store, digest));
   write("CITATION.cff", citation_of(store, digest, authors));
 }

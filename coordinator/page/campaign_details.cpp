@@ -132,14 +132,6 @@ bool has_other_results(const CampaignResults* read, const CampaignRecord& campai
   return read == nullptr || !read->failure.empty() || read->num_runs != campaign.status.num_done();
 }
 
-/// What a reading that failed has is as old as before.
-template <typename Part>
-void take(std::shared_ptr<const Part> read, TimePoint began_at, std::shared_ptr<const Part>& part,
-          TimePoint& read_at) {
-  if (read->failure.empty() || part == nullptr) read_at = began_at;
-  part = std::move(read);
-}
-
 CampaignDetails without_room(TimePoint now) {
   const std::string failure =
       fmt::format("campaigns that are looked at = {} (must be fewer; try again in {} s)",
@@ -147,7 +139,7 @@ CampaignDetails without_room(TimePoint now) {
   auto events = std::make_shared<CampaignEvents>();
   auto results = std::make_shared<CampaignResults>();
   events->failure = results->failure = failure;
-  return {.events = events, .results = results, .events_at = now, .results_at = now};
+  return {.events = events, .results = results, .results_at = now};
 }
 
 }  // namespace
@@ -229,19 +221,21 @@ std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
   }
   std::optional<Choice> choice;
   TimePoint due_first = now;
-  const auto consider = [&](const std::string& name, Part part, TimePoint due) {
+  const auto consider = [&](const std::string& name, const Watched& watched,
+                            TimePoint Watched::*part) {
+    const TimePoint due = watched.*part;
     if (due > now) {
       look_again = std::min(look_again, due);
     } else if (!choice || due < due_first) {
-      choice = Choice{.name = name, .part = part};
+      choice = Choice{.name = name, .due = part};
       due_first = due;
     }
   };
   for (const auto& [name, watched] : watched_) {
     if (!is_wanted(watched.asked_at, now)) continue;
-    consider(name, Part::events, watched.events_due);
+    consider(name, watched, &Watched::events_due);
     if (has_other_results(watched.details.results.get(), watched.campaign)) {
-      consider(name, Part::results, watched.results_due);
+      consider(name, watched, &Watched::results_due);
     }
   }
   return choice;
@@ -249,32 +243,26 @@ std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
 
 void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock) {
   const CampaignRecord campaign = watched_.at(choice.name).campaign;
-  const CampaignDetails before = watched_.at(choice.name).details;
+  CampaignDetails details = watched_.at(choice.name).details;
   lock.unlock();
   const TimePoint began_at = steady_now();
   const Duration cpu_before = cpu_time_of_thread();
-  std::shared_ptr<const CampaignEvents> events;
-  std::shared_ptr<const CampaignResults> results;
-  if (choice.part == Part::events) {
-    events = sources_.read_events(campaign, before.events.get());
+  if (choice.due == &Watched::events_due) {
+    details.events = sources_.read_events(campaign, details.events.get());
   } else {
-    results = sources_.read_results(campaign, before.results.get());
+    // What a reading that failed has is as old as before.
+    const bool is_first = details.results == nullptr;
+    details.results = sources_.read_results(campaign, details.results.get());
+    if (is_first || details.results->failure.empty()) details.results_at = began_at;
   }
   const TimePoint ended_at = steady_now();
   const Duration cpu_time = cpu_time_of_thread() - cpu_before;
-  const TimePoint due = next_reading(ended_at, cpu_time);
   lock.lock();
   rests_until_ = end_of_rest(ended_at, cpu_time);
   const auto found = watched_.find(choice.name);
   if (found == watched_.end() || !is_same(found->second.campaign, campaign)) return;
-  Watched& watched = found->second;
-  if (events != nullptr) {
-    watched.events_due = due;
-    take(std::move(events), began_at, watched.details.events, watched.details.events_at);
-  } else {
-    watched.results_due = due;
-    take(std::move(results), began_at, watched.details.results, watched.details.results_at);
-  }
+  found->second.*choice.due = next_reading(ended_at, cpu_time);
+  found->second.details = std::move(details);
 }
 
 void DetailReader::read_next(std::unique_lock<std::mutex>& lock) {

@@ -77,11 +77,11 @@ struct CampaignResults {
   std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.
 };
 
-/// What was read, and when. Parts are null before they were read for the first time.
+/// What was read, and when the results were. Parts are null before they were read for the first
+/// time.
 struct CampaignDetails {
   std::shared_ptr<const CampaignEvents> events = {};
   std::shared_ptr<const CampaignResults> results = {};
-  TimePoint events_at{};
   TimePoint results_at{};
 };
 
@@ -133,10 +133,9 @@ class DetailReader {
     TimePoint events_due{};
     TimePoint results_due{};
   };
-  enum class Part : std::uint8_t { events, results };
   struct Choice {
     std::string name;
-    Part part = Part::events;
+    TimePoint Watched::*due;  ///< Says which part is meant.
   };
 
   void work();

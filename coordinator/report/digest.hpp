@@ -25,7 +25,6 @@ namespace proofmass::coordinator {
 /// ResultSchema::health, cause and session of the loss (32 bits each; 0 unless the run is lost).
 class Digest {
  public:
-  /// @param schema  Of the campaign.
   explicit Digest(const ResultSchema& schema);
 
   void add(const RunResult& result);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace proofmass::coordinator {
 namespace {
@@ -41,7 +42,7 @@ void ErrorFigures::add_error(RunIndex run, double error, Growing& quantity) {
   const double magnitude = std::abs(error);
   quantity.magnitudes.add(magnitude);
   quantity.errors.add(error);
-  add_if_worst({.run = run, .value = magnitude}, quantity.worst);
+  add_if_worst({.run = run, .value = magnitude}, quantity.figures.worst);
   if (!quantity.sums) quantity.sums.emplace(magnitude);
   quantity.sums->add(magnitude);
 }
@@ -49,9 +50,9 @@ void ErrorFigures::add_error(RunIndex run, double error, Growing& quantity) {
 void ErrorFigures::add_convergence() {
   for (Growing& quantity : quantities_) {
     const Moments moments = quantity.sums->moments();
-    quantity.convergence.push_back(
+    quantity.figures.convergence.push_back(
         {.num_runs = num_estimated_,
-         .worst = quantity.worst.front().value,
+         .worst = quantity.figures.worst.front().value,
          .mean = moments.mean,
          .mean_interval = mean_interval(moments, default_confidence),
          .standard_deviation = moments.standard_deviation,
@@ -79,15 +80,13 @@ void leave_out_intervals(QuantityFigures& figures) {
 
 std::vector<QuantityFigures> ErrorFigures::figures() {
   // Where runs have no estimate, the last count is not reached.
-  const bool has_last = !quantities_.empty() && !quantities_[0].convergence.empty() &&
-                        quantities_[0].convergence.back().num_runs == num_estimated_;
+  const bool has_last = next_count_ > 0 && counts_[next_count_ - 1] == num_estimated_;
   if (num_estimated_ > 0 && !has_last) add_convergence();
   std::vector<QuantityFigures> figures;
-  for (const Growing& quantity : quantities_) {
-    figures.push_back({.magnitudes = quantity.magnitudes.histogram(),
-                       .errors = quantity.errors.histogram(),
-                       .worst = quantity.worst,
-                       .convergence = quantity.convergence});
+  for (Growing& quantity : quantities_) {
+    quantity.figures.magnitudes = quantity.magnitudes.histogram();
+    quantity.figures.errors = quantity.errors.histogram();
+    figures.push_back(std::move(quantity.figures));
   }
   return figures;
 }

@@ -55,9 +55,8 @@ class ErrorFigures {
   struct Growing {
     MagnitudeBins magnitudes;
     ErrorBins errors;
-    std::vector<RunValue> worst;
     std::optional<MomentSums> sums;  ///< About the first |error|, which is of their size.
-    std::vector<ConvergencePoint> convergence;
+    QuantityFigures figures = {};    ///< Without the histograms, which are made at the end.
   };
 
   static void add_error(RunIndex run, double error, Growing& quantity);

@@ -60,7 +60,6 @@ struct InstrumentStatistics {
 /// as a lost one.
 class RunningInstruments {
  public:
-  /// @param schema        Of the campaign.
   /// @param objectives    Of each quantity, SI.
   /// @param realisations  At least 2.
   RunningInstruments(const ResultSchema& schema, std::vector<double> objectives,

@@ -52,10 +52,9 @@ std::string LiveResults::html() const {
   }
   StandardErrorStatistics errors = standard_errors_.statistics();
   if (!are_draws_independent_) leave_out_intervals(errors);
-  return "<h3>Accuracy so far</h3>\n" +
-         html_table(accuracy_table(schema_, objectives_, review.results.statistics)) +
-         table_or_nothing(standard_error_table(schema_, errors)) +
-         table_or_nothing(fit_table(schema_, errors.fit)) + "<h3>Errors so far</h3>\n<figure>\n" +
+  std::string html = "<h3>Accuracy so far</h3>\n" + html_table(accuracy_table(review));
+  for (const Table& table : standard_error_tables(schema_, errors)) html += table_or_nothing(table);
+  return html + "<h3>Errors so far</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }
 

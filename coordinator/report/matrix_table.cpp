@@ -11,11 +11,10 @@ namespace {
 Cell count_cell(std::uint64_t count) { return {std::to_string(count), static_cast<double>(count)}; }
 
 /// `|error| of a_c12`, or the budget or a term of it.
-std::string subject_of(const RequirementAnswer& row, std::size_t num_quantities) {
+std::string subject_of(const RequirementAnswer& row) {
   if (row.is_joint()) return "all objectives";
   const std::string symbol(row.subject.symbol);
-  const bool is_error = row.requirement.parameter < num_quantities;
-  return is_error ? "|error| of " + symbol : symbol;
+  return row.is_of_error ? "|error| of " + symbol : symbol;
 }
 
 /// In the unit of the tables; a ratio to the objectives without one.
@@ -33,19 +32,19 @@ Cell margin_cell(const RequirementAnswer& row) {
 }
 
 /// `|error| of a_c12, for 95 % with 90 %`, after the words of the project.
-std::string statement_of(const RequirementAnswer& row, std::size_t num_quantities) {
+std::string statement_of(const RequirementAnswer& row) {
   const Tolerance& tolerance = row.requirement.tolerance;
   const std::string text =
-      fmt::format("{}, for {} with {}", subject_of(row, num_quantities),
-                  given_percent(tolerance.coverage), given_percent(tolerance.confidence));
+      fmt::format("{}, for {} with {}", subject_of(row), given_percent(tolerance.coverage),
+                  given_percent(tolerance.confidence));
   return row.stated.text.empty() || is_default(row) ? text
                                                     : fmt::format("{} ({})", row.stated.text, text);
 }
 
-Row matrix_cells(const RequirementAnswer& row, std::size_t num_quantities) {
+Row matrix_cells(const RequirementAnswer& row) {
   const RequirementCheck& check = row.check;
   return {requirement_name(row),
-          statement_of(row, num_quantities),
+          statement_of(row),
           value_cell(row, row.limit),
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
@@ -128,9 +127,7 @@ Table matrix_table(const Review& review) {
     table.notes = {fmt::format("No verdicts: {}.", review.why_not_independent)};
     return table;
   }
-  for (const RequirementAnswer& row : review.matrix) {
-    table.rows.push_back(matrix_cells(row, review.schema.quantities.size()));
-  }
+  for (const RequirementAnswer& row : review.matrix) table.rows.push_back(matrix_cells(row));
   return table;
 }
 

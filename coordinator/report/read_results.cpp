@@ -18,10 +18,10 @@ namespace {
 
 // A run that is given up is one of those that lack a result, and as many as were counted with the
 // statistics.
-void check_given_up(const Store& store, const CampaignStatistics& statistics,
-                    std::uint64_t num_given_up) {
+void check_given_up(const Store& store, const ReadResults& results) {
+  const std::uint64_t num_given_up = results.missing.num_given_up;
   const std::optional<Summary> summary = store.summary();
-  if (summary && summary->num_finished == statistics.num_runs &&
+  if (summary && summary->num_finished == results.statistics.num_runs &&
       num_given_up < summary->num_given_up) {
     store.refuse_as_damaged(fmt::format("{} runs are given up, and its statistics are beside {}",
                                         num_given_up, summary->num_given_up));
@@ -81,7 +81,8 @@ void end_totals(std::vector<double> totals, std::optional<RunTotals>& of_runs) {
 /// these runs: those that were given up, which have no result, count as lost.
 class RunGroups {
  public:
-  RunGroups(const Store& store, const Campaign& campaign) {
+  RunGroups(const Store& store, const Campaign& campaign, std::vector<RunRange> given_up)
+      : given_up_(std::move(given_up)) {
     const std::uint64_t realisations = campaign.num_realisations();
     const SamplingDesign design = campaign.sampling_design();
     if (realisations > 1) {
@@ -90,8 +91,6 @@ class RunGroups {
     if (design.points > 1) {
       replicates_.emplace(store.schema(), campaign.objectives(), design);
     }
-    if (!instruments_ && !replicates_) return;
-    given_up_ = store.given_up_runs();
     std::ranges::reverse(given_up_);
   }
 
@@ -147,14 +146,6 @@ void MissingEstimates::add(const RunResult& result) {
 
 std::uint64_t MissingEstimates::total() const {
   return num_not_converged + num_not_finite + num_no_draw + num_lost + num_given_up;
-}
-
-MissingEstimates missing_in(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  return {.num_not_converged = statistics.num_not_converged,
-          .num_not_finite = statistics.num_not_finite,
-          .num_no_draw = statistics.num_no_draw,
-          .num_lost = statistics.num_lost,
-          .num_given_up = num_given_up};
 }
 
 std::string reasons_text(const MissingEstimates& missing) {
@@ -219,11 +210,14 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   const Warner warner = campaign.warner();
   store.read_one_state([&] {
-    RunGroups groups(store, campaign);
+    results.given_up = store.given_up_runs();
+    results.missing.num_given_up = num_runs_in(results.given_up);
+    RunGroups groups(store, campaign, results.given_up);
     Digest digest(store.schema());
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, store.schema());
       statistics.add(result);
+      results.missing.add(result);
       standard_errors.add(result);
       groups.add(result);
       kept.add(result);
@@ -252,18 +246,16 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   return results;
 }
 
-CheckedResults read_checked_results(const Store& store, const Campaign& campaign,
-                                    const ResultVisitor& further) {
-  CheckedResults checked;
+ReadResults read_checked_results(const Store& store, const Campaign& campaign,
+                                 const ResultVisitor& further) {
+  ReadResults results;
   store.read_one_state([&] {
-    checked.results = read_results(store, campaign, further);
-    const CampaignStatistics& statistics = checked.results.statistics;
-    checked.check = check_digest(store, statistics.num_runs, checked.results.digests);
-    checked.given_up = store.given_up_runs();
-    check_given_up(store, statistics, num_runs_in(checked.given_up));
+    results = read_results(store, campaign, further);
+    results.digest_check = check_digest(store, results.statistics.num_runs, results.digests);
+    check_given_up(store, results);
     check_stop_checks(store, campaign.objectives());
   });
-  return checked;
+  return results;
 }
 
 void update_statistics(Store& store, const Campaign& campaign) {

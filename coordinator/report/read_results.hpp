@@ -34,10 +34,6 @@ struct MissingEstimates {
   bool operator==(const MissingEstimates&) const = default;
 };
 
-/// Those of a campaign, of which so many runs were given up.
-[[nodiscard]] MissingEstimates missing_in(const CampaignStatistics& statistics,
-                                          std::uint64_t num_given_up);
-
 /// `2 not finite, 1 without draw`, at most 76 characters; empty if there are none.
 [[nodiscard]] std::string reasons_text(const MissingEstimates& missing);
 
@@ -79,6 +75,9 @@ struct ReadResults {
   StandardErrorStatistics standard_errors;
   std::optional<InstrumentStatistics> instruments = {};  ///< With several realisations for each.
   std::optional<ReplicateStatistics> replicates = {};    ///< Of a sampling design.
+  std::vector<RunRange> given_up = {};                   ///< Ascending.
+  MissingEstimates missing = {};
+  DigestCheck digest_check = DigestCheck::not_checked;  ///< See read_checked_results().
 };
 
 /// Sees what read_results() reads.
@@ -96,17 +95,11 @@ struct ResultVisitor {
 [[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign,
                                        const ResultVisitor& further = {});
 
-/// What a report is made of.
-struct CheckedResults {
-  ReadResults results;
-  DigestCheck check = DigestCheck::holds;
-  std::vector<RunRange> given_up;  ///< Ascending.
-};
-
 /// Reads all results, of one state of the file, and holds them against what is stored beside them.
-/// @throws StoreError as report_text() does.
-[[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign,
-                                                  const ResultVisitor& further = {});
+/// @throws StoreError if results, given-up runs or stop checks are not what was stored; see
+///         check_digest().
+[[nodiscard]] ReadResults read_checked_results(const Store& store, const Campaign& campaign,
+                                               const ResultVisitor& further = {});
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);

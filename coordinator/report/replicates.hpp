@@ -58,7 +58,6 @@ inline constexpr double count_deviation_min = 0.5;
 /// as a lost one.
 class RunningReplicates {
  public:
-  /// @param schema      Of the campaign.
   /// @param objectives  Of each quantity, SI.
   /// @param design      Not `random`.
   RunningReplicates(const ResultSchema& schema, std::vector<double> objectives,

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +11,6 @@
 #include "coordinator/report/status_json.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/independence.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -76,8 +76,9 @@ Json parameters_of(const std::vector<Quantity>& quantities, const std::vector<do
   return json;
 }
 
-Json budget_of(const ResultSchema& schema, const Campaign& campaign, const ReadResults& results) {
-  const std::optional<ErrorBudget> budget = campaign.error_budget();
+Json budget_of(const Review& review) {
+  const std::optional<ErrorBudget>& budget = review.budget;
+  const ReadResults& results = review.results;
   if (!budget) return nullptr;
   const auto& [before, worst, mean] = budget_columns(*budget, results.statistics);
   const auto row = [&](std::string_view name, const auto& value_of) -> Json {
@@ -90,7 +91,7 @@ Json budget_of(const ResultSchema& schema, const Campaign& campaign, const ReadR
             {"total", row(budget->total_info.name, [](const Budget& of) { return of.total; })},
             {"single_runs", nullptr},
             {"level",
-             {{"quantity", schema.health.at(budget->level).column()},
+             {{"quantity", review.schema.health.at(budget->level).column()},
               {"worst", nullptr},
               {"mean", nullptr},
               {"assumed", budget->assumed_level}}}};
@@ -182,57 +183,48 @@ Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
 
 }  // namespace
 
-std::string report_json(const Store& store, const Campaign& campaign,
-                        std::span<const RequirementAnswer> answers,
-                        std::span<const StatedRequirement> stated) {
-  const ResultSchema& schema = store.schema();
-  VerificationMatrix matrix(
-      schema, matrix_requirements(schema, {stated.begin(), stated.end()}, campaign.objectives()),
-      campaign.objectives(), num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
-      campaign.error_budget());
-  const CheckedResults checked = read_checked_results(
-      store, campaign,
-      {.result = [&](const RunResult& result) { matrix.add(result); },
-       .magnitudes = [&](std::size_t quantity,
-                         auto magnitudes) { matrix.add_magnitudes(quantity, magnitudes); }});
-  const CampaignStatistics& statistics = checked.results.statistics;
-  const std::uint64_t num_given_up = num_runs_in(checked.given_up);
-  Json json{{"campaign", store.name()},
-            {"seed", std::to_string(store.seed())},
-            {"digest", checked.results.digests.results},
-            {"note", campaign.note()},
-            {"is_digest_checked", checked.check == DigestCheck::holds},
-            {"num_runs", store.num_runs()},
+std::string report_json(const Review& review, std::span<const StatedRequirement> stated) {
+  const ResultSchema& schema = review.schema;
+  const ReadResults& results = review.results;
+  const CampaignStatistics& statistics = results.statistics;
+  const MissingEstimates& missing = results.missing;
+  Json json{{"campaign", review.name},
+            {"seed", std::to_string(review.seed)},
+            {"digest", results.digests.results},
+            {"note", review.note},
+            {"is_digest_checked", results.digest_check == DigestCheck::holds},
+            {"num_runs", review.num_runs},
             {"num_finished", statistics.num_runs},
             {"num_with_estimate", statistics.num_estimated},
-            {"num_not_converged", statistics.num_not_converged},
-            {"num_not_finite", statistics.num_not_finite},
-            {"num_no_draw", statistics.num_no_draw},
-            {"num_lost", statistics.num_lost},
-            {"num_given_up", num_given_up},
-            {"num_warned", checked.results.warnings.num_runs},
-            {"warnings", warnings_of(schema, checked.results.warnings)},
+            {"num_not_converged", missing.num_not_converged},
+            {"num_not_finite", missing.num_not_finite},
+            {"num_no_draw", missing.num_no_draw},
+            {"num_lost", missing.num_lost},
+            {"num_given_up", missing.num_given_up},
+            {"num_warned", results.warnings.num_runs},
+            {"warnings", warnings_of(schema, results.warnings)},
             {"confidence", default_confidence},
-            {"parameters", parameters_of(schema.quantities, campaign.objectives(), statistics)},
+            {"parameters", parameters_of(schema.quantities, review.objectives, statistics)},
             {"all_objectives",
              {{"num_within", statistics.num_within_objectives},
-              {"num_runs", statistics.num_runs + num_given_up},
-              {"fraction_within_interval", statistics.within_objectives(num_given_up)}}},
-            {"standard_errors", standard_errors_of(schema, checked.results.standard_errors)},
-            {"budget", budget_of(schema, campaign, checked.results)},
+              {"num_runs", statistics.num_runs + missing.num_given_up},
+              {"fraction_within_interval", statistics.within_objectives(missing.num_given_up)}}},
+            {"standard_errors", standard_errors_of(schema, results.standard_errors)},
+            {"budget", budget_of(review)},
             {"requirements", Json::array()},
             {"matrix", Json::array()}};
-  if (const auto& instruments = checked.results.instruments) {
-    json["instruments"] = json_of(schema, *instruments);
+  if (results.instruments) json["instruments"] = json_of(schema, *results.instruments);
+  if (results.replicates) json["replicates"] = json_of(schema, *results.replicates);
+  json["why_not_independent"] = review.why_not_independent;
+  const auto id_of = [](const RequirementAnswer& row) -> const std::string& {
+    return row.stated.id;
+  };
+  for (const StatedRequirement& each : stated) {
+    json["requirements"].push_back(json_of(*std::ranges::find(review.matrix, each.id, id_of)));
   }
-  if (const auto& replicates = checked.results.replicates) {
-    json["replicates"] = json_of(schema, *replicates);
-  }
-  json["why_not_independent"] = why_not_independent(campaign);
-  for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
-  for (const RequirementAnswer& row : matrix.answers()) {
-    if (!statistics.are_draws_independent) break;
-    json["matrix"].push_back(json_of(row, campaign.interpretation()));
+  for (const RequirementAnswer& row : review.matrix) {
+    if (!review.why_not_independent.empty()) break;
+    json["matrix"].push_back(json_of(row, review.interpretation));
   }
   return dumped(json, JsonLayout::indented);
 }

@@ -138,7 +138,8 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
 }
 
 /// Which biases differ from 0 if all parameters are looked at together.
-std::string bias_sentence(const ResultSchema& schema, const CampaignStatistics& statistics) {
+std::string bias_sentence(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
   std::vector<double> p_values;
   for (const AccuracyStatistic& accuracy : statistics.accuracy) {
     p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
@@ -147,28 +148,30 @@ std::string bias_sentence(const ResultSchema& schema, const CampaignStatistics& 
   std::string names;
   for (std::size_t i = 0; i < adjusted.size(); ++i) {
     if (adjusted[i] >= 1.0 - default_confidence) continue;
-    names += (names.empty() ? "" : ", ") + std::string(schema.quantities[i].symbol);
+    names += (names.empty() ? "" : ", ") + std::string(review.schema.quantities[i].symbol);
   }
   return fmt::format(
       "Bias: each interval holds by itself. Of all {} together (Holm, 5 %) {}.", adjusted.size(),
       names.empty() ? "no bias differs from 0" : "the bias differs from 0 of " + names);
 }
 
-std::string joint_sentence(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                           Interpretation interpretation) {
+std::string joint_sentence(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
+  const std::uint64_t num_given_up = review.results.missing.num_given_up;
   const std::string seen =
       fmt::format("all objectives together: {} of {} runs", statistics.num_within_objectives,
                   statistics.num_runs + num_given_up);
   const std::optional<Interval> share = statistics.within_objectives(num_given_up);
   if (!share) return seen;
   return fmt::format("{}, {} of all draws ({})", seen, interval_percent(*share),
-                     name_of(interpretation));
+                     name_of(review.interpretation));
 }
 
 /// What the level of a budget is, and that it is the one of the runs or an assumed one.
-std::string level_sentence(const ResultSchema& schema, const ErrorBudget& budget,
-                           const CampaignStatistics& statistics) {
-  const std::string_view unit = schema.health.at(budget.level).unit;
+std::string level_sentence(const Review& review) {
+  const ErrorBudget& budget = *review.budget;
+  const CampaignStatistics& statistics = review.results.statistics;
+  const std::string_view unit = review.schema.health.at(budget.level).unit;
   if (statistics.health.empty() || statistics.health.at(budget.level).worst == 0.0) {
     return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
   }
@@ -178,23 +181,22 @@ std::string level_sentence(const ResultSchema& schema, const ErrorBudget& budget
 }
 
 /// What error_table() shows where draws are not independent and there is no interval.
-Table dependent_error_table(const ResultSchema& schema, const CampaignStatistics& statistics,
-                            std::uint64_t num_given_up, Interpretation interpretation,
-                            const std::string& why) {
+Table dependent_error_table(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
   constexpr const char* percentiles = "percentiles of |error|";
-  Table table{.id = "error-table",
-              .caption = "Errors, in the units above",
-              .columns = {{"parameter", true, 11},
-                          {"bias", false, 9},
-                          {"skew", false, 8},
-                          {"50 %", false, 8, percentiles, true},
-                          {"90 %", false, 8, percentiles},
-                          {"95 %", false, 8, percentiles},
-                          {"99 %", false, 8, percentiles}},
-              .notes = {"no intervals over runs: " + why,
-                        joint_sentence(statistics, num_given_up, interpretation)}};
+  Table table{
+      .id = "error-table",
+      .caption = "Errors, in the units above",
+      .columns = {{"parameter", true, 11},
+                  {"bias", false, 9},
+                  {"skew", false, 8},
+                  {"50 %", false, 8, percentiles, true},
+                  {"90 %", false, 8, percentiles},
+                  {"95 %", false, 8, percentiles},
+                  {"99 %", false, 8, percentiles}},
+      .notes = {"no intervals over runs: " + review.why_not_independent, joint_sentence(review)}};
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    const Quantity& quantity = schema.quantities[i];
+    const Quantity& quantity = review.schema.quantities[i];
     const AccuracyStatistic& accuracy = statistics.accuracy[i];
     Row row{quantity.symbol, figure_cell(accuracy.error.bias, quantity.display_scale),
             skewness_cell(accuracy, statistics.num_estimated)};
@@ -212,15 +214,13 @@ std::string totals_sentence(const RunTotals& totals) {
       totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
 }
 
-std::vector<std::string> budget_notes(const ResultSchema& schema, const ErrorBudget& budget,
-                                      const CampaignStatistics& statistics,
-                                      const std::optional<RunTotals>& totals) {
+std::vector<std::string> budget_notes(const Review& review) {
   std::vector<std::string> notes{
       "before: bounds of construction; worst, mean: left by errors of the estimates",
-      level_sentence(schema, budget, statistics)};
-  std::istringstream lines(budget.note);
+      level_sentence(review)};
+  std::istringstream lines(review.budget->note);
   for (std::string line; std::getline(lines, line);) notes.push_back(line);
-  if (totals) notes.push_back(totals_sentence(*totals));
+  if (const auto& totals = review.results.totals) notes.push_back(totals_sentence(*totals));
   return notes;
 }
 
@@ -256,8 +256,9 @@ Cell unit_cell(const Quantity& quantity) {
   return cell;
 }
 
-Table accuracy_table(const ResultSchema& schema, std::span<const double> objectives,
-                     const CampaignStatistics& statistics) {
+Table accuracy_table(const Review& review) {
+  const ResultSchema& schema = review.schema;
+  const CampaignStatistics& statistics = review.results.statistics;
   Table table{.id = "accuracy",
               .caption = fmt::format("Accuracy of the estimates: |estimate − truth| of {}",
                                      counted(statistics.num_estimated, "run")),
@@ -277,9 +278,9 @@ Table accuracy_table(const ResultSchema& schema, std::span<const double> objecti
         table.columns.end(),
         {{"worst", false, 6, theirs, true}, {"mean", false, 6, theirs}, {"std", false, 6, theirs}});
   }
-  for (std::size_t i = 0; i < objectives.size(); ++i) {
+  for (std::size_t i = 0; i < review.objectives.size(); ++i) {
     table.rows.push_back(
-        accuracy_row(schema.quantities[i], objectives[i],
+        accuracy_row(schema.quantities[i], review.objectives[i],
                      statistics.num_estimated > 0 ? &statistics.accuracy[i] : nullptr,
                      statistics.num_estimated));
     if (has_published) add_published(schema.quantities[i], table.rows.back());
@@ -290,8 +291,8 @@ Table accuracy_table(const ResultSchema& schema, std::span<const double> objecti
   return table;
 }
 
-Table interval_table(const ResultSchema& schema, const CampaignStatistics& statistics,
-                     std::uint64_t num_given_up) {
+Table interval_table(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
   if (statistics.num_estimated == 0 || !statistics.are_draws_independent) return {};
   constexpr const char* mean = "mean of |error|";
   constexpr const char* deviation = "std of |error|";
@@ -307,26 +308,24 @@ Table interval_table(const ResultSchema& schema, const CampaignStatistics& stati
                           {"bias", false, 9, "error", true},
                           {"skew", false, 7, "error"}}};
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(
-        interval_row(schema.quantities[i], statistics.accuracy[i], statistics.num_estimated));
+    table.rows.push_back(interval_row(review.schema.quantities[i], statistics.accuracy[i],
+                                      statistics.num_estimated));
   }
   if (statistics.num_estimated < num_runs_of_bootstrap) {
     table.notes.emplace_back(
         "std: an interval from fewer than 200 runs is too narrow, see core/statistics");
   }
   table.notes.push_back(worth_of_worst(
-      statistics.num_estimated, statistics.num_runs - statistics.num_estimated + num_given_up));
+      statistics.num_estimated,
+      statistics.num_runs - statistics.num_estimated + review.results.missing.num_given_up));
   return table;
 }
 
-Table error_table(const ResultSchema& schema, const std::vector<double>& objectives,
-                  const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                  Interpretation interpretation, const std::string& why_not_independent) {
+Table error_table(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
+  const std::vector<double>& objectives = review.objectives;
   if (statistics.num_estimated == 0) return {};
-  if (!why_not_independent.empty()) {
-    return dependent_error_table(schema, statistics, num_given_up, interpretation,
-                                 why_not_independent);
-  }
+  if (!review.why_not_independent.empty()) return dependent_error_table(review);
   constexpr const char* percentiles = "percentiles of |error|";
   static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
   Table table{.id = "error-table",
@@ -343,27 +342,32 @@ Table error_table(const ResultSchema& schema, const std::vector<double>& objecti
   const bool has_objective =
       std::ranges::any_of(objectives, [](double objective) { return std::isfinite(objective); });
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(error_row(schema.quantities[i], objectives[i], statistics.accuracy[i]));
+    table.rows.push_back(
+        error_row(review.schema.quantities[i], objectives[i], statistics.accuracy[i]));
   }
-  table.notes.push_back(bias_sentence(schema, statistics));
-  if (has_objective) {
-    table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
-  }
+  table.notes.push_back(bias_sentence(review));
+  if (has_objective) table.notes.push_back(joint_sentence(review));
   return table;
 }
 
-std::vector<Table> group_tables(const ResultSchema& schema, const ReadResults& results) {
+std::vector<Table> accuracy_tables(const Review& review) {
+  return {accuracy_table(review), interval_table(review), error_table(review)};
+}
+
+std::vector<Table> group_tables(const Review& review) {
+  const ResultSchema& schema = review.schema;
+  const ReadResults& results = review.results;
   if (results.replicates) return {replicate_table(schema, *results.replicates)};
   if (!results.instruments) return {};
   return {variance_table(schema, *results.instruments),
           instrument_table(schema, *results.instruments)};
 }
 
-Table budget_table(const ResultSchema& schema, const std::optional<ErrorBudget>& budget,
-                   const CampaignStatistics& statistics, const std::optional<RunTotals>& totals) {
-  if (!budget) return {};
+Table budget_table(const Review& review) {
+  if (!review.budget) return {};
+  const ErrorBudget& budget = *review.budget;
   Table table{.id = "budget-table",
-              .caption = std::string(budget->title),
+              .caption = std::string(budget.title),
               .columns = {{"term", true, 23},
                           {"before", false, 9, ours},
                           {"worst", false, 9, ours},
@@ -372,13 +376,13 @@ Table budget_table(const ResultSchema& schema, const std::optional<ErrorBudget>&
                           {"worst", false, 9, theirs},
                           {"mean", false, 9, theirs}},
               .has_total = true,
-              .notes = budget_notes(schema, *budget, statistics, totals)};
+              .notes = budget_notes(review)};
   const auto figure = [](double value) {
     Cell cell = figure_cell(value);
     cell.text = fmt::format("{:.1e}", value);
     return cell;
   };
-  const BudgetColumns columns = budget_columns(*budget, statistics);
+  const BudgetColumns columns = budget_columns(budget, review.results.statistics);
   const auto add = [&](const BudgetEntryInfo& info, const auto& value_of) {
     Row row{info.label, figure(value_of(columns.before))};
     for (const auto& after : {columns.after_worst, columns.after_mean}) {
@@ -389,10 +393,10 @@ Table budget_table(const ResultSchema& schema, const std::optional<ErrorBudget>&
     }
     table.rows.push_back(std::move(row));
   };
-  for (std::size_t i = 0; i < budget->terms.size(); ++i) {
-    add(budget->terms[i].info, [&](const Budget& of) { return of.entries[i]; });
+  for (std::size_t i = 0; i < budget.terms.size(); ++i) {
+    add(budget.terms[i].info, [&](const Budget& of) { return of.entries[i]; });
   }
-  add(budget->total_info, [](const Budget& of) { return of.total; });
+  add(budget.total_info, [](const Budget& of) { return of.total; });
   return table;
 }
 

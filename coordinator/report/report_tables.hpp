@@ -1,19 +1,16 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
-#include "coordinator/report/read_results.hpp"
+#include "coordinator/report/review.hpp"
 #include "coordinator/table/table.hpp"
-#include "core/campaign/campaign.hpp"
-#include "core/campaign/statistics.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
 
 // The tables of `proofmass report`, which are those of a review report and of the live page, too.
-// `schema` is that of the campaign whose statistics are shown.
 // Without an estimate, a table has no rows unless it says otherwise.
 
 /// A number in the display unit, and in SI units for programs; a dash if there is none.
@@ -28,38 +25,27 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
 [[nodiscard]] Cell unit_cell(const Quantity& quantity);
 
 /// Accuracy of each parameter beside the published one, and whose that is; always with rows.
-/// @param objectives  Of each quantity, SI.
-[[nodiscard]] Table accuracy_table(const ResultSchema& schema, std::span<const double> objectives,
-                                   const CampaignStatistics& statistics);
+[[nodiscard]] Table accuracy_table(const Review& review);
 
 /// What the draws that were made say about all draws: 95 % intervals of mean and standard
 /// deviation, and the errors' bias and skewness. No rows if they are not independent.
-/// @param num_given_up  Runs that have no result, beside those in the statistics.
-[[nodiscard]] Table interval_table(const ResultSchema& schema, const CampaignStatistics& statistics,
-                                   std::uint64_t num_given_up);
+[[nodiscard]] Table interval_table(const Review& review);
 
 /// Of the error with its sign the interval of its bias; percentiles of |error|; how often a
 /// parameter is beyond its objective; and how often all objectives hold together. One line says
 /// which biases differ from 0 if all parameters are looked at together: a table of ten intervals
-/// invites to look for one without 0, which chance alone makes in 40 % of all campaigns.
-/// @param num_given_up    Runs that have no result, beside those in the statistics.
-/// @param interpretation  What the probabilities are over.
-/// @param why_not_independent  Of the draws: then bias, skewness and percentiles without intervals,
-///                             and this reason.
-[[nodiscard]] Table error_table(const ResultSchema& schema, const std::vector<double>& objectives,
-                                const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                                Interpretation interpretation,
-                                const std::string& why_not_independent = "");
+/// invites to look for one without 0, which chance alone makes in 40 % of all campaigns. Of draws
+/// that are not independent bias, skewness and percentiles without intervals, and the reason.
+[[nodiscard]] Table error_table(const Review& review);
+
+/// The three tables above.
+[[nodiscard]] std::vector<Table> accuracy_tables(const Review& review);
 
 /// The tables whose unit is an instrument or a replicate, of several runs each.
-[[nodiscard]] std::vector<Table> group_tables(const ResultSchema& schema,
-                                              const ReadResults& results);
+[[nodiscard]] std::vector<Table> group_tables(const Review& review);
 
 /// Budget before and after estimation beside the published one, and what single runs have. A
 /// campaign without a budget has no rows; one without an estimate has.
-[[nodiscard]] Table budget_table(const ResultSchema& schema,
-                                 const std::optional<ErrorBudget>& budget,
-                                 const CampaignStatistics& statistics,
-                                 const std::optional<RunTotals>& totals);
+[[nodiscard]] Table budget_table(const Review& review);
 
 }  // namespace proofmass::coordinator

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -105,28 +106,35 @@ std::string needed_line(const RequirementAnswer& answer) {
 
 }  // namespace
 
-double required_value(const RunResult& result, std::size_t position,
-                      const std::optional<ErrorBudget>& budget) {
-  const std::size_t num_quantities = result.estimate.size();
+double Exceedances::value_of(const RunResult& result) const {
+  const std::size_t position = requirement_.parameter;
+  const std::size_t num_quantities = objectives_.size();
   if (position < num_quantities) return std::abs(result.error(position));
-  PROOFMASS_EXPECT(budget.has_value());
-  const Budget of_run = budget->of_run(result);
+  PROOFMASS_EXPECT(budget_.has_value());
+  const Budget of_run = budget_->of_run(result);
   return position == num_quantities ? of_run.total
                                     : of_run.entries.at(position - num_quantities - 1);
 }
 
-void Exceedances::add(const RunResult& result) {
-  if (!result.is_completed()) return;
+double Exceedances::largest_ratio(const RunResult& result) const {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    largest = std::max(largest, std::abs(result.error(i)) / objectives_[i]);
+  }
+  return largest;
+}
+
+double Exceedances::add(const RunResult& result) {
+  ++num_estimated_;
   if (requirement_.subject == Requirement::Subject::parameter) {
-    ++num_estimated_;
-    const double value = required_value(result, requirement_.parameter, budget_);
+    const double value = value_of(result);
     if (value >= requirement_.limit) ++num_exceeding_;
-    return;
+    return value;
   }
   std::vector<double> errors(objectives_.size());
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = result.error(i);
-  ++num_estimated_;
   if (exceeds(requirement_, errors, objectives_)) ++num_exceeding_;
+  return largest_ratio(result);
 }
 
 ExceedanceCount Exceedances::of(std::uint64_t num_runs) const {

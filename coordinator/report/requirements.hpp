@@ -37,12 +37,6 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string bounds_text(const Requirement& requirement, const Interval& exceedance,
                                       RequirementVerdict verdict);
 
-/// What a requirement of the subject at a position compares with its limit, see
-/// requirement_subjects(): an |error|, the total of the budget or a term of it.
-/// @pre The result has an estimate, and there is a budget if the subject is of one.
-[[nodiscard]] double required_value(const RunResult& result, std::size_t position,
-                                    const std::optional<ErrorBudget>& budget);
-
 /// Counts the runs that exceed what is required.
 class Exceedances {
  public:
@@ -54,14 +48,19 @@ class Exceedances {
         objectives_(objectives.begin(), objectives.end()),
         budget_(budget) {}
 
-  /// Counts a result that has an estimate; others are none.
-  void add(const RunResult& result);
+  /// Counts a result that has an estimate; others are not to be added.
+  /// @return What is compared with RequirementAnswer::limit: an |error|, the total of the budget or
+  ///         a term of it; of all objectives the largest ratio of an |error| to its objective.
+  double add(const RunResult& result);
 
   /// Of so many runs; those that were not counted have no estimate and count as exceedances.
   /// @throws InvalidArgument if more were counted.
   [[nodiscard]] ExceedanceCount of(std::uint64_t num_runs) const;
 
  private:
+  [[nodiscard]] double value_of(const RunResult& result) const;
+  [[nodiscard]] double largest_ratio(const RunResult& result) const;
+
   Requirement requirement_;
   std::vector<double> objectives_;
   std::optional<ErrorBudget> budget_;
@@ -89,6 +88,7 @@ struct RequirementAnswer {
   /// Upper tolerance bound of the |error| or of that ratio by order statistics: with the confidence
   /// of the requirement, `coverage` of all draws stay below. Empty if draws are too few.
   std::optional<double> bound;
+  bool is_of_error = false;       ///< About the |error| of a parameter, not a budget or all.
   std::optional<RunValue> worst;  ///< In the unit of the limit; empty if no run has an estimate.
 
   [[nodiscard]] bool is_joint() const {

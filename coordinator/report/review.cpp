@@ -9,47 +9,48 @@
 namespace proofmass::coordinator {
 namespace {
 
-CampaignIdentity identity_of(const Store& store, const Campaign& campaign) {
-  return {.name = store.name(),
-          .seed = store.seed(),
-          .num_runs = store.num_runs(),
-          .model_version = store.model_version(),
-          .is_of_program = !store.model().description().empty(),
-          .is_imported = store.model().is_imported(),
-          .note = campaign.note(),
-          .build = store.build(),
-          .created_utc = store.created_utc(),
-          .definition_digest = store.table_digest()};
-}
-
-Review read_of_one_state(const Store& store, const Campaign& campaign,
+Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDepth depth,
                          std::vector<StatedRequirement> stated) {
-  Review review{.identity = identity_of(store, campaign),
+  Review review{.name = store.name(),
+                .seed = store.seed(),
+                .num_runs = store.num_runs(),
+                .model_version = store.model_version(),
+                .is_of_program = !store.model().description().empty(),
+                .is_imported = store.model().is_imported(),
+                .note = campaign.note(),
+                .build = store.build(),
+                .created_utc = store.created_utc(),
+                .definition_digest = store.table_digest(),
                 .schema = store.schema(),
                 .objectives = campaign.objectives(),
                 .interpretation = campaign.interpretation(),
                 .budget = campaign.error_budget(),
                 .why_not_independent = why_not_independent(campaign)};
-  const std::uint64_t num_given_up = num_runs_in(store.given_up_runs());
+  if (depth == ReviewDepth::tables) {
+    review.results = read_checked_results(store, campaign);
+    return review;
+  }
   ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()));
-  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives, num_given_up,
-                            store.num_runs_fixed(), review.budget);
-  CheckedResults checked = read_checked_results(
+  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives,
+                            num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
+                            review.budget);
+  review.results = read_checked_results(
       store, campaign,
       {.result =
            [&](const RunResult& result) {
-             figures.add(result);
+             if (depth >= ReviewDepth::charts) figures.add(result);
              matrix.add(result);
            },
        .magnitudes = [&](std::size_t quantity,
                          auto magnitudes) { matrix.add_magnitudes(quantity, magnitudes); }});
-  review.results = std::move(checked.results);
-  review.digest_check = checked.check;
-  review.missing = missing_in(review.results.statistics, num_given_up);
-  review.figures = figures.figures();
   review.matrix = matrix.answers();
+  if (depth == ReviewDepth::matrix) return review;
+  review.execution = store.execution();
+  review.figures = figures.figures();
   if (!review.why_not_independent.empty()) {
     for (QuantityFigures& quantity : review.figures) leave_out_intervals(quantity);
+  } else if (depth == ReviewDepth::causes) {
+    review.causes = find_causes(store, campaign);
   }
   return review;
 }
@@ -63,19 +64,15 @@ std::optional<RunIndex> worst_run_of(const Review& review) {
   return std::nullopt;
 }
 
-Review read_review(const Store& store, const Campaign& campaign, std::string_view database,
-                   std::vector<StatedRequirement> stated, WithCauses with_causes) {
+Review read_review(const Store& store, const Campaign& campaign, ReviewDepth depth,
+                   std::vector<StatedRequirement> stated) {
   Review review;
   if (!stated.empty()) require_independent(campaign, "requirement", stated.front().requirement);
   stated = matrix_requirements(store.schema(), std::move(stated), campaign.objectives());
   store.read_one_state([&] {
-    review = read_of_one_state(store, campaign, std::move(stated));
-    if (with_causes == WithCauses::yes && review.why_not_independent.empty())
-      review.causes = find_causes(store, campaign);
-    review.execution = store.execution();
+    review = read_of_one_state(store, campaign, depth, std::move(stated));
     review.stop = stop_text(store);
   });
-  review.database = std::string(database);
   return review;
 }
 

@@ -17,28 +17,22 @@
 
 namespace proofmass::coordinator {
 
-/// What a campaign database says of itself. Any of these texts may come from a stranger.
-struct CampaignIdentity {
-  std::string name;
+/// Everything that reports and their charts are made of.
+struct Review {
+  std::string database = {};  ///< As commands name it; whoever read the review knows that.
+  // What the database says of itself. Any of these texts may come from a stranger.
+  std::string name = {};
   std::uint64_t seed = 0;
   std::uint64_t num_runs = 0;  ///< Wanted.
-  std::string model_version;
+  std::string model_version = {};
   bool is_of_program = false;  ///< Its model needs one to be simulated again.
   bool is_imported = false;    ///< Model::is_imported().
-  std::string note;            ///< Campaign::note().
-  std::string build;
-  std::string created_utc;
-  std::string definition_digest;
-};
-
-/// Everything that a review report and its charts are made of.
-struct Review {
-  std::string database = {};  ///< As commands name it.
-  CampaignIdentity identity = {};
+  std::string note = {};       ///< Campaign::note().
+  std::string build = {};
+  std::string created_utc = {};
+  std::string definition_digest = {};
   ResultSchema schema = {};  ///< What the results are.
   ReadResults results = {};
-  DigestCheck digest_check = DigestCheck::not_checked;
-  MissingEstimates missing = {};
   std::vector<double> objectives = {};  ///< Of each quantity, SI.
   Interpretation interpretation = Interpretation::mixed;
   std::optional<ErrorBudget> budget = {};
@@ -57,17 +51,21 @@ struct Review {
 /// estimate or no quantity has an objective.
 [[nodiscard]] std::optional<RunIndex> worst_run_of(const Review& review);
 
-enum class WithCauses : std::uint8_t { no, yes };
+/// What a review has beside the results, each with what comes before it.
+enum class ReviewDepth : std::uint8_t {
+  tables,
+  matrix,
+  charts,  ///< Also how the campaign was executed.
+  causes,
+};
 
-/// Reads all results, of one state of the file, twice or as often as more than 65,536 runs need it,
-/// and once more for the causes. Memory does not grow with the runs.
+/// Reads all results, of one state of the file, as read_checked_results() does, and once more for
+/// the causes.
 ///
-/// @param database  The name of the file, for the commands that the report shows.
-/// @param stated    Requirements; of none, the objectives. All objectives together follow, unless
-///                  they are asked for or the campaign has none.
-/// @throws ConfigError as parse_requirement(); StoreError as report_text().
-[[nodiscard]] Review read_review(const Store& store, const Campaign& campaign,
-                                 std::string_view database, std::vector<StatedRequirement> stated,
-                                 WithCauses with_causes);
+/// @param stated  Requirements; of none, the objectives. All objectives together follow, unless
+///                they are asked for or the campaign has none.
+/// @throws ConfigError as parse_requirement(); StoreError as read_checked_results().
+[[nodiscard]] Review read_review(const Store& store, const Campaign& campaign, ReviewDepth depth,
+                                 std::vector<StatedRequirement> stated = {});
 
 }  // namespace proofmass::coordinator

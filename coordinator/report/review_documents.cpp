@@ -57,10 +57,14 @@ figure{zoom:.72}
 }
 )";
 
+using Tables = std::span<const Table>;
+
 struct Section {
   std::string id;
   std::string title;
-  std::string content;  ///< Markup; a section without any is left out.
+  std::vector<Table> tables;  ///< What Markdown shows, except of those without rows.
+  /// What HTML shows; nothing if the section is to be left out.
+  std::string (*markup)(const Review& review, Tables tables);
 };
 
 std::string figure_of(const Picture& picture) {
@@ -79,12 +83,20 @@ std::string table_part(const Table& table) {
   return table.rows.empty() ? "" : "<div>\n" + html_table(table) + "</div>\n";
 }
 
+std::string table_parts(Tables tables) {
+  std::string html;
+  for (const Table& table : tables) html += table_part(table);
+  return html;
+}
+
 /// Figures and tables beside each other, as many as there is room for.
 std::string flow(std::string_view markup) {
   return fmt::format("<div class=\"flow\">\n{}</div>\n", markup);
 }
 
-std::string error_figures_markup(const Review& review) {
+std::string matrix_markup(const Review&, Tables tables) { return html_table(tables.front()); }
+
+std::string error_figures_markup(const Review& review, Tables) {
   std::string html;
   const std::vector<Quantity>& quantities = review.schema.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
@@ -107,28 +119,24 @@ std::string characteristics_markup(const Review& review) {
              name_of(review.interpretation));
 }
 
-std::string standard_errors_markup(const Review& review) {
-  const StandardErrorStatistics& statistics = review.results.standard_errors;
-  const std::optional<ChartGrid> pulls = pull_overview(review.schema, statistics);
-  if (!pulls) return "";
-  return flow(table_part(standard_error_table(review.schema, statistics)) +
-              table_part(fit_table(review.schema, statistics.fit)) + figure_of(*pulls));
+std::string accuracy_markup(const Review& review, Tables tables) {
+  return flow(table_part(tables.front()) + characteristics_markup(review)) +
+         table_parts(tables.subspan(1));
 }
 
-std::string groups_markup(const Review& review) {
-  std::string html;
-  for (const Table& table : group_tables(review.schema, review.results)) html += table_part(table);
-  return html;
+std::string standard_errors_markup(const Review& review, Tables tables) {
+  const auto pulls = pull_overview(review.schema, review.results.standard_errors);
+  return pulls ? flow(table_parts(tables) + figure_of(*pulls)) : "";
 }
 
-std::string budget_markup(const Review& review) {
+std::string groups_markup(const Review&, Tables tables) { return table_parts(tables); }
+
+std::string budget_markup(const Review& review, Tables tables) {
   const std::optional<BarChart> chart = budget_chart(review);
-  if (!chart) return "";
-  return flow(table_part(review_budget_table(review)) + figure_of(*chart));
+  return chart ? flow(table_parts(tables) + figure_of(*chart)) : "";
 }
 
-std::string causes_markup(const Review& review) {
-  if (!review.causes) return "";
+std::string causes_markup(const Review& review, Tables tables) {
   std::string html;
   if (const std::optional<HeatMap> map = cause_map(review)) {
     html =
@@ -136,10 +144,10 @@ std::string causes_markup(const Review& review) {
         "the errors with their signs. Cells below four standard errors are empty.</p>\n" +
         wide_figure_of(*map);
   }
-  return html + table_part(cause_table(review));
+  return html + table_parts(tables);
 }
 
-std::string spectra_markup(const Review& review) {
+std::string spectra_markup(const Review& review, Tables) {
   if (!review.spectra) return "";
   const RunSpectra& spectra = *review.spectra;
   std::string html;
@@ -158,44 +166,36 @@ std::string spectra_markup(const Review& review) {
   return html + flow(figures + table_part(spectrum_table(review)));
 }
 
-std::string execution_markup(const Review& review) {
-  std::string html = flow(table_part(identity_table(review)) + table_part(execution_table(review)) +
-                          table_part(host_table(review))) +
-                     "<h3>How to reproduce it</h3>\n<ul>\n";
+std::string execution_markup(const Review& review, Tables tables) {
+  std::string html = flow(table_parts(tables)) + "<h3>How to reproduce it</h3>\n<ul>\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
   }
   return html + "</ul>\n";
 }
 
-/// What intervals take for their unit instead of the run.
-std::string groups_heading(const Review& review) {
-  return review.results.replicates ? "Replicates of the design" : "Instruments";
-}
-
 std::vector<Section> sections_of(const Review& review) {
-  const ResultSchema& schema = review.schema;
-  const CampaignStatistics& statistics = review.results.statistics;
-  return {{"verification", "Verification matrix", html_table(matrix_table(review))},
-          {"results", "Accuracy",
-           flow(table_part(accuracy_table(schema, review.objectives, statistics)) +
-                characteristics_markup(review)) +
-               table_part(interval_table(schema, statistics, review.missing.num_given_up)) +
-               table_part(error_table(schema, review.objectives, statistics,
-                                      review.missing.num_given_up, review.interpretation,
-                                      review.why_not_independent))},
-          {"standard-errors-section", "Standard errors", standard_errors_markup(review)},
-          {"instruments-section", groups_heading(review), groups_markup(review)},
-          {"distributions", "Errors by parameter", error_figures_markup(review)},
-          {"budget-section", "Budget", budget_markup(review)},
-          {"causes-section", "Causes of the errors", causes_markup(review)},
-          {"spectra-section", "Spectra of the worst run", spectra_markup(review)},
-          {"how", "How it was run", execution_markup(review)}};
+  // What intervals take for their unit instead of the run.
+  const char* const groups = review.results.replicates ? "Replicates of the design" : "Instruments";
+  return {{"verification", "Verification matrix", {matrix_table(review)}, matrix_markup},
+          {"results", "Accuracy", accuracy_tables(review), accuracy_markup},
+          {"standard-errors-section", "Standard errors",
+           standard_error_tables(review.schema, review.results.standard_errors),
+           standard_errors_markup},
+          {"instruments-section", groups, group_tables(review), groups_markup},
+          {"distributions", "Errors by parameter", {}, error_figures_markup},
+          {"budget-section", "Budget", {review_budget_table(review)}, budget_markup},
+          {"causes-section", "Causes of the errors", {cause_table(review)}, causes_markup},
+          {"spectra-section", "Spectra of the worst run", {}, spectra_markup},
+          {"how",
+           "How it was run",
+           {identity_table(review), execution_table(review), host_table(review)},
+           execution_markup}};
 }
 
 std::string summary_markup(const Review& review, std::span<const Section> sections) {
   std::string html =
-      fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.identity.name));
+      fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.name));
   for (const auto& [text, source] : review_summary(review)) {
     const auto section = std::ranges::find(sections, source, &Section::title);
     html += fmt::format("<li>{} (<a href=\"#{}\">{}</a>)</li>\n", markup_text(text), section->id,
@@ -209,14 +209,15 @@ std::string summary_markup(const Review& review, std::span<const Section> sectio
 std::string review_html(const Review& review) {
   std::string navigation;
   std::string content;
-  std::vector<Section> sections = sections_of(review);
-  std::erase_if(sections, [](const Section& section) { return section.content.empty(); });
+  const std::vector<Section> sections = sections_of(review);
   for (const Section& section : sections) {
+    const std::string markup = section.markup(review, section.tables);
+    if (markup.empty()) continue;
     navigation += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.id, section.title);
     content += fmt::format(
         "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n<h2 "
         "id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
-        section.id, section.title, section.content);
+        section.id, section.title, markup);
   }
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
@@ -227,7 +228,7 @@ std::string review_html(const Review& review) {
       "<header>\n{}<nav aria-label=\"Sections\"><ul>\n{}</ul></nav>\n</header>\n"
       "<main id=\"content\">\n{}</main>\n<footer><p>Made by Proofmass from {}.</p></footer>\n"
       "</body>\n</html>\n",
-      policy, markup_text(review.identity.name), review_style(), page_style,
+      policy, markup_text(review.name), review_style(), page_style,
       summary_markup(review, sections), navigation, content, markup_text(review.database));
 }
 
@@ -279,38 +280,22 @@ std::string code_span(std::string_view text) {
   return "`" + span + "`";
 }
 
-std::string section(std::string_view title, const std::vector<Table>& tables) {
-  std::string text;
-  for (const Table& table : tables) {
-    if (!table.rows.empty()) text += markdown_table(table);
-  }
-  return text.empty() ? "" : fmt::format("## {}\n\n{}", title, text);
-}
-
 }  // namespace
 
 std::string review_markdown(const Review& review) {
-  const ResultSchema& schema = review.schema;
-  const CampaignStatistics& statistics = review.results.statistics;
-  std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.identity.name));
+  std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.name));
   for (const auto& [sentence, source] : review_summary(review)) {
     text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
   }
   text += "\n";
-  text += section("Verification matrix", {matrix_table(review)}) +
-          section("Accuracy",
-                  {accuracy_table(schema, review.objectives, statistics),
-                   interval_table(schema, statistics, review.missing.num_given_up),
-                   error_table(schema, review.objectives, statistics, review.missing.num_given_up,
-                               review.interpretation, review.why_not_independent)}) +
-          section("Standard errors", {standard_error_table(schema, review.results.standard_errors),
-                                      fit_table(schema, review.results.standard_errors.fit)}) +
-          section(groups_heading(review), group_tables(schema, review.results)) +
-          section("Budget", {review_budget_table(review)}) +
-          section("Causes of the errors", {cause_table(review)}) +
-          section("How it was run",
-                  {identity_table(review), execution_table(review), host_table(review)}) +
-          "## How to reproduce it\n\n";
+  for (const Section& section : sections_of(review)) {
+    std::string tables;
+    for (const Table& table : section.tables) {
+      if (!table.rows.empty()) tables += markdown_table(table);
+    }
+    if (!tables.empty()) text += fmt::format("## {}\n\n{}", section.title, tables);
+  }
+  text += "## How to reproduce it\n\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     text += fmt::format("- {} {}\n", code_span(command), markdown_text(effect));
   }

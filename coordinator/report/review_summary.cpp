@@ -54,8 +54,8 @@ std::string question(const Review& review) {
 
 std::string draws(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  const std::uint64_t num_wanted = review.identity.num_runs;
-  const std::uint64_t num_done = statistics.num_runs + review.missing.num_given_up;
+  const std::uint64_t num_wanted = review.num_runs;
+  const std::uint64_t num_done = statistics.num_runs + review.results.missing.num_given_up;
   const std::uint64_t num_missing = num_done - statistics.num_estimated;
   std::string text = num_done < num_wanted
                          ? fmt::format("The campaign is not finished: {} of {} {} {} done",
@@ -63,7 +63,7 @@ std::string draws(const Review& review) {
                          : fmt::format("All {} {} are done", num_wanted, unit_of(review));
   if (num_missing > 0) {
     text += fmt::format(", {} of them without an estimate ({}), which {} as {}", num_missing,
-                        reasons_text(review.missing), num_missing == 1 ? "counts" : "count",
+                        reasons_text(review.results.missing), num_missing == 1 ? "counts" : "count",
                         num_missing == 1 ? "an exceedance" : "exceedances");
   }
   return text + ".";

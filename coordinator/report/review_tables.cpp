@@ -23,10 +23,10 @@ Table facts(std::string id, std::string caption, std::vector<Row> rows) {
 }
 
 std::string digest_words(const Review& review) {
-  return review.digest_check == DigestCheck::holds
-             ? review.results.digests.results + " (equal to the stored one)"
-             : review.results.digests.results +
-                   " (not checked: there is no stored one of these runs)";
+  return review.results.digests.results +
+         (review.results.digest_check == DigestCheck::holds
+              ? " (equal to the stored one)"
+              : " (not checked: there is no stored one of these runs)");
 }
 
 std::string hours(double seconds) { return figure_text(seconds / 3600.0) + " h"; }
@@ -62,8 +62,7 @@ std::string name_in_symbols(const ResultSchema& schema, std::string_view name) {
 }
 
 Table review_budget_table(const Review& review) {
-  Table table =
-      budget_table(review.schema, review.budget, review.results.statistics, review.results.totals);
+  Table table = budget_table(review);
   for (std::string& note : table.notes) note = with_powers_of_ten(note);
   return table;
 }
@@ -89,25 +88,25 @@ Table cause_table(const Review& review) {
 }
 
 Table identity_table(const Review& review) {
-  const CampaignIdentity& identity = review.identity;
   const CampaignStatistics& statistics = review.results.statistics;
-  Table table = facts(
-      "identity", "The campaign",
-      {{"campaign", identity.name},
-       {"seed", std::to_string(identity.seed)},
-       {"runs", fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
-                            identity.num_runs, statistics.num_estimated)},
-       {"not converged", std::to_string(statistics.num_not_converged)},
-       {"with a warning", std::to_string(review.results.warnings.num_runs)},
-       {"without an estimate", review.missing.total() == 0 ? "none" : reasons_text(review.missing)},
-       {"model", identity.model_version},
-       {"build", identity.build},
-       {"created", identity.created_utc},
-       {"SHA-256 of the results", digest_words(review)},
-       {"SHA-256 of the definition", identity.definition_digest}});
-  if (identity.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
+  const MissingEstimates& missing = review.results.missing;
+  Table table =
+      facts("identity", "The campaign",
+            {{"campaign", review.name},
+             {"seed", std::to_string(review.seed)},
+             {"runs", fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
+                                  review.num_runs, statistics.num_estimated)},
+             {"not converged", std::to_string(statistics.num_not_converged)},
+             {"with a warning", std::to_string(review.results.warnings.num_runs)},
+             {"without an estimate", missing.total() == 0 ? "none" : reasons_text(missing)},
+             {"model", review.model_version},
+             {"build", review.build},
+             {"created", review.created_utc},
+             {"SHA-256 of the results", digest_words(review)},
+             {"SHA-256 of the definition", review.definition_digest}});
+  if (review.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
   if (!review.stop.empty()) table.rows.push_back({"stop rule", review.stop});
-  if (!identity.note.empty()) table.rows.push_back({"note", identity.note});
+  if (!review.note.empty()) table.rows.push_back({"note", review.note});
   return table;
 }
 
@@ -124,7 +123,7 @@ Table execution_table(const Review& review) {
        {"results of a later attempt than the first", std::to_string(execution.num_retried)},
        {"results computed a second time",
         fmt::format("{}, {} of them differed", execution.num_audited, execution.num_contradicting)},
-       {"runs given up", std::to_string(review.missing.num_given_up)}});
+       {"runs given up", std::to_string(review.results.missing.num_given_up)}});
   for (const LossCount& loss : execution.losses) {
     table.rows.push_back(
         {fmt::format("lost: {}", loss.reason),
@@ -162,12 +161,12 @@ Table host_table(const Review& review) {
 
 std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
   const std::string database = wire::shell_word(review.database);
-  if (review.identity.is_imported) {
+  if (review.is_imported) {
     return {{fmt::format("proofmass verify {}", database), "checks the database"},
             {fmt::format("proofmass report {} --html report.html", database),
              "makes this report anew"}};
   }
-  const char* const program = review.identity.is_of_program ? " --model-program PROGRAM" : "";
+  const char* const program = review.is_of_program ? " --model-program PROGRAM" : "";
   std::vector<std::pair<std::string, std::string>> commands{
       {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),
        "checks the database, simulates a tenth of the runs again and compares all bits"},

@@ -24,7 +24,7 @@ namespace proofmass::coordinator {
 
 [[nodiscard]] Table matrix_table(const Review& review);
 
-/// The budget, with the numbers of its notes in the spelling of documents.
+/// budget_table() with the numbers of its notes in the spelling of documents.
 [[nodiscard]] Table review_budget_table(const Review& review);
 
 /// The sums that explain the errors. No rows without causes.

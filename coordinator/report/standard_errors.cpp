@@ -140,6 +140,11 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
   return table;
 }
 
+std::vector<Table> standard_error_tables(const ResultSchema& schema,
+                                         const StandardErrorStatistics& statistics) {
+  return {standard_error_table(schema, statistics), fit_table(schema, statistics.fit)};
+}
+
 std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
                                        const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return std::nullopt;

@@ -68,6 +68,10 @@ class RunningStandardErrors {
 [[nodiscard]] Table standard_error_table(const ResultSchema& schema,
                                          const StandardErrorStatistics& statistics);
 
+/// That table, and that of the fit.
+[[nodiscard]] std::vector<Table> standard_error_tables(const ResultSchema& schema,
+                                                       const StandardErrorStatistics& statistics);
+
 /// Error over standard error of each quantity beside the normal law that it should follow; nothing
 /// without standard errors.
 [[nodiscard]] std::optional<ChartGrid> pull_overview(const ResultSchema& schema,

@@ -19,7 +19,9 @@ StopCheck check_exceedances(const StopRule& rule, const Store& store,
                             std::span<const double> objectives, std::uint64_t num_runs) {
   Exceedances exceedances(rule.requirement, objectives);
   ResultReader reader = store.results({RunIndex{0}, num_runs});
-  while (const std::optional<RunResult> result = reader.next()) exceedances.add(*result);
+  while (const std::optional<RunResult> result = reader.next()) {
+    if (result->is_completed()) exceedances.add(*result);
+  }
   return check_stop_rule(rule, exceedances.of(num_runs), store.num_runs_fixed());
 }
 

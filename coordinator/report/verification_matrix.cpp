@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <set>
 #include <utility>
 
@@ -15,9 +14,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// Of the values of all objectives together; others have the position of their subject.
-constexpr std::size_t key_of_joint = std::numeric_limits<std::size_t>::max();
-
 std::string default_tolerance_text() {
   return fmt::format("for {:.12g}% with {:.12g}%", 100.0 * default_tolerance.coverage,
                      100.0 * default_tolerance.confidence);
@@ -25,10 +21,6 @@ std::string default_tolerance_text() {
 
 bool has_finite(std::span<const double> objectives) {
   return std::ranges::any_of(objectives, [](double value) { return std::isfinite(value); });
-}
-
-std::size_t key_of(const RequirementAnswer& answer) {
-  return answer.is_joint() ? key_of_joint : answer.requirement.parameter;
 }
 
 /// A requirement for each objective of the campaign.
@@ -86,11 +78,7 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
                                        std::uint64_t num_given_up,
                                        std::optional<std::uint64_t> num_fixed,
                                        const std::optional<ErrorBudget>& budget)
-    : objectives_(objectives.begin(), objectives.end()),
-      num_fixed_(num_fixed),
-      budget_(budget),
-      missing_{.num_given_up = num_given_up},
-      num_runs_(num_given_up) {
+    : num_fixed_(num_fixed), missing_{.num_given_up = num_given_up}, num_runs_(num_given_up) {
   for (StatedRequirement& each : stated) {
     RequirementAnswer answer;
     answer.stated = std::move(each);
@@ -100,69 +88,57 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
       answer.subject = requirement_subject(schema, answer.requirement.parameter);
       answer.limit = answer.requirement.limit;
     }
-    exceedances_.emplace_back(answer.requirement, objectives, budget);
-    subjects_.try_emplace(key_of(answer));
-    answers_.push_back(std::move(answer));
+    answer.is_of_error = !answer.is_joint() && answer.requirement.parameter < objectives.size();
+    rows_.push_back(
+        {.answer = answer, .exceedances = Exceedances(answer.requirement, objectives, budget)});
   }
-}
-
-double VerificationMatrix::value_of(std::size_t key, const RunResult& result) const {
-  if (key != key_of_joint) return required_value(result, key, budget_);
-  double largest = 0.0;
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    largest = std::max(largest, std::abs(result.error(i)) / objectives_[i]);
-  }
-  return largest;
 }
 
 void VerificationMatrix::add(const RunResult& result) {
   ++num_runs_;
   missing_.add(result);
-  for (Exceedances& exceedances : exceedances_) exceedances.add(result);
   if (!result.is_completed()) return;
-  for (auto& [key, subject] : subjects_) {
-    const double value = value_of(key, result);
-    if (key >= objectives_.size()) subject.values.push_back(value);
-    const bool is_worse = !subject.worst || value > subject.worst->value;
-    if (is_worse) subject.worst = {.run = result.run, .value = value};
+  for (Row& row : rows_) {
+    const double value = row.exceedances.add(result);
+    if (!row.answer.is_of_error) row.values.push_back(value);
+    std::optional<RunValue>& worst = row.answer.worst;
+    if (!worst || value > worst->value) worst = {.run = result.run, .value = value};
   }
 }
 
 void VerificationMatrix::end_results() {
   if (have_results_ended_) return;
   have_results_ended_ = true;
-  for (std::size_t i = 0; i < answers_.size(); ++i) {
-    RequirementAnswer& answer = answers_[i];
-    answer.missing = missing_;
-    answer.check = check_requirement(answer.requirement, exceedances_[i].of(num_runs_), num_fixed_);
-    answer.worst = subjects_.at(key_of(answer)).worst;
-  }
-  for (auto& [key, subject] : subjects_) {
-    std::ranges::sort(subject.values);
-    set_bounds(key, std::exchange(subject.values, {}));
+  for (Row& row : rows_) {
+    row.answer.missing = missing_;
+    row.answer.check =
+        check_requirement(row.answer.requirement, row.exceedances.of(num_runs_), num_fixed_);
+    std::ranges::sort(row.values);
+    row.set_bound(std::exchange(row.values, {}));
   }
 }
 
-void VerificationMatrix::set_bounds(std::size_t key, std::span<const double> ascending) {
+void VerificationMatrix::Row::set_bound(std::span<const double> ascending) {
   // Runs without an estimate are the largest errors.
-  const std::uint64_t num_missing = missing_.total();
-  for (RequirementAnswer& answer : answers_) {
-    const std::uint64_t order = answer.check.bound_order;
-    if (key_of(answer) != key || ascending.empty() || order <= num_missing) {
-      continue;
-    }
-    answer.bound = ascending[static_cast<std::size_t>(ascending.size() - (order - num_missing))];
-  }
+  const std::uint64_t order = answer.check.bound_order, num_missing = answer.missing.total();
+  if (ascending.empty() || order <= num_missing) return;
+  answer.bound = ascending[static_cast<std::size_t>(ascending.size() - (order - num_missing))];
 }
 
 void VerificationMatrix::add_magnitudes(std::size_t parameter, std::span<const double> magnitudes) {
   end_results();
-  set_bounds(parameter, magnitudes);
+  for (Row& row : rows_) {
+    if (row.answer.is_of_error && row.answer.requirement.parameter == parameter) {
+      row.set_bound(magnitudes);
+    }
+  }
 }
 
-const std::vector<RequirementAnswer>& VerificationMatrix::answers() {
+std::vector<RequirementAnswer> VerificationMatrix::answers() {
   end_results();
-  return answers_;
+  std::vector<RequirementAnswer> answers;
+  for (const Row& row : rows_) answers.push_back(row.answer);
+  return answers;
 }
 
 std::vector<RequirementAnswer> check_requirements(const Store& store,
@@ -180,7 +156,7 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
     });
     std::set<std::size_t> parameters;
     for (const RequirementAnswer& answer : matrix.answers()) {
-      if (key_of(answer) < objectives.size()) parameters.insert(key_of(answer));
+      if (answer.is_of_error) parameters.insert(answer.requirement.parameter);
     }
     for (const std::size_t parameter : parameters) {
       std::vector<double> magnitudes;

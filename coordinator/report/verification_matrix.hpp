@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -37,7 +36,6 @@ inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.9
 /// objectives together.
 class VerificationMatrix {
  public:
-  /// @param schema        Of the campaign.
   /// @param stated        Their order is that of the answers.
   /// @param objectives    Of the campaign, SI.
   /// @param num_given_up  Runs that have no result, and count as exceedances.
@@ -55,25 +53,22 @@ class VerificationMatrix {
   /// @param magnitudes  |error| of all completed runs, SI, ascending; at least one.
   void add_magnitudes(std::size_t parameter, std::span<const double> magnitudes);
 
-  [[nodiscard]] const std::vector<RequirementAnswer>& answers();
+  [[nodiscard]] std::vector<RequirementAnswer> answers();
 
  private:
-  /// What a requirement compares with its limit, in the runs that have an estimate.
-  struct Subject {
-    std::vector<double> values;  ///< Unless it is a parameter.
-    std::optional<RunValue> worst;
+  struct Row {
+    RequirementAnswer answer;
+    Exceedances exceedances;
+    std::vector<double> values = {};  ///< Of the runs that have an estimate; none of a parameter.
+
+    /// @param ascending  All values of the runs that have an estimate.
+    void set_bound(std::span<const double> ascending);
   };
 
-  [[nodiscard]] double value_of(std::size_t key, const RunResult& result) const;
   void end_results();
-  void set_bounds(std::size_t key, std::span<const double> ascending);
 
-  std::vector<double> objectives_;
   std::optional<std::uint64_t> num_fixed_;
-  std::optional<ErrorBudget> budget_;
-  std::vector<RequirementAnswer> answers_;
-  std::vector<Exceedances> exceedances_;     ///< Of each answer.
-  std::map<std::size_t, Subject> subjects_;  ///< By position; all objectives together are last.
+  std::vector<Row> rows_;
   MissingEstimates missing_;
   std::uint64_t num_runs_ = 0;
   bool have_results_ended_ = false;

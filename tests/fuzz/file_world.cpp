@@ -221,7 +221,7 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     }
     case FileUse::report: {
       const Store store = Store::open_read_only(file);
-      (void)report_text(store, *stored_campaign(store));
+      (void)report_text(read_review(store, *stored_campaign(store), ReviewDepth::tables));
       return;
     }
     case FileUse::requirement: {

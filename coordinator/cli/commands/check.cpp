@@ -148,8 +148,8 @@ std::string check_text(const CheckOptions& options, const Campaign& campaign, co
                                                                 campaign.model().step_name());
   return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {}{}\n{}{}\n{}\n{}",
                      options.file.string(), campaign.name, campaign.seed, campaign.num_runs, steps,
-                     note_text(campaign), outlook_text(options, campaign, outlook), cost_text(cost),
-                     differences_text(campaign));
+                     note_text(campaign.note()), outlook_text(options, campaign, outlook),
+                     cost_text(cost), differences_text(campaign));
 }
 
 int check_campaign_file(const CheckOptions& options) {

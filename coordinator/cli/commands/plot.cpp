@@ -123,8 +123,8 @@ int plot(const PlotOptions& options) {
   const Store store = Store::open_read_only(options.database);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   const bool are_causes_needed = options.is_list || needs_causes(options.chart);
-  Review review = read_review(store, *campaign, options.database.filename().string(), {},
-                              are_causes_needed ? WithCauses::yes : WithCauses::no);
+  Review review =
+      read_review(store, *campaign, are_causes_needed ? ReviewDepth::causes : ReviewDepth::charts);
   if (options.is_list) {
     print_names(review, *campaign);
     return exit_done;

@@ -52,12 +52,6 @@ std::vector<StatedRequirement> stated_in(const ReportOptions& options,
   return read_requirements(options.requirements_file, results);
 }
 
-std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
-                                          const std::vector<StatedRequirement>& stated) {
-  if (!stated.empty()) require_independent(campaign, "requirement", stated.front().requirement);
-  return check_requirements(store, campaign.objectives(), stated, campaign.error_budget());
-}
-
 std::string answers_text(const std::vector<RequirementAnswer>& answers, Paint paint) {
   std::string text;
   for (const RequirementAnswer& answer : answers) {
@@ -80,7 +74,17 @@ int print_remote_report(const ReportOptions& options) {
   return print_answer(options.connection, question, AnswerText::lines);
 }
 
-int exit_code_of(bool are_met) { return are_met ? exit_done : exit_not_met; }
+int exit_code_of(std::span<const RequirementAnswer> answers) {
+  const bool are_met = std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
+    return answer.check.verdict == RequirementVerdict::met;
+  });
+  return are_met ? exit_done : exit_not_met;
+}
+
+/// The first rows of the matrix are those that were asked for.
+int exit_code_of(const Review& review, const std::vector<StatedRequirement>& stated) {
+  return exit_code_of(std::span(review.matrix).first(stated.size()));
+}
 
 /// Two texts in one stream would be neither.
 void check_standard_output(const ReportOptions& options) {
@@ -98,25 +102,25 @@ void check_standard_output(const ReportOptions& options) {
 }
 
 /// @return What print_report() returns.
-int write_documents(const ReportOptions& options, const Store& store, const Campaign& campaign,
-                    const std::vector<StatedRequirement>& stated) {
-  Review review =
-      read_review(store, campaign, options.database.filename().string(), stated, WithCauses::yes);
+int write_documents(const ReportOptions& options, const Store& store,
+                    const std::vector<StatedRequirement>& stated, Review& review) {
   const auto write = [&] {
     if (!options.html.empty()) write_document(options.html, options.if_there, review_html(review));
     if (!options.markdown.empty()) {
       write_document(options.markdown, options.if_there, review_markdown(review));
     }
-    const std::span<const RequirementAnswer> rows(review.matrix);
-    return exit_code_of(std::ranges::all_of(
-        rows.first(stated.size()),
-        [](const RequirementAnswer& row) { return row.check.verdict == RequirementVerdict::met; }));
+    return exit_code_of(review, stated);
   };
   if (options.html.empty()) return write();
   return run_until_stopped([&](const IsStopped& is_stopped) {
     review.spectra = worst_run_spectra(store, review, is_stopped);
     return write();
   });
+}
+
+ReviewDepth depth_of(const ReportOptions& options) {
+  if (options.has_document()) return ReviewDepth::causes;
+  return options.format == OutputFormat::json ? ReviewDepth::matrix : ReviewDepth::tables;
 }
 
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
@@ -129,21 +133,27 @@ int print_report(const ReportOptions& options) {
   const Store store = Store::open_read_only(options.database);
   const std::vector<StatedRequirement> stated = stated_in(options, store.schema());
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  const bool is_json = options.format == OutputFormat::json;
+  const Paint paint = style_of(stdout).paint;
+  if (!is_json && !options.has_document() && !stated.empty()) {
+    require_independent(*campaign, "requirement", stated.front().requirement);
+    const std::vector<RequirementAnswer> answers =
+        check_requirements(store, campaign->objectives(), stated, campaign->error_budget());
+    write_standard_output(answers_text(answers, paint));
+    return exit_code_of(answers);
+  }
+  Review review = read_review(store, *campaign, depth_of(options), stated);
+  review.database = options.database.filename().string();
   if (options.has_document()) {
-    const int exit_code = write_documents(options, store, *campaign, stated);
-    if (options.format != OutputFormat::json || exit_code == exit_interrupted) return exit_code;
+    const int exit_code = write_documents(options, store, stated, review);
+    if (!is_json || exit_code == exit_interrupted) return exit_code;
   }
-  const std::vector<RequirementAnswer> answers = answers_of(store, *campaign, stated);
-  if (options.format == OutputFormat::json) {
-    print_lines(report_json(store, *campaign, answers, stated));
-  } else {
-    const Paint paint = style_of(stdout).paint;
-    write_standard_output(answers.empty() ? report_text(store, *campaign, paint)
-                                          : answers_text(answers, paint));
+  if (!is_json) {
+    write_standard_output(report_text(review, paint));
+    return exit_done;
   }
-  return exit_code_of(std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
-    return answer.check.verdict == RequirementVerdict::met;
-  }));
+  print_lines(report_json(review, stated));
+  return exit_code_of(review, stated);
 }
 
 }  // namespace

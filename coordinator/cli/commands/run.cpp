@@ -313,9 +313,13 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
 }
 
 void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
-  if (output == RunOutput::tables)
-    write_standard_output(report_text(store, campaign, style_of(stdout).paint));
-  if (output == RunOutput::json) print_lines(report_json(store, campaign, {}, {}));
+  if (output == RunOutput::tables) {
+    const Review review = read_review(store, campaign, ReviewDepth::tables);
+    write_standard_output(report_text(review, style_of(stdout).paint));
+  }
+  if (output == RunOutput::json) {
+    print_lines(report_json(read_review(store, campaign, ReviewDepth::matrix)));
+  }
 }
 
 /// The runs of `50:100`, which are 50 to 99; empty if the text is none such.

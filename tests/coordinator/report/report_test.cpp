@@ -26,24 +26,23 @@ MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) 
 
 // Tables as lines of a terminal.
 
-std::string accuracy_text(const Campaign& campaign, const CampaignStatistics& statistics) {
-  return terminal_text(accuracy_table(test::schema(), campaign.objectives(), statistics));
+/// What is seen of a campaign with these statistics.
+Review review_of(const Campaign& campaign, const CampaignStatistics& statistics,
+                 std::uint64_t num_given_up = 0) {
+  Review review{.name = "hardy2013",
+                .seed = 1,
+                .num_runs = 100,
+                .schema = test::schema(),
+                .objectives = campaign.objectives(),
+                .budget = campaign.error_budget()};
+  review.results.statistics = statistics;
+  review.results.missing.num_given_up = num_given_up;
+  return review;
 }
 
-std::string interval_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  return terminal_text(interval_table(test::schema(), statistics, num_given_up));
-}
-
-std::string error_text(const CampaignStatistics& statistics, std::uint64_t num_given_up,
-                       const std::vector<double>& objectives = MicroscopeCampaign{}.objectives()) {
-  return terminal_text(
-      error_table(test::schema(), objectives, statistics, num_given_up, Interpretation::mixed));
-}
-
-std::string budget_text(const Campaign& campaign, const CampaignStatistics& statistics,
-                        const std::optional<RunTotals>& totals) {
-  return terminal_text(budget_table(test::schema(), campaign.error_budget(), statistics, totals));
-}
+std::string accuracy_text(const Review& review) { return terminal_text(accuracy_table(review)); }
+std::string interval_text(const Review& review) { return terminal_text(interval_table(review)); }
+std::string error_text(const Review& review) { return terminal_text(error_table(review)); }
 
 /// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
 CampaignStatistics paper_statistics(std::uint64_t num_runs) {
@@ -83,7 +82,7 @@ TEST(AccuracyTable, NamesTheWorstRunAndMarksWhatIsBeyondItsObjective) {
   AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c13)];
   accuracy.num_beyond_objective = 3;
   accuracy.worst_run = {57};
-  const Table table = accuracy_table(test::schema(), MicroscopeCampaign{}.objectives(), statistics);
+  const Table table = accuracy_table(review_of(MicroscopeCampaign{}, statistics));
   const Row& row = table.rows[index(Parameter::a_c13)];
   EXPECT_EQ(row[1].in_document(), "10⁻⁴ rad");
   EXPECT_EQ(row[3].value, 11e-4);
@@ -97,41 +96,40 @@ TEST(IntervalTable, BeginsAtZeroWhereAMagnitudeDoes) {
   CampaignStatistics statistics = paper_statistics(2);
   AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c11_delta_x)];
   accuracy.mean_interval = Interval{.lower = -83.0e-9, .upper = 125.4e-9, .confidence = 0.95};
-  EXPECT_THAT(lines_of(interval_text(statistics, 0)),
+  EXPECT_THAT(lines_of(interval_text(review_of(MicroscopeCampaign{}, statistics))),
               Contains("a_c11·Δx       10.0       0     125 │    7.30       -       - │"
                        "        0      -"));
 }
 
 TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
-  EXPECT_THAT(lines_of(interval_text(paper_statistics(1), 0)),
+  const Review review = review_of(MicroscopeCampaign{}, paper_statistics(1));
+  EXPECT_THAT(lines_of(interval_text(review)),
               Contains("a_c11·Δx       10.0       -       - │       -       -       - │"
                        "        0      -"));
-  EXPECT_THAT(accuracy_text(MicroscopeCampaign{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
-  EXPECT_THAT(lines_of(accuracy_text(MicroscopeCampaign{}, paper_statistics(1))),
+  EXPECT_THAT(accuracy_text(review), HasSubstr(" of 1 run\n"));
+  EXPECT_THAT(lines_of(accuracy_text(review)),
               Contains("a_c11·Δx   nm             100    40.0    10.0       -      0 │"
                        "    40    10   7.3"));
 }
 
 // Nothing is beyond an objective that there is not, and nothing within.
 TEST(ErrorTable, CountsNothingBeyondAnObjectiveThatThereIsNot) {
-  std::vector<double> objectives = MicroscopeCampaign{}.objectives();
-  objectives[0] = std::numeric_limits<double>::infinity();
-  const std::string accuracy =
-      terminal_text(accuracy_table(test::schema(), objectives, paper_statistics(100)));
+  Review review = review_of(MicroscopeCampaign{}, paper_statistics(100));
+  review.objectives[0] = std::numeric_limits<double>::infinity();
   EXPECT_THAT(
-      lines_of(accuracy),
+      lines_of(accuracy_text(review)),
       Contains(::testing::MatchesRegex("a_c11·Δx   nm  +-  +40.0  +10.0  +[0-9.]+ +- │.*")));
-  EXPECT_THAT(lines_of(error_text(paper_statistics(100), 0, objectives)),
+  EXPECT_THAT(lines_of(error_text(review)),
               Contains(::testing::MatchesRegex("a_c11·Δx .* +-  +-")));
 }
 
 TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   CampaignStatistics statistics = paper_statistics(40);
   leave_out_intervals(statistics);
-  EXPECT_TRUE(interval_table(test::schema(), statistics, 0).rows.empty());
-  const std::string text =
-      terminal_text(error_table(test::schema(), MicroscopeCampaign{}.objectives(), statistics, 0,
-                                Interpretation::mixed, "4 runs share one draw"));
+  Review review = review_of(MicroscopeCampaign{}, statistics);
+  review.why_not_independent = "4 runs share one draw";
+  EXPECT_TRUE(interval_table(review).rows.empty());
+  const std::string text = error_text(review);
   EXPECT_THAT(text, HasSubstr("no intervals over runs: 4 runs share one draw\n"
                               "all objectives together: 40 of 40 runs\n"));
   EXPECT_THAT(text, ::testing::Not(HasSubstr("from")));
@@ -139,12 +137,11 @@ TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
 }
 
 TEST(Summary, TellsHowTheRunsEnded) {
-  CampaignStatistics statistics = paper_statistics(90);
-  statistics.num_not_converged = 3;
-  statistics.num_not_finite = 2;
-  statistics.num_no_draw = 1;
-  statistics.num_lost = 4;
-  EXPECT_THAT(summary_text("hardy2013", 1, 100, statistics, "0f3a"),
+  Review review = review_of(MicroscopeCampaign{}, paper_statistics(90));
+  review.results.statistics.num_estimated = 80;
+  review.results.missing = {
+      .num_not_converged = 3, .num_not_finite = 2, .num_no_draw = 1, .num_lost = 4};
+  EXPECT_THAT(summary_text(review),
               HasSubstr("Runs      90 finished of 100, 80 completed\n"
                         "          3 not converged, 2 not finite, 1 without draw, 4 lost\n"));
 }
@@ -153,7 +150,6 @@ TEST(Summary, TellsHowTheRunsEnded) {
 TEST(Report, FitsATerminal) {
   constexpr std::uint64_t most = 1'000'000'000;
   CampaignStatistics statistics = paper_statistics(most);
-  statistics.num_not_converged = statistics.num_not_finite = statistics.num_no_draw = most / 4;
   for (const double factor : {1e-90, 1e-6, 1.0, 1e6, 1e90}) {
     for (AccuracyStatistic& accuracy : statistics.accuracy) {
       accuracy.worst = accuracy.mean = accuracy.standard_deviation = 1.2345e-6 * factor;
@@ -168,15 +164,22 @@ TEST(Report, FitsATerminal) {
     }
     MicroscopeCampaign campaign;
     for (double& objective : campaign.scenario.objectives) objective *= factor;
-    EXPECT_THAT(lines_of(accuracy_text(campaign, statistics)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(interval_text(statistics, 0)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(error_text(statistics, most)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(budget_text(campaign, statistics, RunTotals{.worst_run = {most}})),
-                Each(FitsATerminal()));
+    Review review = review_of(campaign, statistics, most);
+    review.results.totals = RunTotals{.worst_run = {most}};
+    EXPECT_THAT(lines_of(accuracy_text(review)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(interval_text(review_of(campaign, statistics))), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(error_text(review)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(terminal_text(budget_table(review))), Each(FitsATerminal()));
   }
-  EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
-                                    most, statistics, std::string(64, 'f'))),
-              Each(FitsATerminal()));
+  Review review = review_of(MicroscopeCampaign{}, statistics);
+  review.name = std::string(64, 'n');
+  review.seed = std::numeric_limits<std::uint64_t>::max();
+  review.num_runs = most;
+  review.results.digests.results = std::string(64, 'f');
+  review.results.statistics.num_estimated = most / 4;
+  review.results.missing = {
+      .num_not_converged = most / 4, .num_not_finite = most / 4, .num_no_draw = most / 4};
+  EXPECT_THAT(lines_of(summary_text(review)), Each(FitsATerminal()));
 }
 
 using StoredReport = test::StoreTest;
@@ -222,8 +225,9 @@ TEST_F(StoredReport, CountsWhatWasGivenUpAsWithoutAnEstimate) {
   store.commit(deliveries);
   const Entry given_up = GivenUpRun{.run = {9}};
   store.write({&given_up, 1});
-  EXPECT_THAT(report_text(store, MicroscopeCampaign{}), HasSubstr("worst of 8: "));
-  EXPECT_THAT(report_text(store, MicroscopeCampaign{}),
+  EXPECT_THAT(report_text(read_review(store, MicroscopeCampaign{}, ReviewDepth::tables)),
+              HasSubstr("worst of 8: "));
+  EXPECT_THAT(report_text(read_review(store, MicroscopeCampaign{}, ReviewDepth::tables)),
               HasSubstr(" have an estimate; 2 more have none ("));
 }
 

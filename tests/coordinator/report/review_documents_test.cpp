@@ -27,7 +27,7 @@ TEST_F(ReviewHtml, ShowsTextOfStrangersAsText) {
                             {{.id = test::hostile_text,
                               .text = test::hostile_text,
                               .requirement = "k2c < 10 for 95% with 90%"}});
-  review.database = review.identity.name = review.identity.build = test::hostile_text;
+  review.database = review.name = review.build = test::hostile_text;
   const std::string html = review_html(review);
   EXPECT_EQ(test::malformed_part(as_xml(html)), "");
   EXPECT_THAT(html, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("\x1b"))));
@@ -171,7 +171,7 @@ TEST_F(ReviewSummary, SaysWhatIsMissing) {
   store.extend(test::campaign_of(30), canonical_definition(test::campaign_of(30)));
   Review review = review_of(store, 30);
   EXPECT_EQ(sentences_of(review)[1], "The campaign is not finished: 20 of 30 draws are done.");
-  review.missing.num_given_up = 1;
+  review.results.missing.num_given_up = 1;
   EXPECT_EQ(sentences_of(review)[1],
             "The campaign is not finished: 21 of 30 draws are done, 1 of them without an estimate "
             "(1 given up), which counts as an exceedance.");

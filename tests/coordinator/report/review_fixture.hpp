@@ -51,8 +51,10 @@ class ReviewTest : public StoreTest {
   [[nodiscard]] static coordinator::Review review_of(
       const coordinator::Store& store, std::uint64_t num_runs,
       std::vector<coordinator::StatedRequirement> stated = {}) {
-    return coordinator::read_review(store, campaign_of(num_runs), "a campaign.db",
-                                    std::move(stated), coordinator::WithCauses::no);
+    coordinator::Review review = coordinator::read_review(
+        store, campaign_of(num_runs), coordinator::ReviewDepth::charts, std::move(stated));
+    review.database = "a campaign.db";
+    return review;
   }
 };
 

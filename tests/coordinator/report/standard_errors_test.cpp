@@ -112,13 +112,13 @@ TEST_F(StandardErrorsTest, AreInEveryReport) {
   const std::string caption = "Standard errors σ of the estimates of 5 runs";
   const Review review = review_of(store, 5);
   const auto is_there = AllOf(HasSubstr(caption), HasSubstr("Fit of the estimates to the data"));
-  EXPECT_THAT(report_text(store, test::campaign_of(5)), is_there);
+  EXPECT_THAT(report_text(review), is_there);
   EXPECT_THAT(review_html(review), AllOf(is_there, HasSubstr("id=\"pulls-title\"")));
   EXPECT_THAT(review_markdown(review), is_there);
   LiveResults live(campaign, test::schema());
   for (const Delivery& delivery : deliveries) live.add(delivery.result);
   EXPECT_THAT(live.html(), is_there);
-  EXPECT_THAT(report_json(store, test::campaign_of(5), {}, {}),
+  EXPECT_THAT(report_json(review),
               AllOf(HasSubstr("\"num_within_95\": 3"), HasSubstr("\"mean_chi_squared\": 32.0")));
 }
 
@@ -126,8 +126,7 @@ TEST_F(StandardErrorsTest, AreInNoReportWithoutThem) {
   const Store store = store_with(5);
   EXPECT_THAT(review_html(review_of(store, 5)), Not(HasSubstr("tandard error")));
   EXPECT_THAT(review_markdown(review_of(store, 5)), Not(HasSubstr("tandard error")));
-  EXPECT_THAT(report_json(store, test::campaign_of(5), {}, {}),
-              HasSubstr("\"standard_errors\": null"));
+  EXPECT_THAT(report_json(review_of(store, 5)), HasSubstr("\"standard_errors\": null"));
 }
 
 }  // namespace

@@ -392,8 +392,7 @@ TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
                           Not(HasSubstr("<html"))));
   const Review review = review_of(store, 150);
-  for (const Row& row :
-       accuracy_table(review.schema, review.objectives, review.results.statistics).rows) {
+  for (const Row& row : accuracy_table(review).rows) {
     for (const Cell& cell : row) {
       EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
     }
