@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <ctime>
 #include <utility>
@@ -33,17 +34,40 @@ double database_mb(const ResultSchema& schema, std::uint64_t num_runs) {
   return (empty_size + run_size * static_cast<double>(num_runs)) / 1e6;
 }
 
+std::vector<RunRequest> first_requests(const Campaign& campaign, std::size_t count) {
+  std::vector<RunRequest> requests;
+  for (std::uint64_t run = 0; run < std::min<std::uint64_t>(count, campaign.num_runs); ++run) {
+    requests.push_back({.run = {run}, .table_values = campaign.table_values({run})});
+  }
+  return requests;
+}
+
+/// Of a program beside this one, the time that passes: one run, and a batch if that is short.
+FirstBatch try_program(const Campaign& campaign, const Plan& plan) {
+  using Clock = std::chrono::steady_clock;
+  const InstructionSet set = best_instruction_set();
+  (void)plan.simulate_batch({}, set);  // Starts it.
+  FirstBatch batch;
+  for (const std::size_t count : {std::size_t{1}, campaign.model().batch_size()}) {
+    const std::vector<RunRequest> requests = first_requests(campaign, count);
+    const Clock::time_point start = Clock::now();
+    batch.results = plan.simulate_batch(requests, set);
+    const double elapsed_s = std::chrono::duration<double>(Clock::now() - start).count();
+    batch.time_s = elapsed_s * static_cast<double>(campaign.model().batch_size()) /
+                   static_cast<double>(requests.size());
+    if (elapsed_s > measured_s_max) break;
+  }
+  return batch;
+}
+
 }  // namespace
 
 FirstBatch try_first_batch(const Campaign& campaign, const Plan& plan) {
+  if (!campaign.model().description().empty()) return try_program(campaign, plan);
   const InstructionSet set = best_instruction_set();
   // Scalar code simulates the runs of a batch one after the other.
   const std::size_t num_at_once = set == InstructionSet::scalar ? 1 : campaign.model().batch_size();
-  std::vector<RunRequest> requests;
-  for (std::uint64_t run = 0; run < std::min<std::uint64_t>(num_at_once, campaign.num_runs);
-       ++run) {
-    requests.push_back({.run = {run}, .table_values = campaign.table_values({run})});
-  }
+  const std::vector<RunRequest> requests = first_requests(campaign, num_at_once);
   const std::clock_t start = std::clock();
   const auto elapsed_s = [start] {
     return static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);

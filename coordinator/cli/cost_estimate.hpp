@@ -11,7 +11,8 @@ namespace proofmass::coordinator {
 /// The campaign's first batch, which is a full one unless the campaign has fewer runs.
 struct FirstBatch {
   /// Processor time on this machine, extrapolated from the steps that the first half second takes.
-  /// All steps of a run take about the same time.
+  /// All steps of a run take about the same time. Of a model program, the time that passes, with
+  /// the first run for all others if it takes as long.
   double time_s = 0.0;
   std::vector<RunResult> results;  ///< Empty if half a second was not enough for all steps.
 };

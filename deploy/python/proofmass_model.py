@@ -114,6 +114,9 @@ class Model:
         return {}
 
     def _run(self, question):
+        return {"run": question["run"], **self._result_of(question)}
+
+    def _result_of(self, question):
         drawn = question.get("drawn", {})
         try:
             result = self.run(self._parameters, drawn, Random(question.get("seeds", {})))

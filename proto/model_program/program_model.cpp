@@ -110,8 +110,9 @@ std::string ProgramPlan::question_of(RunIndex run, const std::vector<double>& dr
 /// @return A number for each name; NaN for null, which is not finite.
 std::vector<double> numbers_in(const Json& object, const std::vector<std::string_view>& names,
                                const std::function<void(std::string_view)>& refuse) {
-  if (!object.is_object() || object.size() != names.size()) {
-    refuse(fmt::format("must have a number for each of {} quantities", names.size()));
+  if (!object.is_object() || object.size() > names.size()) {
+    refuse(
+        fmt::format("must have a number for each of {} quantities and nothing else", names.size()));
   }
   std::vector<double> numbers;
   for (const std::string_view name : names) {
@@ -134,6 +135,9 @@ void ProgramPlan::read(std::string_view answer, RunResult& result) const {
   };
   const Json json = Json::parse(answer, nullptr, false);
   if (!json.is_object()) refuse_as("the answer")("must be an object of JSON");
+  if (json.value("run", Json()) != result.run.value) {
+    refuse_as("the answer")(fmt::format("must be of this run, with \"run\": {}", result.run.value));
+  }
   if (json.contains("lost")) {
     if (json["lost"] != true) refuse_as("lost")("must be true, or left out");
     return set_lost(result);

@@ -107,6 +107,13 @@ void ProgramProcess::write_some(std::string_view& text) const {
   }
 }
 
+void ProgramProcess::expect_silence() const {
+  char letter = 0;
+  if (recv(answers_.number(), &letter, 1, MSG_DONTWAIT | MSG_PEEK) > 0) {
+    fail("answers what it was not asked");
+  }
+}
+
 void ProgramProcess::read_some() {
   std::array<char, 65536> part;  // NOLINT: recv() fills it.
   const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT);
@@ -120,6 +127,7 @@ void ProgramProcess::read_some() {
 void ProgramProcess::ask(const std::vector<std::string>& questions,
                          const std::function<void(std::string_view answer)>& on_answer) {
   using Clock = std::chrono::steady_clock;
+  expect_silence();
   std::string all;
   for (const std::string& question : questions) all += question + '\n';
   std::string_view unsent = all;

@@ -37,6 +37,7 @@ class ProgramProcess {
  private:
   void write_some(std::string_view& text) const;
   void read_some();
+  void expect_silence() const;
   [[nodiscard]] std::string how_it_ended();
   [[noreturn]] void fail(std::string_view reason) const;
 

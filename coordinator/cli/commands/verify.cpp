@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,12 +26,23 @@ struct CheckedFileOptions {
   std::vector<std::string> authors{"anonymous"};
   wire::IfThere if_there = wire::IfThere::keep;
   bool is_check = false;
-  double fraction = 0.01;  ///< Of the runs, simulated again; in [0, 1].
+  /// Of the runs, simulated again; in [0, 1]. Nothing: some, if their model is here.
+  std::optional<double> fraction = {};
   OutputFormat format = OutputFormat::text;
 };
 
-VerifyOptions how_to_verify(double fraction) {
-  return {.fraction = fraction, .num_threads = wire::num_processors()};
+constexpr double fraction_by_default = 0.01;
+
+VerifyOptions how_to_verify(const CheckedFileOptions& options) {
+  return {.fraction = options.fraction.value_or(fraction_by_default),
+          .num_threads = wire::num_processors()};
+}
+
+CLI::Option* add_fraction(CLI::App& command, CheckedFileOptions& options) {
+  return command
+      .add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
+      ->check(wire::in_range(0.0, 1.0))
+      ->default_str(fmt::format("{}", fraction_by_default));
 }
 
 using Json = nlohmann::ordered_json;
@@ -44,14 +56,19 @@ Json json_of_check(const Check& check) {
 
 /// Prints checks of a file as soon as they are made, and what came of them.
 /// @param make_checks  Calls its argument with each, and returns true if none fails.
-int print_checks(const std::filesystem::path& file, OutputFormat format,
+int print_checks(const CheckedFileOptions& options,
                  const std::function<bool(const std::function<void(const Check&)>&)>& make_checks) {
-  const bool is_json = format == OutputFormat::json;
+  const std::filesystem::path& file = options.file;
+  const bool is_json = options.format == OutputFormat::json;
+  bool is_simulated = true;
   std::size_t num_failing = 0, num_checks = 0;
   Json checks = Json::array();
   const bool holds = make_checks([&](const Check& check) {
     ++num_checks;
     if (check.verdict == CheckOutcome::fails) ++num_failing;
+    if (check.verdict == CheckOutcome::not_checked && check.name == "simulation") {
+      is_simulated = false;
+    }
     if (is_json) {
       checks.push_back(json_of_check(check));
       return;
@@ -62,6 +79,11 @@ int print_checks(const std::filesystem::path& file, OutputFormat format,
   if (is_json) {
     print_json({{"file", file.string()}, {"num_failing", num_failing}, {"checks", checks}});
   }
+  if (holds && !is_simulated && options.fraction.value_or(0.0) > 0.0) {
+    wire::say(fmt::format("proofmass: error: {}: no run was simulated again, as --fraction asks\n",
+                          file.string()));
+    return exit_cannot_be_done;
+  }
   if (holds) return exit_done;
   wire::say(fmt::format("proofmass: error: {}: {} of {} checks {}\n", file.string(), num_failing,
                         num_checks, num_failing == 1 ? "fails" : "fail"));
@@ -69,15 +91,15 @@ int print_checks(const std::filesystem::path& file, OutputFormat format,
 }
 
 int verify_database(const CheckedFileOptions& options, const IsStopped& is_stopped) {
-  return print_checks(options.file, options.format, [&](const auto& report) {
-    return verify(options.file, how_to_verify(options.fraction), report, is_stopped);
+  return print_checks(options, [&](const auto& report) {
+    return verify(options.file, how_to_verify(options), report, is_stopped);
   });
 }
 
 int publish_campaign(const CheckedFileOptions& options, const IsStopped& is_stopped) {
   if (options.is_check) {
-    return print_checks(options.file, options.format, [&](const auto& report) {
-      return check_publication(options.file, how_to_verify(options.fraction), report, is_stopped);
+    return print_checks(options, [&](const auto& report) {
+      return check_publication(options.file, how_to_verify(options), report, is_stopped);
     });
   }
   std::filesystem::path output = options.output;
@@ -94,9 +116,7 @@ void add_verify(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<CheckedFileOptions>(
       app, chosen, "verify", "Check a database, simulate some runs again", verify_database);
   add_database(command, options.file);
-  command.add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
-      ->check(wire::in_range(0.0, 1.0))
-      ->capture_default_str();
+  add_fraction(command, options);
   add_json_flag(command, options.format);
 }
 
@@ -115,10 +135,7 @@ void add_publish(CLI::App& app, Command& chosen) {
   command.add_option("--author", options.authors, "Of the results, for citations; may be repeated")
       ->excludes(check);
   add_force_flag(command, options.if_there);
-  command.add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
-      ->check(wire::in_range(0.0, 1.0))
-      ->needs(check)
-      ->capture_default_str();
+  add_fraction(command, options)->needs(check);
   add_json_flag(command, options.format);
 }
 
