@@ -224,15 +224,12 @@ std::filesystem::path CampaignFolder::archive(const std::filesystem::path& file)
   return place;
 }
 
+// A known file may have come from elsewhere, under any name.
 ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan,
-                                    const Asker& asker) {
-  return open_or_create(wanted, plan, file_of(wanted), remedy, asker);
-}
-
-// The file may have come from elsewhere, under any name.
-ServedCampaign CampaignFolder::open_again(const std::filesystem::path& file, const Campaign& wanted,
-                                          const StopPlan& plan, const Asker& asker) {
-  return open_same(wanted, plan, file, remedy, asker);
+                                    const Asker& asker,
+                                    const std::optional<std::filesystem::path>& known) {
+  return known ? open_same(wanted, plan, *known, remedy, asker)
+               : open_or_create(wanted, plan, file_of(wanted), remedy, asker);
 }
 
 void CampaignFolder::require_same(const std::filesystem::path& file, const Campaign& wanted) {

@@ -68,10 +68,9 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
   /// disk must not keep a coordinator from starting.
   [[nodiscard]] std::filesystem::path answers() const { return directory_ / ".answers"; }
 
-  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan& plan,
-                                    const Asker& asker) override;
-  [[nodiscard]] ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
-                                          const StopPlan& plan, const Asker& asker) override;
+  [[nodiscard]] ServedCampaign open(
+      const Campaign& wanted, const StopPlan& plan, const Asker& asker,
+      const std::optional<std::filesystem::path>& known = std::nullopt) override;
   void require_same(const std::filesystem::path& file, const Campaign& wanted) override;
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override;

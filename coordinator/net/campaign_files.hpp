@@ -46,19 +46,16 @@ class CampaignFiles {
  public:
   virtual ~CampaignFiles() = default;
 
-  /// The file for a campaign that the service does not know: a new one, or one that has been there
-  /// since a service before. With a stop rule it has as many runs as the rule is to be checked with
-  /// next. Called in a background thread.
+  /// The file for a campaign that is not open: the one from which it was served before, or else one
+  /// of its name, a new one perhaps. With a stop rule it has as many runs as the rule is to be
+  /// checked with next. Called in a background thread.
   ///
   /// @param asker  Its name becomes the owner of a new file.
+  /// @param known  The file if it was served before, whatever it is called.
   /// @throws Error if there is another campaign in the file, naming what differs, or one that the
-  ///         asker may not control.
-  virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan, const Asker& asker) = 0;
-
-  /// Opens a campaign that was served before from this file, whatever the file is called.
-  /// @throws Error as open() does; StoreError if there is no such file any more.
-  virtual ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
-                                    const StopPlan& plan, const Asker& asker) = 0;
+  ///         asker may not control; StoreError if a known file is gone.
+  virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan, const Asker& asker,
+                              const std::optional<std::filesystem::path>& known) = 0;
 
   /// Compares a served file with the campaign that is wanted, whatever its number of runs. Called
   /// in a background thread, before extend().

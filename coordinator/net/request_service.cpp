@@ -326,12 +326,12 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
                                const std::optional<CampaignRecord>& closed, UnderWay under_way,
                                Respond respond) {
   CampaignFiles& files = *context_.config.files;
+  std::optional<std::filesystem::path> known;
+  if (closed) known = closed->file;
   serve_opened(
       request->campaign->name, std::move(under_way),
-      [&files, request, asker, closed] {
-        const StopPlan plan = plan_of(*request);
-        return closed ? files.open_again(closed->file, *request->campaign, plan, asker)
-                      : files.open(*request->campaign, plan, asker);
+      [&files, request, asker, known] {
+        return files.open(*request->campaign, plan_of(*request), asker, known);
       },
       [request](Store& store) {
         const proto::SubmitRequest& sent = request->message.submit();
@@ -349,20 +349,20 @@ void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction 
   const proto::CampaignStatus& status = campaign.status;
   if (under_way_.contains(status.name())) refuse_as_under_way(status.name());
   if (campaign.status.owner().empty()) {
-    return reopen_measured(status.name(), campaign, action, 0, std::move(respond));
+    return reopen_measured(campaign, action, 0, std::move(respond));
   }
   check_limits(status.name(), campaign.status.owner(), {.num_campaigns = 1, .size = 0});
   // What its definition takes is known when the file is read, which must not change if that is too
   // much: so it is opened twice.
-  const auto work = [this, &directory = *context_.config.directory, name = status.name(), campaign,
-                     action, respond]() -> Background::Finish {
+  const auto work = [this, &directory = *context_.config.directory, campaign, action,
+                     respond]() -> Background::Finish {
     std::uint64_t size = 0;
     const std::string failure =
         failure_of([&] { size = definition_size(*directory.load(campaign.file).definition); });
-    return [this, name, campaign, action, size, failure, respond] {
-      under_way_.erase(name);
+    return [this, campaign, action, size, failure, respond] {
+      under_way_.erase(campaign.status.name());
       if (!failure.empty()) return respond(wire::error_reply(failure));
-      respond_or_say_why(respond, [&] { reopen_measured(name, campaign, action, size, respond); });
+      respond_or_say_why(respond, [&] { reopen_measured(campaign, action, size, respond); });
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();
@@ -370,9 +370,9 @@ void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction 
                      UnderWay{.owner = campaign.status.owner(), .added = {.num_campaigns = 1}});
 }
 
-void RequestService::reopen_measured(const std::string& name, const CampaignRecord& campaign,
-                                     wire::ControlAction action, std::uint64_t size,
-                                     Respond respond) {
+void RequestService::reopen_measured(const CampaignRecord& campaign, wire::ControlAction action,
+                                     std::uint64_t size, Respond respond) {
+  const std::string& name = campaign.status.name();
   UnderWay under_way{.owner = campaign.status.owner(), .added = {.num_campaigns = 1, .size = size}};
   check_limits(name, under_way.owner, under_way.added);
   const CampaignDirectory& directory = *context_.config.directory;

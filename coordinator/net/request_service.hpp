@@ -83,8 +83,8 @@ class RequestService {
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs, if its owner
   /// may have it unfinished.
   void reopen(const CampaignRecord& campaign, wire::ControlAction action, Respond respond);
-  void reopen_measured(const std::string& name, const CampaignRecord& campaign,
-                       wire::ControlAction action, std::uint64_t size, Respond respond);
+  void reopen_measured(const CampaignRecord& campaign, wire::ControlAction action,
+                       std::uint64_t size, Respond respond);
   void change_served(CampaignId id, const Submitted& request, UnderWay under_way, Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it. If that fails, a file that
   /// was made for it is removed.

@@ -83,14 +83,10 @@ std::uint64_t num_workers(const RunOptions& options, const Campaign& campaign,
 /// The file of a campaign that asks for more runs until its stop rule is reached.
 class GrowingFile final : public CampaignFiles {
  public:
-  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&,
-                                    const Asker&) override {
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&, const Asker&,
+                                    const std::optional<std::filesystem::path>&) override {
     throw UsageError(fmt::format(
         "campaign {} cannot be submitted: proofmass run serves its own alone", wanted.name));
-  }
-  [[nodiscard]] ServedCampaign open_again(const std::filesystem::path&, const Campaign& wanted,
-                                          const StopPlan& plan, const Asker& asker) override {
-    return open(wanted, plan, asker);
   }
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override {

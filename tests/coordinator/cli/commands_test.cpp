@@ -101,11 +101,11 @@ TEST_F(CampaignFolderTest, OpensTheFileAgainThatACampaignHad) {
   (void)folder.open(campaign_of("a", 10), {}, {});
   const auto file = directory / "served/small.db";
   std::filesystem::rename(directory / "served/a.db", file);
-  EXPECT_EQ(folder.open_again(file, campaign_of("a", 11), {}, {}).file, file);
+  EXPECT_EQ(folder.open(campaign_of("a", 11), {}, {}, file).file, file);
   EXPECT_EQ(Store::open_read_only(file).num_runs(), 11U);
   EXPECT_FALSE(std::filesystem::exists(directory / "served/a.db"));
   std::filesystem::remove(file);
-  EXPECT_THROW((void)folder.open_again(file, campaign_of("a", 11), {}, {}), StoreError);
+  EXPECT_THROW((void)folder.open(campaign_of("a", 11), {}, {}, file), StoreError);
   EXPECT_FALSE(std::filesystem::exists(file));
 }
 

@@ -36,8 +36,15 @@ class PlainFiles final : public coordinator::CampaignFiles {
  public:
   explicit PlainFiles(const ScratchDirectory& directory) : directory_(directory) {}
 
-  coordinator::ServedCampaign open(const Campaign& wanted, const coordinator::StopPlan& plan,
-                                   const coordinator::Asker& asker) override {
+  coordinator::ServedCampaign open(
+      const Campaign& wanted, const coordinator::StopPlan& plan, const coordinator::Asker& asker,
+      const std::optional<std::filesystem::path>& known = std::nullopt) override {
+    if (known) {
+      coordinator::Store store = coordinator::Store::open(*known);
+      (void)extend(store, wanted);
+      store.set_stop_plan(plan);
+      return {.file = *known, .store = std::move(store), .definition = wanted.clone()};
+    }
     before_open();
     const auto file = directory_ / (wanted.name + ".db");
     const bool is_new = !std::filesystem::exists(file);
@@ -50,14 +57,6 @@ class PlainFiles final : public coordinator::CampaignFiles {
             .definition = wanted.clone(),
             .elsewhere = {},
             .is_new = is_new};
-  }
-  coordinator::ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
-                                         const coordinator::StopPlan& plan,
-                                         const coordinator::Asker&) override {
-    coordinator::Store store = coordinator::Store::open(file);
-    (void)extend(store, wanted);
-    store.set_stop_plan(plan);
-    return {.file = file, .store = std::move(store), .definition = wanted.clone()};
   }
   std::shared_ptr<const Campaign> extend(coordinator::Store& store,
                                          const Campaign& wanted) override {
