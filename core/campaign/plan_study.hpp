@@ -57,7 +57,8 @@ class PlanStudy {
   [[nodiscard]] virtual std::vector<int> num_steps() const = 0;
   /// Steps of a run in sessions that the study is not about: it leaves them as they are.
   [[nodiscard]] virtual int num_steps_beside() const { return 0; }
-  /// Most steps that a session may have.
+  /// Least and most steps that a session may have.
+  [[nodiscard]] virtual int num_steps_min() const { return 1; }
   [[nodiscard]] virtual int num_steps_max() const = 0;
   /// Drawn instruments that a bound is the mean over.
   [[nodiscard]] virtual std::size_t num_instruments() const = 0;

@@ -213,8 +213,9 @@ std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& 
 AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) {
   const std::vector<int> of_file = study.num_steps();
   const int in_all = options.num_steps.value_or(std::accumulate(of_file.begin(), of_file.end(), 0));
-  const AllocationRule rule{
-      .num_steps = in_all, .minimum = options.minimum, .maximum = study.num_steps_max()};
+  const AllocationRule rule{.num_steps = in_all,
+                            .minimum = std::max(options.minimum, study.num_steps_min()),
+                            .maximum = study.num_steps_max()};
   const auto refuse = [&](std::string_view limit, std::size_t number, std::string_view each) {
     throw UsageError(fmt::format("--{} = {} (must be {} or {}, {} for each of {} sessions)",
                                  built_in_model().step_name(), in_all, number, limit, each,

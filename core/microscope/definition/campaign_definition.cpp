@@ -160,6 +160,14 @@ EnvironmentTable parse_environment(std::string_view text, const std::string& nam
   return table;
 }
 
+void check_joint_campaign(const MicroscopeCampaign& campaign) {
+  const Scenario& scenario = campaign.scenario;
+  check_joint_records(scenario.sessions, scenario.orbit.period_s, scenario.estimation.transient_s);
+  check_joint_pushes(scenario.sessions,
+                     push_limits(drawn_moments(campaign.dispersions),
+                                 scenario.objectives[index(Parameter::a_d11_prime)]));
+}
+
 MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   MicroscopeCampaign campaign = read_definition(document);
   document.check();
@@ -181,6 +189,7 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     check_independence(law_set(campaign.dispersions), campaign);
     if (estimation_method(campaign.scenario.estimation.method).name == joint_method.name) {
       check_joint_orbit(campaign.scenario.orbit.eccentricity);
+      check_joint_campaign(campaign);
     }
   } catch (const ConfigError& error) {
     throw document.located(error);

@@ -31,6 +31,11 @@ class Document;
 /// @throws DefinitionError naming file, line, field, value and rule.
 [[nodiscard]] MicroscopeCampaign read_campaign(Document& document, DataFiles& files);
 
+/// What the method `joint` needs beyond what it needs to estimate at all: without it, its standard
+/// errors are too small. Definitions of older campaigns may lack it.
+/// @throws ConfigError naming the session.
+void check_joint_campaign(const MicroscopeCampaign& campaign);
+
 /// The campaign of a text and of data that have been read before; opens no file.
 ///
 /// @param name               For messages: where the text is from.

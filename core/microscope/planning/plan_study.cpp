@@ -207,6 +207,7 @@ class JointStudy final : public PlanStudy {
     std::erase_if(campaign_.scenario.sessions, is_test);
     check_joint_orbit(campaign_.scenario.orbit.eccentricity);
     campaign_.scenario.validate();
+    check_joint_campaign(campaign_);
     const Scenario& scenario = campaign_.scenario;
     const MicroscopeCampaign brief = short_campaign(campaign_);
     for (const Session& session : brief.scenario.sessions) {
@@ -242,6 +243,10 @@ class JointStudy final : public PlanStudy {
       if (is_test(session)) orbits += session.num_orbits;
     }
     return orbits;
+  }
+  [[nodiscard]] int num_steps_min() const override {
+    return joint_orbits_min(campaign_.scenario.orbit.period_s,
+                            campaign_.scenario.estimation.transient_s);
   }
   [[nodiscard]] int num_steps_max() const override { return num_session_orbits_max; }
   [[nodiscard]] std::size_t num_instruments() const override { return instruments_.size(); }

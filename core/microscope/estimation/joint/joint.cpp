@@ -9,6 +9,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -96,7 +97,7 @@ struct Priors {
   NuisanceMatrix information;  ///< Inverse of the nuisances' correlations.
 };
 
-/// Sums of drawn quantities that the nuisances are, except for scale_y and scale_z.
+/// Sums of drawn quantities that the nuisances are, except for scales and squares.
 Eigen::Matrix<double, num_drawn, num_nuisances> nuisance_sums(const EstimationInput& input) {
   Eigen::Matrix<double, num_drawn, num_nuisances> sums;
   sums.setZero();
@@ -135,6 +136,15 @@ Priors make_priors(const EstimationInput& input, const DrawnSums& drawn) {
     priors.mean[index(unknown)] = mean;
     covariance(row, row) = 4.0 * drawn.mean_square(k2d) * drawn.mean_square(b) - mean * mean;
   }
+  // Squares of sums, which are taken for normal.
+  for (const auto& [unknown, axis] :
+       {std::pair{Unknown::square_y, Axis::y}, std::pair{Unknown::square_z, Axis::z}}) {
+    const Combination k2c = of_pair("quadratic_factor_s2_m", axis, 0.5, 0.5);
+    const double mean = drawn.mean(k2c), variance = drawn.variance(k2c);
+    const auto row = static_cast<Eigen::Index>(index(unknown) - num_parameters);
+    priors.mean[index(unknown)] = mean * mean + variance;
+    covariance(row, row) = 2.0 * variance * (variance + 2.0 * mean * mean);
+  }
   const NuisanceVector deviation = covariance.diagonal().cwiseSqrt();
   NuisanceMatrix correlations =
       deviation.cwiseInverse().asDiagonal() * covariance * deviation.cwiseInverse().asDiagonal();
@@ -163,12 +173,68 @@ double line_variance(const EstimationInput& input, const Session& session, const
   return scale * scale * density * passed / duration_s;
 }
 
+/// What a line has of a push, and what the low-pass makes of it there.
+struct LinePush {
+  Push push;
+  PushLine line;
+  std::complex<double> gain;
+};
+
 /// An observed line.
 struct Line {
   std::size_t session;
   LineSignals signals;
   LinePhasors phasors;
   double weight;
+  std::optional<LinePush> push{};
+};
+
+/// The pushes of a session, at their lines in the order of RecordNeeds::lines.
+class SessionPushes {
+ public:
+  SessionPushes(const Session& session, const RecordNeeds& needs, const SessionPhasors& record,
+                const BandPass& filter, const EstimationInput& input)
+      : needs_(needs) {
+    for (const WantedLine& wanted : needs.lines) {
+      const double f = line_frequency_hz(session, wanted.line, input.orbit_period_s);
+      // The phasor of a cosine is 1, that of a sine i: the other way round than e^(iωt) counts.
+      gains_.push_back(std::conj(response(filter, f, input.sample_period_s)));
+    }
+    for (std::size_t i = 0; i < session.excitations.size(); ++i) {
+      const Excitation& excitation = session.excitations[i];
+      if (excitation.kind != ExcitationKind::drag_free) continue;
+      Push push{.axis = excitation.axis};
+      const std::size_t signal = index(Signal::common_x) + index(excitation.axis);
+      for (std::size_t k = 0; k < needs.lines.size(); ++k) {
+        if (is_multiple(k, i, 1.0)) push.at_f = record.lines[k][signal] / gains_[k];
+        if (is_multiple(k, i, 2.0)) push.at_2f = record.lines[k][signal] / gains_[k];
+      }
+      pushes_.push_back({i, push});
+    }
+    for (auto& [i, push] : pushes_) {
+      for (const auto& [j, other] : pushes_) {
+        if (i == j || other.axis != push.axis) continue;
+        push.square_of_others_m2_s4 += std::norm(other.at_f);
+      }
+    }
+  }
+
+  [[nodiscard]] std::optional<LinePush> at(std::size_t k) const {
+    for (const auto& [i, push] : pushes_) {
+      if (is_multiple(k, i, 1.0)) return LinePush{push, PushLine::at_f, gains_[k]};
+      if (is_multiple(k, i, 2.0)) return LinePush{push, PushLine::at_2f, gains_[k]};
+    }
+    return std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] bool is_multiple(std::size_t k, std::size_t excitation, double factor) const {
+    return needs_.lines[k].line == excitation_multiple(excitation, factor);
+  }
+
+  const RecordNeeds& needs_;
+  std::vector<std::complex<double>> gains_;
+  std::vector<std::pair<std::size_t, Push>> pushes_;
 };
 
 std::vector<Line> observed_lines(const RunPhasors& records, const EstimationInput& input) {
@@ -179,13 +245,14 @@ std::vector<Line> observed_lines(const RunPhasors& records, const EstimationInpu
     const BandPass filter = further_lines_filter(needs, session, input.config, input.orbit_period_s,
                                                  input.sample_period_s);
     PROOFMASS_EXPECT(records[i].lines.size() == needs.lines.size());
+    const SessionPushes pushes(session, needs, records[i], filter, input);
     for (std::size_t k = 0; k < needs.lines.size(); ++k) {
       const auto& [line, signals] = needs.lines[k];
       const LinePhasors& recorded = records[i].lines[k];
       lines.push_back(
           {i, signals,
            signals == LineSignals::squares ? centred(recorded, records[i].means) : recorded,
-           1.0 / line_variance(input, session, line, filter)});
+           1.0 / line_variance(input, session, line, filter), pushes.at(k)});
     }
   }
   return lines;
@@ -231,7 +298,7 @@ class JointFit {
     }
     std::vector<NormalEquations> equations(records_.size());
     for (const Line& line : lines_) {
-      const Prediction model = predict(coefficients[line.session], line.signals, line.phasors);
+      const Prediction model = prediction(coefficients[line.session], line, unknowns);
       const std::complex<double> residual =
           line.phasors[index(Signal::differential_x)] - model.value;
       NormalVector cosine, sine;
@@ -258,7 +325,9 @@ class JointFit {
     const auto calibration = std::ranges::find_if_not(input_.sessions, is_test);
     const auto& means =
         records_[static_cast<std::size_t>(calibration - input_.sessions.begin())].means;
-    const Dual constant = differential_constant(means, unknowns);
+    const double mean_square_m2_s4 =
+        mean_square_of_pushes(static_cast<std::size_t>(calibration - input_.sessions.begin()));
+    const Dual constant = mean_differential(means, unknowns, mean_square_m2_s4);
     NormalVector slope;
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_.unit[i];
@@ -272,6 +341,28 @@ class JointFit {
   [[nodiscard]] double unit(std::size_t unknown) const { return priors_.unit[unknown]; }
 
  private:
+  /// Of what a session pushes along X, as Γ_mes,cx shows it, m²/s⁴.
+  [[nodiscard]] double mean_square_of_pushes(std::size_t session) const {
+    double sum = 0.0;
+    for (const Line& line : lines_) {
+      if (line.session != session || !line.push || line.push->line != PushLine::at_f) continue;
+      if (line.push->push.axis == Axis::x) sum += 0.5 * std::norm(line.push->push.at_f);
+    }
+    return sum;
+  }
+
+  [[nodiscard]] Prediction prediction(const LineCoefficients& coefficients, const Line& line,
+                                      const UnknownArray& unknowns) const {
+    Prediction model = predict(coefficients, line.signals, line.phasors);
+    if (!line.push) return model;
+    const auto& [push, at, gain] = *line.push;
+    const Prediction terms =
+        push_terms(input_.sessions[line.session].drag_free, unknowns, push, at);
+    model.value += gain * terms.value;
+    for (std::size_t i = 0; i < num_unknowns; ++i) model.slope[i] += gain * terms.slope[i];
+    return model;
+  }
+
   const RunPhasors& records_;
   const EstimationInput& input_;
   std::vector<Line> lines_;

@@ -41,6 +41,10 @@ class JointInformation {
   ParameterArray units_;                   ///< SI.
 };
 
+/// factor·f of an excitation plus orbital·f_orb.
+[[nodiscard]] LineMultiple excitation_multiple(std::size_t excitation, double factor,
+                                               double orbital = 0.0);
+
 /// 2 f_orb, the line of each angular and each drag-free excitation, 2 f of what is shaken along X,
 /// and f ± 2 f_orb of masses that move in opposition along Y or Z.
 [[nodiscard]] RecordNeeds joint_needs(const Session& session);
@@ -57,6 +61,26 @@ void check_joint(const std::vector<Session>& sessions);
 /// 47 s²/m at 0.5, measured; so by 1.9 s²/m at 0.1, a fifth of its standard error.
 /// @throws ConfigError if the eccentricity is larger.
 void check_joint_orbit(double eccentricity);
+
+/// Least orbits of a session of which the record, less the transient, is one orbit long: in a
+/// shorter one the lines at f_orb, 2 f_orb and 3 f_orb and the level cannot be told apart, and
+/// errors are larger than the standard errors (README.md).
+[[nodiscard]] int joint_orbits_min(double orbit_period_s, double transient_s);
+
+/// @throws ConfigError if a session that calibrates has fewer orbits than joint_orbits_min().
+void check_joint_records(const std::vector<Session>& sessions, double orbit_period_s,
+                         double transient_s);
+
+/// Largest amplitude of a push, m/s², where what the model leaves out moves a_d11' by a fiftieth of
+/// its objective if K2 is as large as it is drawn (root mean square). README.md derives both.
+struct PushLimits {
+  double alone_along_x;  ///< In a session that shakes X, and pushes, by it alone.
+  double beside_others;  ///< Of a push along X beside another push or motion along X.
+};
+[[nodiscard]] PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective);
+
+/// @throws ConfigError if a push is stronger.
+void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& limits);
 
 inline constexpr EstimationMethodInfo joint_method{
     .name = "joint",

@@ -169,12 +169,16 @@ UnknownArray true_unknowns(const Instrument& instrument, double common_offset_x_
   at(Unknown::parasitic_z) = k1.x() * p.z();
   at(Unknown::scale_y) = 2.0 * k2d.y() * b.y() / k1.y();
   at(Unknown::scale_z) = 2.0 * k2d.z() * b.z() / k1.z();
+  const Eigen::Vector3d k2c = 0.5 * (one.quadratic_s2_m + two.quadratic_s2_m);
+  at(Unknown::square_y) = k2c.y() * k2c.y();
+  at(Unknown::square_z) = k2c.z() * k2c.z();
   return unknowns;
 }
 
-Dual differential_constant(const std::array<double, num_line_bases>& means,
-                           const UnknownArray& unknowns) {
-  return constant_of(means, Unknowns(unknowns));
+Dual mean_differential(const std::array<double, num_line_bases>& means,
+                       const UnknownArray& unknowns, double mean_square_m2_s4) {
+  const Unknowns x(unknowns);
+  return constant_of(means, x) + x[Parameter::k2d] * Dual(mean_square_m2_s4);
 }
 
 LineCoefficients line_coefficients(const Session& session,
@@ -237,6 +241,41 @@ Prediction predict(const LineCoefficients& coefficients, LineSignals signals,
   if (signals == LineSignals::squares) add(coefficients.squares, num_line_bases);
   if (signals == LineSignals::moved) add(coefficients.moved[0], num_line_bases);
   if (signals == LineSignals::moved_again) add(coefficients.moved[1], num_line_bases);
+  return sum;
+}
+
+Prediction push_terms(DragFreeSource source, const UnknownArray& unknowns, const Push& push,
+                      PushLine line) {
+  Prediction sum;
+  const auto add = [&](const Dual& factor, std::complex<double> product) {
+    sum.value += factor.value * product;
+    for (std::size_t i = 0; i < num_unknowns; ++i) sum.slope[i] += factor.slope[i] * product;
+  };
+  const Unknowns x(unknowns);
+  const std::complex<double> a = push.at_f, b = push.at_2f;
+  const double square = std::norm(a), all_squares = square + 2.0 * push.square_of_others_m2_s4;
+  if (push.axis != Axis::x) {
+    if (line == PushLine::at_2f) return sum;
+    const bool is_y = push.axis == Axis::y;
+    add(Dual(1.5) * x[is_y ? Parameter::a_d12 : Parameter::a_d13] *
+            x[is_y ? Unknown::square_y : Unknown::square_z],
+        all_squares * a);
+    return sum;
+  }
+  const Dual k2c = x[Parameter::k2c];
+  const Dual k2 = x[Parameter::k2d] - x[Parameter::a_d11_prime] * k2c;
+  // The constant that the half sum has where the loop holds one mass, over |a|².
+  Dual level = 0.0;
+  if (source == DragFreeSource::sensor_1) level = Dual(-0.5) * x[Parameter::k2d];
+  if (source == DragFreeSource::sensor_2) level = Dual(0.5) * x[Parameter::k2d];
+  if (line == PushLine::at_f) {
+    add(k2, std::conj(a) * b);
+    add(k2 * (Dual(2.0) * level - Dual(1.5) * k2c), all_squares * a);
+    add(Dual(-8.75) * k2 * k2c * k2c * k2c, square * square * a);
+    return sum;
+  }
+  add(k2 * (Dual(2.0) * level - Dual(5.0) * k2c), square * b);
+  add(k2 * k2c * (Dual(4.5) * k2c - Dual(3.0) * level), square * a * a);
   return sum;
 }
 

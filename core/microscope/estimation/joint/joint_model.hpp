@@ -3,6 +3,7 @@
 #include <array>
 #include <complex>
 #include <cstddef>
+#include <cstdint>
 
 #include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/results/results.hpp"
@@ -25,9 +26,11 @@ enum class Unknown : std::size_t {
   parasitic_z,
   scale_y,  ///< ε_y, the part by which K2 changes the scale of Γ_mes,cy.
   scale_z,
+  square_y,  ///< K2c² along Y, s⁴/m².
+  square_z,
 };
 
-inline constexpr std::size_t num_unknowns = num_parameters + 12;
+inline constexpr std::size_t num_unknowns = num_parameters + 14;
 
 [[nodiscard]] constexpr std::size_t index(Unknown unknown) {
   return static_cast<std::size_t>(unknown);
@@ -66,9 +69,10 @@ struct LineCoefficients {
                                                  const UnknownArray& unknowns,
                                                  DragFreeSource found = DragFreeSource::common);
 
-/// Constant part b of the differential acceleration, m/s²: b₁ and what the mean gradient adds.
-[[nodiscard]] Dual differential_constant(const std::array<double, num_line_bases>& means,
-                                         const UnknownArray& unknowns);
+/// Mean of Γ_mes,dx less its read-out bias, m/s²: b₁, what the mean gradient adds, and what K2d
+/// makes of the mean square of what is pushed.
+[[nodiscard]] Dual mean_differential(const std::array<double, num_line_bases>& means,
+                                     const UnknownArray& unknowns, double mean_square_m2_s4);
 
 /// Γ_mes,dx at a line, m/s², with its derivatives.
 struct Prediction {
@@ -79,6 +83,22 @@ struct Prediction {
 /// @param line  Its squares, if it has them, about their means: see centred().
 [[nodiscard]] Prediction predict(const LineCoefficients& coefficients, LineSignals signals,
                                  const LinePhasors& line);
+
+/// What a drag-free excitation along an axis leaves of itself in the half sum along that axis,
+/// m/s², before the low-pass.
+struct Push {
+  Axis axis = Axis::x;
+  std::complex<double> at_f{};
+  std::complex<double> at_2f{};         ///< Along X; else 0.
+  double square_of_others_m2_s4 = 0.0;  ///< Sum of |at_f|² of further pushes along X.
+};
+
+enum class PushLine : std::uint8_t { at_f, at_2f };
+
+/// What of Γ_mes,dx at a line of a push, m/s² before the low-pass, is of the third and fourth order
+/// in its amplitude: what the product of K2 and its square makes.
+[[nodiscard]] Prediction push_terms(DragFreeSource source, const UnknownArray& unknowns,
+                                    const Push& push, PushLine line);
 
 /// A line of LineSignals::squares with the squares of Γ_mes,kx less its mean in place of those of
 /// Γ_mes,kx itself.

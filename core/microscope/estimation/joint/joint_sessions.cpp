@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,23 +14,19 @@
 namespace proofmass {
 namespace {
 
-/// factor·f of an excitation plus orbital·f_orb.
-LineMultiple multiple(std::size_t excitation, double factor, double orbital) {
-  LineMultiple line{.orbital = orbital};
-  (excitation == 0 ? line.excitation : line.further[excitation - 1]) = factor;
-  return line;
-}
-
 bool moves_apart(const Excitation& excitation) {
   return excitation.kind == ExcitationKind::test_mass && excitation.axis != Axis::x &&
          excitation.motion == MassMotion::opposition;
 }
 
+bool pushes_along_x(const Excitation& excitation) {
+  return excitation.kind == ExcitationKind::drag_free && excitation.axis == Axis::x;
+}
+
 /// Whether the squares of Γ_mes,kx tell at 2 f of K2.
 bool tells_of_squares(const Excitation& excitation) {
-  if (excitation.axis != Axis::x) return false;
-  return excitation.kind == ExcitationKind::drag_free ||
-         (excitation.kind == ExcitationKind::test_mass &&
+  return pushes_along_x(excitation) ||
+         (excitation.axis == Axis::x && excitation.kind == ExcitationKind::test_mass &&
           excitation.motion != MassMotion::opposition);
 }
 
@@ -40,7 +37,7 @@ void add_products(const std::vector<Excitation>& excitations, RecordNeeds& needs
     for (std::size_t j = i + 1; j < excitations.size(); ++j) {
       if (!tells_of_squares(excitations[i]) || !tells_of_squares(excitations[j])) continue;
       for (const double sign : {1.0, -1.0}) {
-        LineMultiple product = multiple(i, 1.0, 0.0);
+        LineMultiple product = excitation_multiple(i, 1.0);
         product.further[j - 1] = sign;
         needs.neighbours.push_back(product);
       }
@@ -50,6 +47,12 @@ void add_products(const std::vector<Excitation>& excitations, RecordNeeds& needs
 
 }  // namespace
 
+LineMultiple excitation_multiple(std::size_t excitation, double factor, double orbital) {
+  LineMultiple line{.orbital = orbital};
+  (excitation == 0 ? line.excitation : line.further[excitation - 1]) = factor;
+  return line;
+}
+
 RecordNeeds joint_needs(const Session& session) {
   RecordNeeds needs{.signals = SignalSet::health};
   if (is_test(session)) return needs;
@@ -57,19 +60,19 @@ RecordNeeds joint_needs(const Session& session) {
   needs.lines.push_back({{.orbital = 2.0}, LineSignals::gradients});
   for (std::size_t i = 0; i < excitations.size(); ++i) {
     if (excitations[i].kind == ExcitationKind::test_mass) continue;
-    needs.lines.push_back({multiple(i, 1.0, 0.0), LineSignals::gradients});
+    needs.lines.push_back({excitation_multiple(i, 1.0), LineSignals::gradients});
   }
   for (std::size_t i = 0; i < excitations.size(); ++i) {
     if (!tells_of_squares(excitations[i])) continue;
-    needs.lines.push_back({multiple(i, 2.0, 0.0), LineSignals::squares});
+    needs.lines.push_back({excitation_multiple(i, 2.0), LineSignals::squares});
   }
   const MassExcitations motions = mass_excitations(session);
   for (std::size_t i = 0; i < excitations.size(); ++i) {
     if (!moves_apart(excitations[i])) continue;
     const bool is_first = &excitations[i] == motions[0];
     for (const double orbital : {2.0, -2.0}) {
-      needs.lines.push_back(
-          {multiple(i, 1.0, orbital), is_first ? LineSignals::moved : LineSignals::moved_again});
+      needs.lines.push_back({excitation_multiple(i, 1.0, orbital),
+                             is_first ? LineSignals::moved : LineSignals::moved_again});
     }
   }
   // Lines of which the model of another line has no term: they must not leak into it. A line that
@@ -78,13 +81,20 @@ RecordNeeds joint_needs(const Session& session) {
   for (std::size_t i = 0; i < excitations.size(); ++i) {
     if (excitations[i].kind != ExcitationKind::test_mass) continue;
     for (const double orbital : {0.0, 2.0, -2.0}) {
-      needs.neighbours.push_back(multiple(i, 1.0, orbital));
+      needs.neighbours.push_back(excitation_multiple(i, 1.0, orbital));
     }
     // The signals of one motion do not tell what leaks from the other one.
     if (motions[1] == nullptr) continue;
     for (const double orbital : {1.0, -1.0, 3.0, -3.0}) {
-      needs.neighbours.push_back(multiple(i, 1.0, orbital));
+      needs.neighbours.push_back(excitation_multiple(i, 1.0, orbital));
     }
+  }
+  for (std::size_t i = 0; i < excitations.size(); ++i) {
+    // Along X ½ K2c K2d Γ³, as much as the noise of the line at Γ = 1e-7 m/s² already; along Y and
+    // Z what the squares make there of Γ_mes,c, times a_d1j.
+    if (excitations[i].kind != ExcitationKind::drag_free) continue;
+    if (!pushes_along_x(excitations[i])) needs.neighbours.push_back(excitation_multiple(i, 2.0));
+    needs.neighbours.push_back(excitation_multiple(i, 3.0));
   }
   add_products(excitations, needs);
   return needs;
@@ -158,6 +168,62 @@ void check_joint(const std::vector<Session>& sessions) {
   throw ConfigError("session",
                     fmt::format("{} session{}", sessions.size(), sessions.size() == 1 ? "" : "s"),
                     fmt::format("estimation.method = \"joint\" needs {}", fmt::join(lacks, ", ")));
+}
+
+int joint_orbits_min(double orbit_period_s, double transient_s) {
+  return 1 + static_cast<int>(std::ceil(transient_s / orbit_period_s));
+}
+
+void check_joint_records(const std::vector<Session>& sessions, double orbit_period_s,
+                         double transient_s) {
+  const int num_orbits_min = joint_orbits_min(orbit_period_s, transient_s);
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const int num_orbits = sessions[i].num_orbits;
+    if (is_test(sessions[i]) || num_orbits >= num_orbits_min) continue;
+    throw ConfigError(
+        fmt::format("session[{}].orbits", i), fmt::format("{}", num_orbits),
+        fmt::format("estimation.method = \"joint\" needs {} or more: less estimation.transient_s "
+                    "= {} the record of session {} is {:.6g} s long, and must be an orbit, {} s",
+                    num_orbits_min, transient_s, sessions[i].name,
+                    num_orbits * orbit_period_s - transient_s, orbit_period_s));
+  }
+}
+
+PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective) {
+  const auto& groups = draw_groups();
+  const auto group =
+      std::ranges::find(groups, std::string_view("quadratic_factor_s2_m"), &DrawGroup::name);
+  PROOFMASS_EXPECT(group != groups.end());
+  double mean_square = 0.0;
+  for (const std::size_t sensor_x : {group->first, group->first + 3}) {
+    const auto at = static_cast<Eigen::Index>(sensor_x);
+    mean_square += 0.5 * (laws.covariance(at, at) + laws.mean[sensor_x] * laws.mean[sensor_x]);
+  }
+  const double part = a_d11_objective / 50.0;
+  return {.alone_along_x = std::sqrt(std::sqrt(part / 8.75) / mean_square),
+          .beside_others = std::sqrt(part / 1.5 / mean_square)};
+}
+
+void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& limits) {
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const std::vector<Excitation>& excitations = sessions[i].excitations;
+    if (is_test(sessions[i])) continue;
+    const auto disturbs = [](const Excitation& excitation) {
+      return excitation.kind == ExcitationKind::drag_free || tells_of_squares(excitation);
+    };
+    const bool is_alone = std::ranges::count_if(excitations, disturbs) == 1;
+    const double limit_m_s2 = is_alone ? limits.alone_along_x : limits.beside_others;
+    for (std::size_t k = 0; k < excitations.size(); ++k) {
+      if (!pushes_along_x(excitations[k]) || excitations[k].amplitude <= limit_m_s2) continue;
+      throw ConfigError(
+          fmt::format("session[{}].excitations[{}].amplitude_m_s2", i, k),
+          fmt::format("{}", excitations[k].amplitude),
+          fmt::format(
+              "must be <= {:.2g} for estimation.method = \"joint\"{}: beyond, what K2 makes "
+              "of it and the model leaves out may move a_d11' by 1/50 of its objective",
+              limit_m_s2, is_alone ? "" : " beside the session's other excitations"));
+    }
+  }
 }
 
 void check_joint_orbit(double eccentricity) {

@@ -70,6 +70,29 @@ TEST(JointCampaign, FindsTheTruthWithoutNoise) {
   }
 }
 
+// At 1e-6 m/s² the product of K2c and K2d makes 1.5 K2c K2d Γ² of a_d11', a hundred times its
+// standard error, and σ of K2d is a hundredth of that at 2e-8 m/s².
+TEST(JointCampaign, ErrsLessThanItsStandardErrorsUnderStrongPushesWithoutNoise) {
+  MicroscopeCampaign campaign;
+  campaign.seed = 46;
+  campaign.scenario.noise.scale = 0.0;
+  for (Session& session : campaign.scenario.sessions) {
+    for (Excitation& excitation : session.excitations) {
+      if (excitation.kind == ExcitationKind::drag_free) excitation.amplitude = 1e-6;
+    }
+  }
+  ParameterArray squares{}, variances{};
+  for (const Outcome& run : simulated(campaign, batch_lanes)) {
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      squares[i] += run.error(i) * run.error(i);
+      variances[i] += run.found.standard_errors[i] * run.found.standard_errors[i];
+    }
+  }
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_LE(squares[i], variances[i]) << test::parameter_infos()[i].name;
+  }
+}
+
 // A rotation at 2 f_TM − 2 f_orb makes a line at f_TM − 2 f_orb by Ω̇, of which Coriolis's
 // acceleration leaves 2 %. With Ω̇ alone in the model, a_c12 would move by 6e-4 rad.
 TEST(JointCampaign, IsNotMovedByARotationAtTwiceTheFrequencyOfAMass) {

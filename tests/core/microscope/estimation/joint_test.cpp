@@ -248,6 +248,48 @@ TEST(JointModel, IsWhatTwoSensorsMeasure) {
   }
 }
 
+/// Largest |model − Γ_mes,dx| at a line of a push along an axis, over some instruments, as a part
+/// of the amplitude times (14000 s²/m of the amplitude)^4: a term of the fifth order is one of
+/// these.
+double fifth_order_misfit(Axis axis, double amplitude_m_s2, DragFreeSource source, PushLine at) {
+  Excitation excitation = push_along(axis);
+  excitation.amplitude = amplitude_m_s2;
+  const Session session = session_with({excitation}, source);
+  const double part = 14'000.0 * amplitude_m_s2;
+  const bool is_twice = at == PushLine::at_2f;
+  const LineSignals signals = is_twice ? LineSignals::squares : LineSignals::gradients;
+  double largest = 0.0;
+  for (std::uint64_t run = 0; run < 8; ++run) {
+    const Instrument instrument = drawn_instrument(run);
+    const Record record(instrument, session);
+    const LinePhasors at_f = record.line(LineSignals::gradients, cycles_shaken);
+    LinePhasors line = record.line(signals, (is_twice ? 2.0 : 1.0) * cycles_shaken);
+    const std::size_t common = 1 + index(axis);
+    const Push push{.axis = axis,
+                    .at_f = at_f[common],
+                    .at_2f = record.line(LineSignals::squares, 2.0 * cycles_shaken)[common]};
+    if (is_twice) line = centred(line, record.means());
+    const UnknownArray truth = true_unknowns(instrument, 0.0);
+    const Complex value =
+        predict(line_coefficients(session, record.means(), truth), signals, line).value +
+        push_terms(source, truth, push, at).value;
+    largest = std::max(largest, std::abs(value - line[0]) / (amplitude_m_s2 * std::pow(part, 4)));
+  }
+  return largest;
+}
+
+// At 3e-6 m/s² terms of the third order are 500 of the fifth order; what is left out are a few of
+// those. The record has an inert loop, so that all of the square is left at 2 f.
+TEST(JointModel, HasWhatTheSquaresOfAStrongPushMakeOfIt) {
+  for (const DragFreeSource source :
+       {DragFreeSource::common, DragFreeSource::sensor_1, DragFreeSource::sensor_2}) {
+    for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+      EXPECT_LT(fifth_order_misfit(axis, 3e-6, source, PushLine::at_f), 3.0);
+    }
+    EXPECT_LT(fifth_order_misfit(Axis::x, 3e-6, source, PushLine::at_2f), 3.0);
+  }
+}
+
 // A rotation ψ(t) displaces a mass at q along Y by −ψq along X of inertial space. Of the second
 // derivative of ψq, the sensor feels ψ̈q + 2ψ̇q̇ along X. With frequencies ν and f, these two have
 // the amplitudes −ν² and 2νf at ν − f, together ν(2f − ν): 5/197 of the first here.
@@ -287,8 +329,8 @@ class Random {
   std::uint32_t next_ = 0;
 };
 
-constexpr UnknownArray sizes{2e-5, 2e-5, 2e-5, 2e-3, 2e-3, 1e-2, 1e-3, 1e-3, 1e4,  1e4,  1e-2,
-                             1e-4, 1e-4, 2e-3, 5e-5, 5e-5, 5e-5, 1e-8, 1e-8, 1e-8, 1e-4, 1e-4};
+constexpr UnknownArray sizes{2e-5, 2e-5, 2e-5, 2e-3, 2e-3, 1e-2, 1e-3, 1e-3, 1e4,  1e4,  1e-2, 1e-4,
+                             1e-4, 2e-3, 5e-5, 5e-5, 5e-5, 1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e8,  1e8};
 
 // A central difference over ±1e-3 of each size errs by 1e-6 of the second-order terms, which are a
 // hundredth of the slope, and by rounding, 1e-13 of the value over that step.
@@ -356,6 +398,49 @@ TEST(Joint, RefusesSessionsThatCannotTellEveryParameter) {
   EXPECT_EQ(without({a_d12, a_c13}), "session = 9" + needs +
                                          "pushes along y, one that moves masses in opposition "
                                          "along z)");
+}
+
+// The limits for the nominal law of K2, uniform within 14000 s²/m: K = 14000/√3 s²/m. Alone,
+// 8.75 K⁴ Γ⁴ = 150e-6/50; beside others, 1.5 K² Γ² = 150e-6/50.
+TEST(Joint, RefusesPushesOfWhichItLeavesOutTooMuch) {
+  const PushLimits limits = push_limits(drawn_moments(nominal_dispersions()), 150e-6);
+  const double k2_s2_m = 14'000.0 / std::sqrt(3.0);
+  EXPECT_NEAR(8.75 * std::pow(k2_s2_m * limits.alone_along_x, 4), 3e-6, 1e-11);
+  EXPECT_NEAR(1.5 * std::pow(k2_s2_m * limits.beside_others, 2), 3e-6, 1e-11);
+  const auto refused = [&](std::vector<Excitation> excitations) {
+    return test::message_of<ConfigError>(
+        [&] { check_joint_pushes({session_with(std::move(excitations))}, limits); });
+  };
+  const auto push = [](Axis axis, double amplitude_m_s2) {
+    Excitation excitation = push_along(axis);
+    excitation.amplitude = amplitude_m_s2;
+    return excitation;
+  };
+  EXPECT_EQ(refused({push(Axis::x, 2.9e-6)}), "");
+  EXPECT_EQ(refused({push(Axis::x, 3.1e-6)}),
+            "session[0].excitations[0].amplitude_m_s2 = 3.1e-06 (must be <= 3e-06 for "
+            "estimation.method = \"joint\": beyond, what K2 makes of it and the model leaves out "
+            "may move a_d11' by 1/50 of its objective)");
+  EXPECT_EQ(refused({move_along(Axis::y), push(Axis::x, 2.9e-6)}), "");
+  EXPECT_EQ(refused({push(Axis::y, 9e-6)}), "");
+  EXPECT_EQ(refused({push(Axis::y, 2e-8), push(Axis::x, 1.7e-7)}), "");
+  EXPECT_EQ(refused({push(Axis::y, 2e-8), push(Axis::x, 1.8e-7)}),
+            "session[0].excitations[1].amplitude_m_s2 = 1.8e-07 (must be <= 1.7e-07 for "
+            "estimation.method = \"joint\" beside the session's other excitations: beyond, what K2 "
+            "makes of it and the model leaves out may move a_d11' by 1/50 of its objective)");
+}
+
+TEST(Joint, RefusesRecordsShorterThanAnOrbit) {
+  std::vector<Session> sessions = hardy2013_sessions();
+  sessions[4].num_orbits = 2;
+  EXPECT_EQ(test::message_of<ConfigError>([&] { check_joint_records(sessions, 5950.0, 5950.0); }),
+            "");
+  sessions[4].num_orbits = 1;
+  EXPECT_EQ(test::message_of<ConfigError>([&] { check_joint_records(sessions, 5950.0, 0.0); }), "");
+  EXPECT_EQ(test::message_of<ConfigError>([&] { check_joint_records(sessions, 5950.0, 1000.0); }),
+            "session[4].orbits = 1 (estimation.method = \"joint\" needs 2 or more: less "
+            "estimation.transient_s = 1000 the record of session a_c13 is 4950 s long, and must be "
+            "an orbit, 5950 s)");
 }
 
 // Every session that may be asked for: its lines fit into one set of weights, with the level.
