@@ -34,6 +34,8 @@ struct CampaignIdentity {
 /// Everything that a review report and its charts are made of.
 struct Review {
   std::string database = {};  ///< As commands name it.
+  /// Options of `report` that make this one anew, as a shell reads them, each after a blank.
+  std::string options = {};
   CampaignIdentity identity = {};
   ResultSchema schema = {};  ///< What the results are.
   ReadResults results = {};
