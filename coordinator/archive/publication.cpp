@@ -130,14 +130,45 @@ void write_campaign(const Campaign& campaign, const path& folder) {
   write_file(file, copy->definition(TableColumns::left_out).text, wire::IfThere::replace);
 }
 
-/// @param model  Its program is for the reader to name.
-std::string command_of(const StopPlan& plan, const Model& model) {
-  std::string command = "proofmass run campaign.toml --db again.db";
-  if (!model.description().empty()) command += " --model-program PROGRAM";
+/// The program of a model is for the reader to name.
+std::string run_command(const Model& model) {
+  const std::string command = "proofmass run campaign.toml --db again.db";
+  return model.description().empty() ? command : command + " --model-program PROGRAM";
+}
+
+std::string command_of_all(const StopPlan& plan, const Model& model) {
+  std::string command = run_command(model);
   if (plan.num_runs_max) command += fmt::format(" --runs {}", *plan.num_runs_max);
   if (!plan.stop_rule.empty()) command += " --until " + wire::shell_word(plan.stop_rule);
   if (plan.failures_max) command += fmt::format(" --failures {}", *plan.failures_max);
   return command;
+}
+
+/// More commands than these nobody types, one by one.
+constexpr std::size_t ranges_max = 20;
+
+/// What repeats the runs that have a result, in paragraphs. Those of a campaign that stopped half
+/// way are whichever had come, and only their ranges say which.
+std::string repetition_text(const Store& store, std::string_view digest) {
+  const std::vector<RunRange> finished = store.finished_runs();
+  const bool is_whole = store.control().phase == wire::CampaignPhase::finished &&
+                        num_runs_in(finished) == store.num_runs();
+  if (finished.empty()) return "There is nothing to repeat yet.\n";
+  if (!is_whole && finished.size() > ranges_max) {
+    return fmt::format(
+        "The runs that have a result are in {} ranges, too many for commands that repeat them.\n",
+        finished.size());
+  }
+  std::string commands;
+  if (is_whole) commands = "    " + command_of_all(store.stop_plan(), store.model()) + "\n";
+  for (const RunRange& range : is_whole ? std::vector<RunRange>() : finished) {
+    commands += fmt::format("    {} --range {}:{}\n", run_command(store.model()), range.first.value,
+                            range.end());
+  }
+  return fmt::format(
+      "These commands repeat the {}, and print its digest again if every bit is the same:\n\n"
+      "{}    proofmass report again.db | grep {}\n",
+      is_whole ? "campaign" : "part of the campaign that has results", commands, digest);
 }
 
 std::string readme_of(const Store& store, std::string_view digest) {
@@ -156,19 +187,15 @@ std::string readme_of(const Store& store, std::string_view digest) {
 - `CITATION.cff`: how to cite them
 - `SHA256SUMS`: checksums of all files, for `sha256sum --check SHA256SUMS`
 
-These commands repeat the campaign, and print its digest again if every bit is the same:
-
-    {}
-    proofmass report again.db | grep {}
-
+{}
 `proofmass publish --check ARCHIVE` checks all files, and computes some runs again.
 
 Made by {}, model {}; database schema {}; archive made on a processor with {}.
 )",
       store.name(), num_finished, store.num_runs(),
-      is_whole ? "" : " **The campaign is not finished.**", digest,
-      command_of(store.stop_plan(), store.model()), digest, store.build(), store.model_version(),
-      detail::schema_version(), name_of(best_instruction_set()));
+      is_whole ? "" : " **The campaign is not finished.**", digest, repetition_text(store, digest),
+      store.build(), store.model_version(), detail::schema_version(),
+      name_of(best_instruction_set()));
 }
 
 std::string citation_of(const Store& store, std::string_view digest,
@@ -284,7 +311,9 @@ void publish(const path& database, const path& archive, wire::IfThere if_there,
   const std::string folder = "proofmass-" + original.name();
   const path place = work.place / folder;
   std::filesystem::create_directory(place);
-  original.back_up(place / database_name);
+  original.back_up(place / database_name, [&] {
+    if (is_stopped()) throw Interrupted();
+  });
   write_texts(place, authors, is_stopped);
   wire::DraftFile draft("output", archive);
   const std::string complaint =

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "coordinator/cli/program.hpp"
+#include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/campaign/name.hpp"
@@ -115,6 +116,7 @@ ServedCampaign open_same(const Campaign& wanted, const StopPlan& plan,
   require_control(asker, wanted.name, store.owner());
   const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, store.num_runs());
   require_same(store, *campaign, database, remedy);
+  check_results_before_more(store);
   extend_same(store, *campaign, database);
   if (store.stop_plan() != plan) store.set_stop_plan(plan);
   return {.file = database, .store = std::move(store), .definition = campaign};
@@ -203,6 +205,7 @@ ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
                             store.model_version(), model.version()));
   }
   std::shared_ptr<const Campaign> definition = stored_campaign(store);
+  check_results_before_more(store);
   try {
     check_campaign_name(definition->name, NameOrigin::given);
   } catch (const ConfigError& error) {
@@ -233,7 +236,9 @@ ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan
 }
 
 void CampaignFolder::require_same(const std::filesystem::path& file, const Campaign& wanted) {
-  coordinator::require_same(Store::open_read_only(file), wanted, file, remedy);
+  const Store store = Store::open_read_only(file);
+  coordinator::require_same(store, wanted, file, remedy);
+  check_results_before_more(store);
 }
 
 // What the file holds was compared before.

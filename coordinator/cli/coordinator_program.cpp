@@ -71,10 +71,15 @@ std::string status_of(const Service& service) {
 
 /// The campaigns of campaign files: new ones, or such that have more runs than before.
 std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder) {
-  std::vector<ServedCampaign> campaigns;
+  std::vector<std::unique_ptr<const Campaign>> wanted;  // All, before a database is made.
   for (const std::filesystem::path& file : options.campaign_files) {
-    campaigns.push_back(folder.open(*read_campaign(file), {}, {}));
+    wanted.push_back(read_campaign(file));
+    const std::string& name = wanted.back()->name;
+    if (std::ranges::count(wanted, name, [](const auto& one) { return one->name; }) == 1) continue;
+    throw UsageError(fmt::format("FILE = {} (campaign {} is given twice)", file.string(), name));
   }
+  std::vector<ServedCampaign> campaigns;
+  for (const auto& campaign : wanted) campaigns.push_back(folder.open(*campaign, {}, {}));
   return campaigns;
 }
 

@@ -114,6 +114,9 @@ void check_new_file(std::string_view argument, const std::filesystem::path& file
   if (std::filesystem::exists(file, error)) {
     throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
   }
+  if (!file.has_filename()) {
+    throw UsageError(fmt::format("{} = \"{}\" (must name a file)", argument, file.string()));
+  }
   const bool has_directory = std::filesystem::is_directory(wire::directory_of(file), error);
   if (has_directory || error == std::errc::permission_denied) return;  // Making it says more.
   throw Error(fmt::format("{} = {} (its directory does not exist)", argument, file.string()));

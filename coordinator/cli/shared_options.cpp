@@ -31,6 +31,14 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
       "Accept machines where a model program computes\nother bits; the report says so");
 }
 
+std::string too_many_failures_text(std::uint64_t num_failures, std::uint64_t num_runs,
+                                   std::uint64_t failures_max) {
+  return fmt::format(
+      "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
+      "--failures); cancelled\n",
+      num_failures, num_runs, failures_max);
+}
+
 std::string example_requirement() {
   const Quantity quantity = example_quantity(example_results());
   const double limit =

@@ -23,6 +23,11 @@ struct StopOptions {
   std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate.
 };
 
+/// Why a campaign with --failures was cancelled, for standard error.
+/// @param num_failures  Runs given up or without an estimate.
+[[nodiscard]] std::string too_many_failures_text(std::uint64_t num_failures, std::uint64_t num_runs,
+                                                 std::uint64_t failures_max);
+
 /// A requirement about a quantity of the example, for help texts: `gain < 1e-3 for 99% with 95%`.
 [[nodiscard]] std::string example_requirement();
 

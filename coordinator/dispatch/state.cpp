@@ -92,9 +92,10 @@ bool expects_no_result(const CampaignState& campaign) {
   return campaign.pending.empty() && campaign.pending_suspects.empty() && campaign.lent.empty();
 }
 
-bool is_quiet(const State& state) {
+bool is_quiet(const State& state, const std::set<CampaignId>& lost) {
   if (!state.leases.empty()) return false;
   for (const auto& [id, campaign] : state.campaigns) {
+    if (lost.contains(id)) continue;
     if (!campaign.delivered.empty() || campaign.num_comparing > 0) return false;
   }
   return true;

@@ -405,7 +405,8 @@ struct State {
 [[nodiscard]] bool expects_no_result(const CampaignState& campaign);
 
 /// True if no result is expected or on its way to the store any more.
-[[nodiscard]] bool is_quiet(const State& state);
+/// @param lost  Campaigns of which nothing can be stored any more.
+[[nodiscard]] bool is_quiet(const State& state, const std::set<CampaignId>& lost = {});
 
 /// True if workers on a host of this name, with whatever key, are lent nothing.
 [[nodiscard]] bool is_quarantined(const State& state, const std::string& host);

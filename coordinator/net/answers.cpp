@@ -318,6 +318,14 @@ proto::AnswerReply reply_about(const UnnamedFile& file, const Order& order, int 
   return reply;
 }
 
+/// What the program says of its failure, without what whoever is told puts before it as well.
+std::string failure_text(std::string_view text) {
+  constexpr std::string_view beginning = "proofmass: error: ";
+  if (text.starts_with(beginning)) text.remove_prefix(beginning.size());
+  while (text.ends_with('\n')) text.remove_suffix(1);
+  return std::string(text);
+}
+
 /// Removes the copy at the end, whatever happens.
 struct CopyRemover {
   const std::optional<std::filesystem::path>& copy;
@@ -379,7 +387,7 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
     const std::optional<int> status =
         process.follow(Clock::now() + order.duration_max, *is_cancelled);
     const int exit_code = exit_code_of(status, order);
-    if (order.copy && exit_code != 0) throw Error(process.error_text());
+    if (order.copy && exit_code != 0) throw Error(failure_text(process.error_text()));
     if (order.copy) {
       const int descriptor = open(order.copy->c_str(), O_RDONLY | O_CLOEXEC);
       if (descriptor < 0) fail(order.copy->string());

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -74,6 +75,7 @@ class CampaignService {
   void take_hold(CampaignId id);
   /// Nothing can be stored any more in the file of this campaign: nothing of it is left to do.
   void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
+  [[nodiscard]] std::set<CampaignId> abandoned() const;
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
   void let_go(CampaignId id) { served_.at(id).is_held = false; }
   /// Changes a served campaign.

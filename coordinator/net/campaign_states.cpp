@@ -287,6 +287,14 @@ void CampaignService::close_ended(CampaignId id) {
       });
 }
 
+std::set<CampaignId> CampaignService::abandoned() const {
+  std::set<CampaignId> abandoned;
+  for (const auto& [id, served] : served_) {
+    if (served.is_abandoned) abandoned.insert(id);
+  }
+  return abandoned;
+}
+
 void CampaignService::archive(CampaignId id, const Respond& respond) {
   if (context_.config.directory == nullptr) {
     throw Error(
@@ -295,6 +303,8 @@ void CampaignService::archive(CampaignId id, const Respond& respond) {
   }
   const auto found = served_.find(id);
   if (found == served_.end()) return move_to_archive(id, respond);
+  // Says what became of the file and how to go on; there is nothing to be moved.
+  if (found->second.is_abandoned) throw Error(state_.campaigns.at(id).storage_failure);
   if (!is_settled(id, found->second)) {
     throw Error(fmt::format("campaign = {} (something is still to be stored; try again)",
                             found->second.record.status.name()));

@@ -183,7 +183,9 @@ class Service::Impl final : public Outbox {
       drained_until_ = now() + config_.drain_max;
       on_drain(state_, *this);
     }
-    if (drained_until_) return is_quiet(state_) || now() > *drained_until_;
+    if (drained_until_) {
+      return is_quiet(state_, campaign_service_.abandoned()) || now() > *drained_until_;
+    }
     return config_.end == ServiceEnd::when_done && is_done() && background_.is_idle() &&
            campaign_service_.is_all_told() && !is_followed();
   }

@@ -77,13 +77,16 @@ std::string digest_of(const Store& store) {
   return digest.finish().results;
 }
 
-DigestCheck check_digest(const Store& store, std::uint64_t num_results,
-                         const ResultDigests& digests) {
-  const std::optional<Summary> summary = store.summary();
+namespace {
+
+/// What is stored with the statistics of all these results; empty if that is of fewer results, or
+/// not there yet.
+std::optional<Summary> summary_of_all(const Store& store, std::uint64_t num_results) {
+  std::optional<Summary> summary = store.summary();
   if (!summary) {
     // Both are written in one transaction.
     if (store.has_statistics()) store.refuse_as_damaged("its statistics are there without summary");
-    return DigestCheck::not_checked;
+    return std::nullopt;
   }
   const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
                                     summary->num_not_finite + summary->num_no_draw +
@@ -96,7 +99,16 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results,
     store.refuse_as_damaged(fmt::format("it has {} results, and its statistics are of {}",
                                         num_results, summary->num_finished));
   }
-  if (num_results > summary->num_finished) return DigestCheck::not_checked;
+  if (num_results > summary->num_finished) return std::nullopt;
+  return summary;
+}
+
+}  // namespace
+
+DigestCheck check_digest(const Store& store, std::uint64_t num_results,
+                         const ResultDigests& digests) {
+  const std::optional<Summary> summary = summary_of_all(store, num_results);
+  if (!summary) return DigestCheck::not_checked;
   const auto require_same = [&](const std::string& now, const std::string& stored,
                                 const char* what) {
     if (now == stored) return;
@@ -123,6 +135,13 @@ WalkedResults walk_checked(const Store& store, const std::function<void(const Ru
     walked.check = check_digest(store, walked.num_results, digests);
   });
   return walked;
+}
+
+void check_results_before_more(const Store& store) {
+  store.read_one_state([&] {
+    if (!summary_of_all(store, num_runs_in(store.finished_runs()))) return;
+    (void)walk_checked(store, [](const RunResult&) {});
+  });
 }
 
 void check_definition_digest(const Store& store) {

@@ -72,6 +72,12 @@ struct WalkedResults {
 [[nodiscard]] WalkedResults walk_checked(const Store& store,
                                          const std::function<void(const RunResult&)>& visit);
 
+/// To be called before results are added to those of a file: its statistics and their digest are
+/// made anew then, and would make a damaged file valid. Reads all results if there is a digest of
+/// them all, and otherwise nothing: what was stored since the last one cannot be checked.
+/// @throws StoreError as walk_checked() does.
+void check_results_before_more(const Store& store);
+
 /// Holds what defines a campaign, its data files and its tables of drawn values against the digest
 /// that is stored with them.
 /// @throws StoreError `campaign database = x.db (is damaged: ...)`.

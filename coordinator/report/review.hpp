@@ -20,6 +20,8 @@ namespace proofmass::coordinator {
 /// Everything that reports and their charts are made of.
 struct Review {
   std::string database = {};  ///< As commands name it; whoever read the review knows that.
+  /// Options of `report` that make this one anew, as a shell reads them, each after a blank.
+  std::string options = {};
   // What the database says of itself. Any of these texts may come from a stranger.
   std::string name = {};
   std::uint64_t seed = 0;

@@ -163,14 +163,15 @@ std::vector<std::pair<std::string, std::string>> reproducing_commands(const Revi
   const std::string database = wire::shell_word(review.database);
   if (review.is_imported) {
     return {{fmt::format("proofmass verify {}", database), "checks the database"},
-            {fmt::format("proofmass report {} --html report.html", database),
+            {fmt::format("proofmass report {}{} --html report.html", database, review.options),
              "makes this report anew"}};
   }
   const char* const program = review.is_of_program ? " --model-program PROGRAM" : "";
   std::vector<std::pair<std::string, std::string>> commands{
       {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),
        "checks the database, simulates a tenth of the runs again and compares all bits"},
-      {fmt::format("proofmass report {} --html report.html", database), "makes this report anew"}};
+      {fmt::format("proofmass report {}{} --html report.html", database, review.options),
+       "makes this report anew"}};
   if (!review.matrix.empty() && review.matrix.back().worst) {
     commands.emplace_back(fmt::format("proofmass replay {0} --run {1} --output run{1}.h5{2}",
                                       database, review.matrix.back().worst->run.value, program),

@@ -259,13 +259,14 @@ void Store::write_plain(const std::filesystem::path& draft) const {
   transaction.commit();
 }
 
-void Store::back_up(const std::filesystem::path& destination) const {
+void Store::back_up(const std::filesystem::path& destination,
+                    const std::function<void()>& on_part) const {
   check_name(destination);
   const detail::StoreLock lock(destination, detail::IfNoLocks::go_on);
   detail::check_absence(destination);
   detail::appear_complete(destination, wire::IfThere::keep,
                           [&](const std::filesystem::path& draft) {
-                            detail::copy_whole(impl_->database, impl_->path, draft);
+                            detail::copy_whole(impl_->database, impl_->path, draft, on_part);
                           });
 }
 

@@ -302,8 +302,10 @@ class Store {
 
   /// Copies the file as it is now, complete or not at all, also while a coordinator writes to it.
   /// The copy is one file, readable on read-only media.
-  /// @throws StoreError if the destination exists or cannot be written.
-  void back_up(const std::filesystem::path& destination) const;
+  /// @param on_part  Called before each 16 MB or so; if it throws, no file is made.
+  /// @throws StoreError if the destination exists or cannot be written, or if `on_part` throws.
+  void back_up(
+      const std::filesystem::path& destination, const std::function<void()>& on_part = [] {}) const;
 
   /// Writes the same tables and views into an empty file, for SQLite from 3.25 on: no table is
   /// STRICT, and columns that are computed when read hold their values. The programs themselves do

@@ -12,9 +12,11 @@ struct BackupOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-int back_up_database(const BackupOptions& options) {
+int back_up_database(const BackupOptions& options, const IsStopped& is_stopped) {
   check_new_file("destination", options.destination);
-  Store::open_read_only(options.database).back_up(options.destination);
+  Store::open_read_only(options.database).back_up(options.destination, [&] {
+    if (is_stopped()) throw Interrupted();
+  });
   print_written(options.destination, options.format);
   return exit_done;
 }
@@ -22,7 +24,7 @@ int back_up_database(const BackupOptions& options) {
 }  // namespace
 
 void add_backup(CLI::App& app, Command& chosen) {
-  auto [command, options] = add_command<BackupOptions>(
+  auto [command, options] = add_stoppable_command<BackupOptions>(
       app, chosen, "backup", "Copy a database, even while it is written", back_up_database);
   add_database(command, options.database);
   command.add_option("DESTINATION", options.destination, "File to make")

@@ -10,6 +10,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
@@ -61,33 +64,72 @@ std::string_view first_rights(KeyRole role) {
   return role == KeyRole::client ? "observe,submit,control" : "";
 }
 
-void refuse_to_replace(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(std::filesystem::symlink_status(file))) return;
-  throw UsageError(fmt::format("key file = {} (exists; keys are never replaced)", file.string()));
+bool is_there(const std::filesystem::path& file) {
+  return std::filesystem::exists(std::filesystem::symlink_status(file));
 }
 
-void make_directory(const std::filesystem::path& directory) {
-  if (::mkdir(directory.c_str(), 0700) == 0 || errno == EEXIST) return;
-  throw Error(fmt::format("key directory = {} ({})", directory.string(), std::strerror(errno)));
-}
-
-void make_whole_set(const std::filesystem::path& directory) {
-  for (const std::string_view name :
-       {"coordinator.key", "coordinator.pub", "worker.key", "worker.pub", "client.key",
-        "client.pub", "authorized_workers", "authorized_clients"}) {
-    refuse_to_replace(directory / name);
+/// Files that belong together, none of which is there before: they are removed again unless all
+/// were made, whether somebody asked to stop or the disk is full.
+class FilesOfOneSet {
+ public:
+  /// @throws UsageError if one of them is there.
+  FilesOfOneSet(const std::filesystem::path& directory, std::vector<std::string> names)
+      : directory_(directory), names_(std::move(names)) {
+    const auto is_missing = [&](const auto& name) { return !is_there(directory / name); };
+    const auto there = std::ranges::find_if_not(names_, is_missing);
+    if (there == names_.end()) return;
+    const auto missing = std::ranges::find_if(names_, is_missing);
+    // As after a kill, which leaves no time to remove anything.
+    const std::string advice =
+        missing == names_.end()
+            ? std::string()
+            : fmt::format(
+                  " {} is missing: put it back or, if no program has these keys, remove "
+                  "the others;",
+                  (directory / *missing).string());
+    throw UsageError(fmt::format("key file = {} (exists;{} keys are never replaced)",
+                                 (directory / *there).string(), advice));
   }
-  make_directory(directory);
+  ~FilesOfOneSet() {
+    if (is_whole_) return;
+    std::error_code ignored;
+    for (const std::string& name : names_) std::filesystem::remove(directory_ / name, ignored);
+    if (has_made_directory_) std::filesystem::remove(directory_, ignored);
+  }
+  FilesOfOneSet(const FilesOfOneSet&) = delete;
+  FilesOfOneSet& operator=(const FilesOfOneSet&) = delete;
+
+  void make_directory() {
+    has_made_directory_ = ::mkdir(directory_.c_str(), 0700) == 0;
+    if (has_made_directory_ || errno == EEXIST) return;
+    throw Error(fmt::format("key directory = {} ({})", directory_.string(), std::strerror(errno)));
+  }
+  void keep() { is_whole_ = true; }
+
+ private:
+  std::filesystem::path directory_;
+  std::vector<std::string> names_;
+  bool has_made_directory_ = false;
+  bool is_whole_ = false;
+};
+
+void make_whole_set(const std::filesystem::path& directory, const IsStopped& is_stopped) {
+  FilesOfOneSet files(
+      directory, {"coordinator.key", "coordinator.pub", "worker.key", "worker.pub", "client.key",
+                  "client.pub", "authorized_workers", "authorized_clients"});
+  files.make_directory();
   wire::check_key_directory(directory);
   wire::write_key_pair(directory, to_text(KeyRole::coordinator), KeyRole::coordinator,
                        wire::make_key_pair());
   for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
+    if (is_stopped()) throw Interrupted();
     const wire::KeyPair pair = wire::make_key_pair();
     wire::write_key_pair(directory, to_text(role), role, pair);
     wire::write_whole_file("allow-list", directory / list_name(role),
                            list_head(role) + list_line(pair, to_text(role), first_rights(role)),
                            wire::trusted_mode, wire::IfThere::keep);
   }
+  files.keep();
 }
 
 std::string read_list(const std::filesystem::path& file) {
@@ -111,14 +153,13 @@ void add_pair(const std::filesystem::path& directory, KeyRole role, const std::s
     throw UsageError(
         fmt::format("--{} = {} (is in {} already)", to_text(role), name, list.string()));
   }
-  for (const std::string_view ending : {"key", "pub"}) {
-    refuse_to_replace(directory / fmt::format("{}.{}", name, ending));
-  }
+  FilesOfOneSet files(directory, {name + ".key", name + ".pub"});
   const wire::KeyPair pair = wire::make_key_pair();
   wire::write_key_pair(directory, name, role, pair);
   if (!text.empty() && text.back() != '\n') text += '\n';
   wire::write_whole_file("allow-list", list, text + list_line(pair, name), wire::trusted_mode,
                          wire::IfThere::replace);
+  files.keep();
 }
 
 void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
@@ -135,7 +176,7 @@ void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
 
 /// Makes a directory with the keys of a coordinator, of workers and of clients, and the lists of
 /// who may connect; or adds pairs to one. Says what to copy where.
-int make_keys(const KeygenOptions& options) {
+int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
   const std::filesystem::path& directory = options.directory;
   if (options.worker) {
     add_pair(directory, KeyRole::worker, *options.worker);
@@ -146,7 +187,7 @@ int make_keys(const KeygenOptions& options) {
     say_where_to_copy(directory, KeyRole::client, *options.client);
   }
   if (options.worker || options.client) return exit_done;
-  make_whole_set(directory);
+  make_whole_set(directory, is_stopped);
   fmt::print(
       "wrote {0}\nKeep this directory on the coordinator's machine:\n"
       "  proofmass-coordinator --keys {0}\n"
@@ -160,7 +201,7 @@ int make_keys(const KeygenOptions& options) {
 }  // namespace
 
 void add_keygen(CLI::App& app, Command& chosen) {
-  auto [command, options] = add_command<KeygenOptions>(
+  auto [command, options] = add_stoppable_command<KeygenOptions>(
       app, chosen, "keygen", "Make keys of a coordinator, workers, clients", make_keys);
   command.add_option("DIRECTORY", options.directory, "Directory to make, or to add a key to")
       ->type_name(wire::directory_type)

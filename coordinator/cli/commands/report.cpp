@@ -25,6 +25,8 @@
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/start_program.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -101,9 +103,22 @@ void check_standard_output(const ReportOptions& options) {
   take(options.markdown, "--markdown");
 }
 
+/// For a shell in the directory of the database, whose name alone is in the document.
+std::string requirement_options(const ReportOptions& options) {
+  std::string text;
+  for (const std::string& requirement : options.requirements) {
+    text += " --requirement " + wire::shell_word(requirement);
+  }
+  if (options.requirements_file.empty()) return text;
+  const std::filesystem::path file =
+      std::filesystem::proximate(options.requirements_file, wire::directory_of(options.database));
+  return text + " --requirements " + wire::shell_word(file.string());
+}
+
 /// @return What print_report() returns.
 int write_documents(const ReportOptions& options, const Store& store,
                     const std::vector<StatedRequirement>& stated, Review& review) {
+  review.options = requirement_options(options);
   const auto write = [&] {
     if (!options.html.empty()) write_document(options.html, options.if_there, review_html(review));
     if (!options.markdown.empty()) {

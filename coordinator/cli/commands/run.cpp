@@ -282,11 +282,9 @@ int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
 }
 
 int say_cancelled(const Store& store, std::uint64_t failures_max) {
-  wire::say(fmt::format(
-      "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
-      "--failures); cancelled\n",
-      store.num_without_estimate() + num_runs_in(store.given_up_runs()), store.num_runs(),
-      failures_max));
+  wire::say(
+      too_many_failures_text(store.num_without_estimate() + num_runs_in(store.given_up_runs()),
+                             store.num_runs(), failures_max));
   return exit_cannot_be_done;
 }
 

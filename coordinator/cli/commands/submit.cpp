@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,6 +17,7 @@
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -59,6 +62,17 @@ proto::RequestEnvelope submit_request(const SubmitOptions& options, const Campai
   return request;
 }
 
+/// A campaign that was cancelled because of its failures says so, as `run` does.
+void say_failures(const Ask& ask, const std::string& name, std::uint64_t failures_max) {
+  const proto::StatusReply status = whole_status(ask);
+  const auto found = std::ranges::find(status.campaigns(), name, &proto::CampaignStatus::name);
+  if (found == status.campaigns().end()) return;
+  const std::uint64_t num_failures = found->num_without_estimate() + found->num_given_up();
+  const bool is_cancelled = found->phase() == proto::CAMPAIGN_PHASE_CANCELLED;
+  if (!is_cancelled || num_failures <= failures_max) return;
+  wire::say(too_many_failures_text(num_failures, found->num_runs(), failures_max));
+}
+
 // A new campaign, or one that is there and has more runs now.
 int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
@@ -70,7 +84,9 @@ int submit_campaign(const SubmitOptions& options) {
                           options.client.format));
     if (!options.waits) return static_cast<int>(exit_done);
     flush_standard_output();
-    return watch_on_standard_output(ask, campaign->name, options.client.format);
+    const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);
+    if (options.stop.failures_max) say_failures(ask, campaign->name, *options.stop.failures_max);
+    return exit_code;
   });
 }
 

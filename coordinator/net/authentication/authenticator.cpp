@@ -108,6 +108,7 @@ void Authenticator::on_event(Domain domain, const wire::SocketEvent& event, Time
 }
 
 void Authenticator::serve(TimePoint now) {
+  for (AllowList* const list : {&workers_, &clients_}) report(list->refresh_if_due(now));
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;

@@ -50,7 +50,9 @@ class Authenticator {
   /// protocol. ZeroMQ does not report its address.
   void on_event(wire::Domain domain, const wire::SocketEvent& event, TimePoint now);
 
-  /// Answers all handshakes that wait; never waits itself.
+  /// Answers all handshakes that wait, and reads the lists again that changed, once a second at
+  /// most. To be called several times a second, also while nobody connects or speaks: a key is
+  /// revoked by two looks. Never waits itself.
   void serve(TimePoint now);
 
   /// True if the key is on the domain's list, which is read again when it changed, once a second at

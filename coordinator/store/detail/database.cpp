@@ -78,15 +78,24 @@ bool has_locks(sqlite3* connection) {
   return errno != ENOLCK && errno != ENOSYS && errno != EOPNOTSUPP;
 }
 
-// SQLite applies a log to whatever file has the name, also to one that was put there since.
-std::string damage(const std::filesystem::path& file, std::string_view what) {
-  if (has_log(file) && is_sound_without_log(file)) {
+// SQLite applies a log to whatever file has the name. One that this program began is the file's.
+std::string damage(const std::filesystem::path& file, bool had_log, std::string_view what) {
+  if (had_log && has_log(file) && fault_without_log(file).empty()) {
     return fmt::format(
         "is damaged: {}; without its log {} it is in order: if the file was restored from a copy, "
         "the log is that of the file before it, and removing the log suffices",
         what, log_path(file).filename().string());
   }
   return fmt::format("is damaged: {}; restore it from a copy", what);
+}
+
+/// What SQLite noticed, which names no place, and what its check of the whole file finds first.
+std::string corruption(const std::filesystem::path& file, bool had_log, const char* what) {
+  const std::string fault = fault_without_log(file);
+  const bool is_told = fault.empty() || fault == what;
+  return damage(
+      file, had_log,
+      is_told ? std::string(what) : fmt::format("{}; PRAGMA integrity_check: {}", what, fault));
 }
 
 constexpr std::string_view log_out_of_reach =
@@ -116,12 +125,13 @@ std::string explanation_of_readonly(int code, sqlite3* connection) {
   }
 }
 
-std::string explanation(int code, sqlite3* connection, const std::filesystem::path& file) {
+std::string explanation(int code, sqlite3* connection, const std::filesystem::path& file,
+                        bool had_log) {
   switch (code & 0xff) {
     case SQLITE_NOTADB:
       return "is not an SQLite database";
     case SQLITE_CORRUPT:
-      return damage(file, sqlite3_errmsg(connection));
+      return corruption(file, had_log, sqlite3_errmsg(connection));
     case SQLITE_FULL:
       return "the disk is full; what was committed before is safe, free space and try again";
     case SQLITE_BUSY:
@@ -141,14 +151,23 @@ std::string explanation(int code, sqlite3* connection, const std::filesystem::pa
   }
 }
 
-// In one step: with several, a writer in another process would begin the copy anew each time. The
-// end does not tell that the step found the file locked and copied nothing.
-int copy_all(sqlite3* from, sqlite3* to, const char* name = "main") {
-  sqlite3_backup* const backup = sqlite3_backup_init(to, name, from, "main");
+constexpr int pages_per_part = 4096;  // 16 MB.
+
+// With several steps, a writer in another process would begin the copy anew each time, unless a
+// transaction holds the state that is copied. The end does not tell that a step found the file
+// locked and copied nothing.
+int copy_all(
+    sqlite3* from, sqlite3* to, const char* name = "main", int num_pages = -1,
+    const std::function<void()>& on_part = [] {}) {
+  const std::unique_ptr<sqlite3_backup, int (*)(sqlite3_backup*)> backup(
+      sqlite3_backup_init(to, name, from, "main"), &sqlite3_backup_finish);
   if (backup == nullptr) return sqlite3_errcode(to);
-  const int step_code = sqlite3_backup_step(backup, -1);
-  const int end_code = sqlite3_backup_finish(backup);
-  return step_code == SQLITE_BUSY || step_code == SQLITE_LOCKED ? step_code : end_code;
+  int code = SQLITE_OK;
+  while (code == SQLITE_OK) {
+    on_part();
+    code = sqlite3_backup_step(backup.get(), num_pages);
+  }
+  return code == SQLITE_DONE ? SQLITE_OK : code;
 }
 
 }  // namespace
@@ -170,7 +189,9 @@ std::string file_uri(const std::filesystem::path& file, std::string_view paramet
 void Database::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
 
 Database::Database(const std::filesystem::path& path, Access access)
-    : path_(path), name_(name_of(path, access)) {
+    : path_(path),
+      name_(name_of(path, access)),
+      had_log_(access != Access::memory && has_log(path)) {
   open(access);
   const bool is_file = access != Access::memory && access != Access::immutable;
   if (is_file && !has_locks(connection_.get())) {
@@ -242,8 +263,11 @@ std::int64_t Database::last_row() const { return sqlite3_last_insert_rowid(conne
 
 bool Database::in_transaction() const { return sqlite3_get_autocommit(connection_.get()) == 0; }
 
-void Database::copy_to(Database& copy) const {
-  const int code = copy_all(connection_.get(), copy.connection_.get());
+void Database::copy_to(Database& copy, const std::function<void()>& on_part) {
+  const ReadTransaction one_state(*this);
+  (void)count("SELECT count(*) FROM sqlite_schema");  // The first read takes hold of the state.
+  const int code =
+      copy_all(connection_.get(), copy.connection_.get(), "main", pages_per_part, on_part);
   if (code == SQLITE_OK) return;
   if ((code & 0xff) == SQLITE_CORRUPT) {  // Found where it was read.
     refuse_as_damaged(sqlite3_errmsg(copy.connection_.get()));
@@ -305,7 +329,9 @@ void Database::refuse(std::string_view what) const {
   refuse_file(path_, wire::visible_text(what));
 }
 
-void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(path_, what)); }
+void Database::refuse_as_damaged(std::string_view what) const {
+  refuse(damage(path_, had_log_, what));
+}
 
 void Database::refuse_copy(int code) const {
   refuse(
@@ -320,7 +346,7 @@ void Database::fail(int code) const {
       (kind == SQLITE_FULL || kind == SQLITE_IOERR || kind == SQLITE_CANTOPEN)) {
     refuse_copy(code);
   }
-  refuse(explanation(code, connection_.get(), path_));
+  refuse(explanation(code, connection_.get(), path_, had_log_));
 }
 
 Transaction::Transaction(Database& database) : database_(database) {

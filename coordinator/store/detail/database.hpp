@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -149,8 +150,9 @@ class Database {
   [[nodiscard]] bool in_transaction() const;
 
   /// Replaces the content of another database by that of this one, as it is now.
+  /// @param on_part  Called before each of the parts that are copied; what it throws is passed on.
   /// @throws StoreError naming this file if it is damaged, and else the copy.
-  void copy_to(Database& copy) const;
+  void copy_to(Database& copy, const std::function<void()>& on_part);
 
   /// Goes on with a copy of its own that may be changed: SQLite keeps it in memory while it is
   /// small, and else in a nameless file of the temporary directory, which ends with the process,
@@ -203,7 +205,8 @@ class Database {
   [[noreturn]] void refuse_copy(int code) const;
 
   std::filesystem::path path_;
-  std::string name_;  ///< By which SQLite opened it.
+  std::string name_;      ///< By which SQLite opened it.
+  bool had_log_ = false;  ///< When it was opened: the log may be another file's.
   std::unique_ptr<sqlite3, Close> connection_;
   bool is_private_copy_ = false;
 };

@@ -250,20 +250,23 @@ bool has_log(const std::filesystem::path& file) {
 }
 
 // Without a Database: that would ask this function what to say of an error.
-bool is_sound_without_log(const std::filesystem::path& file) {
+std::string fault_without_log(const std::filesystem::path& file) {
   sqlite3* opened = nullptr;
   const int code = sqlite3_open_v2(file_uri(file, "immutable=1").c_str(), &opened,
                                    SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   const std::unique_ptr<sqlite3, int (*)(sqlite3*)> connection(opened, &sqlite3_close_v2);
-  if (code != SQLITE_OK) return false;
-  bool is_sound = false;
+  if (code != SQLITE_OK) return sqlite3_errmsg(opened);
+  std::string finding;
   const auto take = [](void* result, int, char** texts, char**) {
-    *static_cast<bool*>(result) = texts[0] != nullptr && std::string_view(texts[0]) == "ok";
+    *static_cast<std::string*>(result) = texts[0] == nullptr ? "" : texts[0];
     return 0;
   };
-  const int end = sqlite3_exec(opened, "PRAGMA trusted_schema = OFF; PRAGMA quick_check(1)", take,
-                               &is_sound, nullptr);
-  return end == SQLITE_OK && is_sound;
+  const int end = sqlite3_exec(opened, "PRAGMA trusted_schema = OFF; PRAGMA integrity_check(1)",
+                               take, &finding, nullptr);
+  if (end != SQLITE_OK) return sqlite3_errmsg(opened);
+  if (finding == "ok") return {};
+  // A line that names the database may come first.
+  return finding.substr(finding.find('\n') + 1);
 }
 
 void check_absence(const std::filesystem::path& file) {

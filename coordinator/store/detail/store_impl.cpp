@@ -82,10 +82,10 @@ void configure(Database& database) {
   database.execute("PRAGMA foreign_keys = ON");
 }
 
-void copy_whole(const Database& database, const std::filesystem::path& file,
-                const std::filesystem::path& draft) {
+void copy_whole(Database& database, const std::filesystem::path& file,
+                const std::filesystem::path& draft, const std::function<void()>& on_part) {
   Database copy(draft, Access::create);
-  database.copy_to(copy);
+  database.copy_to(copy, on_part);
   copy.execute("PRAGMA cell_size_check = ON");
   // Nobody shall rely on the copy of a damaged file, which is the one to be named.
   copy.name_in_messages(file);
@@ -201,7 +201,7 @@ void Store::Impl::write_copy() {
                                        fmt::gmtime(std::time(nullptr)), name.extension().string());
   detail::check_directory_of(wanted);
   detail::appear_complete(wanted, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
-    detail::copy_whole(database, path, draft);
+    detail::copy_whole(database, path, draft, [] {});
   });
   copy = wanted;
   place->remove_own_log();

@@ -20,9 +20,10 @@ namespace detail {
 void configure(Database& database);
 
 /// Writes all that the database of a file holds to an empty file, which is whole without a log.
+/// @param on_part  See Database::copy_to().
 /// @throws StoreError naming the file if a page of it is damaged, and else the draft.
-void copy_whole(const Database& database, const std::filesystem::path& file,
-                const std::filesystem::path& draft);
+void copy_whole(Database& database, const std::filesystem::path& file,
+                const std::filesystem::path& draft, const std::function<void()>& on_part);
 
 /// Prepares a connection to a campaign database for reading: checks the file, and if it is of an
 /// older version goes on with a private copy, see Database::go_on_with_private_copy().

@@ -315,6 +315,15 @@ TEST_F(StoreBackup, IsTheSameCampaignInOneFile) {
   EXPECT_EQ(Database(copy(), Access::read_only).text("PRAGMA journal_mode"), "delete");
 }
 
+TEST_F(StoreBackup, LeavesNothingIfItIsInterrupted) {
+  const Store store = Store::open_read_only(file());
+  const auto interrupt = [] { throw StoreError("interrupted"); };
+  EXPECT_EQ(store_error_of([&] { store.back_up(copy(), interrupt); }), "interrupted");
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+  store.back_up(copy());
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 1000u);
+}
+
 TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
   const Store store = Store::open_read_only(file());
   {

@@ -63,8 +63,9 @@ class StoreOpening : public test::StoreTest {
     stream << std::string(static_cast<std::size_t>(page_size), '\0');
   }
 
-  [[nodiscard]] std::string damaged() const {
-    return message("is damaged: database disk image is malformed; restore it from a copy");
+  // Where the damage is depends on how SQLite packs pages.
+  [[nodiscard]] static auto damaged() {
+    return HasSubstr("is damaged: database disk image is malformed; PRAGMA integrity_check: ");
   }
 };
 
@@ -86,7 +87,7 @@ TEST_F(StoreOpening, FindsADamagedRootOfAnyTable) {
                                   "delivery", "attempt", "worker", "overrun"}) {
     fill(10);
     damage(table, true);
-    EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()); }), damaged()) << table;
+    EXPECT_THAT(store_error_of([&] { Store::open_read_only(file()); }), damaged()) << table;
   }
 }
 
@@ -109,7 +110,7 @@ TEST_F(StoreOpening, LeavesAPageOfDeliveriesToWhoeverReadsIt) {
   fill(2000);
   damage("delivery", false);
   const Store store = Store::open_read_only(file());
-  EXPECT_EQ(store_error_of([&] { (void)store.finished_runs(); }), damaged());
+  EXPECT_THAT(store_error_of([&] { (void)store.finished_runs(); }), damaged());
   EXPECT_EQ(test::results_in(store).size(), 2000u);
 }
 
@@ -119,7 +120,7 @@ TEST_F(StoreOpening, ForItsCoordinatorFindsAnyDamagedPageBeforeAnythingIsWritten
     fill(2000);
     damage(table, false);
     const std::string before = test::content_of(file());
-    EXPECT_EQ(store_error_of([&] { Store::open(file()); }), damaged()) << table;
+    EXPECT_THAT(store_error_of([&] { Store::open(file()); }), damaged()) << table;
     EXPECT_TRUE(test::content_of(file()) == before) << table;
   }
 }
@@ -128,7 +129,7 @@ TEST_F(StoreOpening, OfADamagedFileMakesNoBackup) {
   fill(2000);
   damage("run_result", false);
   const Store store = Store::open_read_only(file());
-  EXPECT_EQ(store_error_of([&] { store.back_up(directory() / "copy.db"); }), damaged());
+  EXPECT_THAT(store_error_of([&] { store.back_up(directory() / "copy.db"); }), damaged());
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
@@ -167,7 +168,7 @@ TEST_F(StoreOpening, OfAFileThatIsDamagedWithoutItsLogNamesNoSuchRemedy) {
   const Database keeps_the_log(file(), Access::read_only);
   change("UPDATE campaign SET priority = 1");
   const Store store = Store::open_read_only(file());
-  EXPECT_EQ(store_error_of([&] { store.for_each_result([](const RunResult&) {}); }), damaged());
+  EXPECT_THAT(store_error_of([&] { store.for_each_result([](const RunResult&) {}); }), damaged());
 }
 
 // Closing the file would fold the log in, which may not be its own.
@@ -180,7 +181,7 @@ TEST_F(StoreOpening, ForWritingFindsAnyDamagedPageOfAFileWithALog) {
   change("UPDATE campaign SET priority = 1");
   ASSERT_TRUE(detail::has_log(file()));
   const std::string before = test::content_of(file());
-  EXPECT_EQ(store_error_of([&] { Store::open(file()); }), damaged());
+  EXPECT_THAT(store_error_of([&] { Store::open(file()); }), damaged());
   EXPECT_TRUE(test::content_of(file()) == before);
   EXPECT_TRUE(detail::has_log(file()));
 }

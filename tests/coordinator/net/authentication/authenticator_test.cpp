@@ -166,6 +166,18 @@ TEST_F(AuthenticatorTest, RevokedKeyMaySpeakNoMoreThoughItsConnectionStands) {
   EXPECT_EQ(refusal(again), key_refusal(worker_, endpoint(Domain::workers), "worker"));
 }
 
+// The first message of a client may be the only one that a coordinator gets in an hour.
+TEST_F(AuthenticatorTest, RevokesKeysWhileNobodyConnectsOrSpeaks) {
+  const std::string key = client_.public_key.text();
+  write_lists("# none\n", "#" + key + " client\n");
+  for (int second = 1; second <= 2; ++second) {
+    now_ += std::chrono::seconds(1);
+    authenticator_->serve(now_);
+  }
+  EXPECT_FALSE(authenticator_->client(key, now_));
+  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, worker_.public_key.text(), now_));
+}
+
 TEST_F(AuthenticatorTest, MessageWithoutAUserIsNotAllowed) {
   EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, "", now_));
 }
