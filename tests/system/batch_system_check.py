@@ -163,7 +163,7 @@ class Factory:
         self.process = None
         self.moved_s = 0
         self.begin = time.monotonic()
-        self.set_clock()
+        self.move_clock(0)
 
     def command(self, *further):
         batch = self.batch
@@ -183,15 +183,21 @@ class Factory:
     def look(self, after_s=INTERVAL_S + 1):
         """It looks so much later by its clock. It sleeps when it has reported."""
         self.begin = time.monotonic()
+        self.move_clock(after_s)
+        return self.wait_for_report()
+
+    def move_clock(self, after_s):
+        self.moved_at = time.monotonic()
         self.moved_s += after_s
         self.set_clock()
-        return self.wait_for_report()
 
     def wait_for_report(self):
         """Its report since the clock was moved; None if it has ended."""
 
         def newest():
             now = time.monotonic()
+            if now - self.moved_at > 15:  # It went to sleep after that.
+                self.move_clock(INTERVAL_S + 1)
             for report in self.batch.status()["factories"]:
                 if report["name"] == self.name and now - report["silent_s"] > self.begin:
                     return report
