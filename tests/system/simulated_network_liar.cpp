@@ -206,7 +206,8 @@ Envelope Liar::results() {
 
 proto::GiveBack Liar::give_back() {
   constexpr std::array reasons{wire::LossReason::retracted, wire::LossReason::drained,
-                               wire::LossReason::preempted, wire::LossReason::failed};
+                               wire::LossReason::preempted, wire::LossReason::failed,
+                               wire::LossReason::crashed};
   std::vector<proto::HeldRuns> runs = held();
   if (runs.empty() || random_.happens(0.2)) runs.push_back(claim());
   return make_give_back(reasons.at(random_.below(reasons.size())), runs);

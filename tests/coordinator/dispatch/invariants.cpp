@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 
 #include "core/error.hpp"
 
@@ -145,6 +146,17 @@ void check_workers(const State& state) {
   for (const WorkerId id : state.hungry) PROOFMASS_EXPECT(state.workers.contains(id));
 }
 
+/// What is known of a worker's crashes goes with it.
+void check_outside_crashes(const State& state) {
+  std::set<SessionId> sessions;
+  for (const auto& [id, worker] : state.workers) sessions.insert(worker.session);
+  for (const auto& [id, campaign] : state.campaigns) {
+    for (const auto& [session, crashes] : campaign.outside_crashes) {
+      PROOFMASS_EXPECT(sessions.contains(session) && crashes.num_in_a_row > 0);
+    }
+  }
+}
+
 void check_served(const State& state) {
   PROOFMASS_EXPECT(state.order.size() == state.campaigns.size());
   std::vector<CampaignId> served;
@@ -174,6 +186,7 @@ void check_invariants(const State& state) {
                      num_settled(campaign) == campaign.definition->num_runs);
   }
   check_workers(state);
+  check_outside_crashes(state);
   check_served(state);
 }
 

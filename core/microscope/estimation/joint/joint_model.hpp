@@ -95,8 +95,8 @@ struct Push {
 
 enum class PushLine : std::uint8_t { at_f, at_2f };
 
-/// What of Γ_mes,dx at a line of a push, m/s² before the low-pass, is of the third and fourth order
-/// in its amplitude: what the product of K2 and its square makes.
+/// What products of K2 add to Γ_mes,dx at a line of a push, m/s² before the low-pass: terms of the
+/// third to the fifth order in its amplitude (README.md, 5a).
 [[nodiscard]] Prediction push_terms(DragFreeSource source, const UnknownArray& unknowns,
                                     const Push& push, PushLine line);
 
