@@ -141,6 +141,21 @@ TEST_F(ModelsTest, ThatFinishARunHaveNotCrashedInARow) {
   outbox.forget();
 }
 
+TEST_F(ModelsTest, ThatCrashBecauseOfARunThatIsGivenUpDoNotCountForTheOthers) {
+  state.config.lone_witness_wait = std::chrono::seconds(0);
+  add_campaign(one, 2);
+  add_worker(first);
+  complete(first, one, {1});
+  for (std::uint32_t attempt = 1; attempt <= config.crashes_per_run_max; ++attempt) {
+    give_back(first, held(one, {{0}, 1}, attempt), LossReason::crashed);
+    EXPECT_EQ(campaign(one).outside_crashes.at(session_of(first)).num_in_a_row, attempt);
+  }
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(campaign(one).given_up.contains({0}));
+  EXPECT_TRUE(campaign(one).outside_crashes.empty());
+  outbox.forget();
+}
+
 // A thread of the worker computes four times as many runs of another model together.
 TEST_F(ModelsTest, TakeSeveralSlotsARunWhereOthersTakeOne) {
   const auto batch_size = static_cast<std::uint32_t>(model().batch_size());
