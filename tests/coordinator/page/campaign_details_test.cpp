@@ -224,9 +224,10 @@ TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
   EXPECT_EQ(none.events->failure,
             "campaigns that are looked at = 64 (must be fewer; try again in 60 s)");
   EXPECT_EQ(none.results->failure, none.events->failure);
-  // Those that were asked for before are still there, and one gives its place when it is not wanted
-  // any more.
-  EXPECT_EQ(reader.details(record("c0.db"), now + 2s).results, nullptr);
+  // Those that were asked for before are still there, read by now or not, and one gives its place
+  // when it is not wanted any more.
+  const CampaignDetails kept = reader.details(record("c0.db"), now + 2s);
+  EXPECT_TRUE(kept.results == nullptr || kept.results->failure.empty());
   EXPECT_EQ(reader.details(record("more.db"), now + 61s).events, nullptr);
 }
 
