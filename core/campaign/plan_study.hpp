@@ -68,6 +68,10 @@ class PlanStudy {
   /// What makes the standard error of a quantity smaller, as a noun: `longer sessions`.
   [[nodiscard]] virtual std::string remedy(std::size_t quantity) const = 0;
 
+  /// What alone keeps the standard error of a quantity above its objective if the same sessions
+  /// were endless, as a noun; empty if nothing does.
+  [[nodiscard]] virtual std::string limit(std::size_t /*quantity*/) const { return {}; }
+
   /// The bound if the sessions had these lengths.
   /// @param num_steps  Of each session, ≥ 1.
   [[nodiscard]] virtual PlanBound bound(std::span<const int> num_steps) const = 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <memory>
 #include <numbers>
 #include <span>
@@ -76,7 +77,20 @@ ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
 
 ResultSchema MicroscopeCampaign::results() const { return scenario_results(scenario, true); }
 
-std::string MicroscopeCampaign::note() const {
+namespace {
+
+/// Health of the loops is measured where nothing is shaken.
+std::string unwatched_note(const Scenario& scenario) {
+  const auto is_quiet = [](const Session& session) {
+    return !is_test(session) && session.excitations.empty();
+  };
+  if (std::ranges::any_of(scenario.sessions, is_quiet)) return {};
+  return "no session watches the noise of the loops, which may move every estimate: add one "
+         "without "
+         "excitations";
+}
+
+std::string loops_note(const Scenario& scenario) {
   if (scenario.has_plain_loops()) return {};
   const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
   const auto axis_text = [](const AxisMargins& of) {
@@ -94,6 +108,13 @@ std::string MicroscopeCampaign::note() const {
       "phase_margin_rad{}",
       gain.margins.gain, axis_text(gain), phase.margins.phase_rad * 180.0 / std::numbers::pi,
       axis_text(phase), of_realism);
+}
+
+}  // namespace
+
+std::string MicroscopeCampaign::note() const {
+  const std::string unwatched = unwatched_note(scenario), loops = loops_note(scenario);
+  return unwatched.empty() || loops.empty() ? unwatched + loops : unwatched + "; " + loops;
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {
@@ -130,19 +151,43 @@ std::optional<ErrorBudget> MicroscopeCampaign::error_budget() const {
   return microscope_budget(scenario, dispersions, table_columns);
 }
 
+namespace {
+
+/// If χ² of a run's fit is beyond what chance explains, every standard error that, in proportion to
+/// √χ², is worth a warning, or else the largest one.
+void warn_of_fit(const RunResult& result, const ParameterArray& objectives,
+                 std::vector<Warning>& warnings) {
+  if (result.fit.size() < 2 || result.standard_error.size() < num_parameters) return;
+  const double chi_squared = result.fit[0], freedom = result.fit[1];
+  if (!is_beyond_chance(chi_squared, freedom)) return;
+  const double growth = std::sqrt(chi_squared / std::max(freedom, 1.0));
+  std::vector<Warning> of_fit;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    of_fit.push_back({"fit", i, growth * result.standard_error[i] / objectives[i]});
+  }
+  const auto largest = *std::ranges::max_element(of_fit, {}, &Warning::part);
+  std::erase_if(of_fit, [](const Warning& warning) { return warning.part < warned_part; });
+  if (of_fit.empty()) of_fit.push_back(largest);
+  warnings.insert(warnings.end(), of_fit.begin(), of_fit.end());
+}
+
+}  // namespace
+
 Warner MicroscopeCampaign::warner() const {
-  return [bounds = ShiftBounds(scenario)](const RunResult& result) {
-    std::vector<Warning> warnings;
-    if (result.health.empty()) return warnings;
-    // A test alone has standard errors where the calibration has none.
-    std::span<const double> errors = result.standard_error;
-    if (errors.size() < num_parameters) errors = {};
-    for (const Shift& shift : bounds.of(health_of(result.health), result.truth, errors)) {
-      if (shift.part < warned_part) continue;
-      warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
-    }
-    return warnings;
-  };
+  return
+      [bounds = ShiftBounds(scenario), objectives = scenario.objectives](const RunResult& result) {
+        std::vector<Warning> warnings;
+        if (result.health.empty()) return warnings;
+        // A test alone has standard errors where the calibration has none.
+        std::span<const double> errors = result.standard_error;
+        if (errors.size() < num_parameters) errors = {};
+        for (const Shift& shift : bounds.of(health_of(result.health), result.truth, errors)) {
+          if (shift.part < warned_part) continue;
+          warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
+        }
+        warn_of_fit(result, objectives, warnings);
+        return warnings;
+      };
 }
 
 namespace {

@@ -102,8 +102,12 @@ void add_losses(const Planned& plan, Table& table) {
 void add_undetermined(const Planned& plan, Table& table) {
   for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
     if (plan.bound.standard_errors[i] <= plan.objectives[i]) continue;
-    table.notes.push_back(fmt::format("σ of {} is larger than the objective; {} would reduce it",
-                                      plan.quantities[i].symbol, plan.study.remedy(i)));
+    const std::string limit = plan.study.limit(i);
+    const std::string what = limit.empty()
+                                 ? plan.study.remedy(i) + " would reduce it"
+                                 : "no session of this kind can see it: it is limited by " + limit;
+    table.notes.push_back(
+        fmt::format("σ of {} is larger than the objective; {}", plan.quantities[i].symbol, what));
   }
 }
 

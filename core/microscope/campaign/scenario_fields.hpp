@@ -303,7 +303,8 @@ template <typename Config, typename Visitor>
 void for_each_field(Config& scenario, Visitor&& visit) {
   visit(FieldInfo{"orbit.period_s", "Orbital period.", range::between(5000.0, 100000.0)},
         scenario.orbit.period_s);
-  visit(FieldInfo{"orbit.eccentricity", "Perigee is on +X.", range::between(0.0, 0.5)},
+  visit(FieldInfo{"orbit.eccentricity", "Perigee is on +X; files: at most 0.1, first order.",
+                  range::between(0.0, 0.5)},
         scenario.orbit.eccentricity);
   visit(FieldInfo{"simulation.sample_period_s", "Rate of instrument and control.",
                   range::between(0.05, 1.0)},

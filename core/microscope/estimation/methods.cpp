@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
 #include <span>
 #include <string>
@@ -52,6 +53,13 @@ ResultSchema results_of(std::span<const EstimationMethodInfo> possible) {
   schema.fit = {{"chi_squared", "", "1"}, {"degrees_of_freedom", "", "1"}};
   schema.fit_tolerance = fit_tolerance;
   return schema;
+}
+
+bool is_beyond_chance(double chi_squared, double degrees_of_freedom) {
+  // χ² ≥ ν + 2√(νx) + 2x with a chance of e⁻ˣ at most [LaurentMassart2000].
+  constexpr double x = 13.9;  // e⁻ˣ < 1e-6.
+  const double bound = degrees_of_freedom + 2.0 * std::sqrt(degrees_of_freedom * x) + 2.0 * x;
+  return chi_squared > (1.0 + fit_tolerance) * bound;
 }
 
 void add_session_fits(const std::vector<Session>& sessions, ResultSchema& schema) {

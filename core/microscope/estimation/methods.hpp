@@ -94,6 +94,10 @@ struct EstimationMethodInfo {
 /// have none.
 [[nodiscard]] ResultSchema results_of(std::span<const EstimationMethodInfo> methods);
 
+/// Whether χ² of a fit is so large that noise of the densities that the weights are made of makes
+/// it so with a chance below 1e-6, though these be wrong by their tolerance.
+[[nodiscard]] bool is_beyond_chance(double chi_squared, double degrees_of_freedom);
+
 /// Adds χ² and degrees of freedom of each session, `chi_squared_a_c12` and
 /// `degrees_of_freedom_a_c12`, as RunResult::fit has them for methods with standard errors.
 void add_session_fits(const std::vector<Session>& sessions, ResultSchema& schema);

@@ -205,7 +205,6 @@ class JointStudy final : public PlanStudy {
     whole_.scenario.estimation.method = method_named(joint_method.name);
     campaign_.scenario.estimation.method = whole_.scenario.estimation.method;
     std::erase_if(campaign_.scenario.sessions, is_test);
-    check_joint_orbit(campaign_.scenario.orbit.eccentricity);
     campaign_.scenario.validate();
     check_joint_campaign(campaign_);
     const Scenario& scenario = campaign_.scenario;
@@ -256,6 +255,24 @@ class JointStudy final : public PlanStudy {
     const std::string_view what = what_determines(static_cast<Parameter>(quantity));
     if (what.empty()) return "longer sessions";
     return fmt::format("a session that {}, longer or with a larger amplitude", what);
+  }
+
+  [[nodiscard]] std::string limit(std::size_t quantity) const override {
+    const std::vector<double> endless(measured_orbits_.size(), 1e6);
+    const auto sigma = [&](std::optional<Unknown> known) {
+      double sum = 0.0;
+      for (const JointInformation& instrument : instruments_) {
+        sum += instrument.standard_errors(endless, known)[quantity];
+      }
+      return sum / static_cast<double>(instruments_.size());
+    };
+    if (sigma({}) <= campaign_.scenario.objectives[quantity]) return {};
+    std::optional<Unknown> most;
+    for (std::size_t i = num_parameters; i < num_unknowns; ++i) {
+      const Unknown nuisance{i};
+      if (!most || sigma(nuisance) < sigma(most)) most = nuisance;
+    }
+    return std::string(name_of(*most));
   }
 
   [[nodiscard]] PlanBound bound(std::span<const int> num_orbits) const override {

@@ -150,7 +150,9 @@ Priors make_priors(const EstimationInput& input, const DrawnSums& drawn) {
       deviation.cwiseInverse().asDiagonal() * covariance * deviation.cwiseInverse().asDiagonal();
   correlations.diagonal().array() += 1e-9;  // Laws may tie one nuisance to another.
   priors.information = Eigen::LDLT<NuisanceMatrix>(correlations).solve(NuisanceMatrix::Identity());
-  std::ranges::copy(input.objectives, priors.unit.begin());
+  // Whatever the objectives are, squares of these units are numbers.
+  std::ranges::transform(input.objectives, priors.unit.begin(),
+                         [](double objective) { return std::clamp(objective, 1e-30, 1e6); });
   std::copy_n(deviation.data(), num_nuisances, priors.unit.begin() + num_parameters);
   return priors;
 }
@@ -455,11 +457,17 @@ Eigen::MatrixXd JointInformation::information(std::span<const double> factors) c
   return matrix;
 }
 
-ParameterArray JointInformation::standard_errors(std::span<const double> factors) const {
+ParameterArray JointInformation::standard_errors(std::span<const double> factors,
+                                                 std::optional<Unknown> known) const {
   // With the nuisances in front, the last rows of the factor are that of what the lines tell of the
   // parameters while the nuisances are free.
   constexpr auto num_wanted = static_cast<Eigen::Index>(num_parameters);
-  const NormalMatrix reversed = information(factors).reverse();
+  Eigen::MatrixXd matrix = information(factors);
+  if (known) {
+    const auto row = static_cast<Eigen::Index>(index(*known));
+    matrix(row, row) *= 1e9;
+  }
+  const NormalMatrix reversed = matrix.reverse();
   const Eigen::LLT<NormalMatrix> decomposition(reversed);
   ParameterArray errors;
   errors.fill(std::numeric_limits<double>::infinity());

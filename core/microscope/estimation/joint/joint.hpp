@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -29,7 +30,9 @@ class JointInformation {
 
   /// Standard errors, SI, if the lines of each session told so many times as much: what they tell
   /// is in proportion to the length of the record.
-  [[nodiscard]] ParameterArray standard_errors(std::span<const double> factors) const;
+  /// @param known  A nuisance that shall be known beforehand.
+  [[nodiscard]] ParameterArray standard_errors(std::span<const double> factors,
+                                               std::optional<Unknown> known = std::nullopt) const;
 
   /// The normal matrix of the same: the unknowns in the order of Unknown, each in a unit of its
   /// own.
@@ -56,11 +59,6 @@ class JointInformation {
 /// @throws ConfigError if a session spins, or if no session has an excitation that a parameter
 ///         needs.
 void check_joint(const std::vector<Session>& sessions);
-
-/// The equations leave out terms of order e². They shift K2c/K1c² by 17 s²/m at e = 0.3 and by
-/// 47 s²/m at 0.5, measured; so by 1.9 s²/m at 0.1, a fifth of its standard error.
-/// @throws ConfigError if the eccentricity is larger.
-void check_joint_orbit(double eccentricity);
 
 /// Least orbits of a session of which the record, less the transient, is one orbit long: in a
 /// shorter one the lines at f_orb, 2 f_orb and 3 f_orb and the level cannot be told apart, and

@@ -1,6 +1,7 @@
 #include "core/microscope/estimation/joint/joint_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <span>
 
@@ -149,6 +150,26 @@ Dual constant_of(const std::array<double, num_line_bases>& means, const Unknowns
 }
 
 }  // namespace
+
+std::string_view name_of(Unknown nuisance) {
+  static constexpr std::array<std::string_view, num_unknowns - num_parameters> names{
+      "the common scale factor along X",
+      "the common coupling about Z",
+      "the common coupling about Y",
+      "the common misalignment about X",
+      "the bias of the star tracker about X",
+      "the bias of the star tracker about Y",
+      "the bias of the star tracker about Z",
+      "the differential parasitic acceleration along X",
+      "the common parasitic acceleration along Y",
+      "the common parasitic acceleration along Z",
+      "the differential quadratic factor along Y",
+      "the differential quadratic factor along Z",
+      "the common quadratic factor along Y",
+      "the common quadratic factor along Z",
+  };
+  return names.at(index(nuisance) - num_parameters);
+}
 
 UnknownArray true_unknowns(const Instrument& instrument, double common_offset_x_m_s2) {
   const ParameterArray parameters = true_parameters(instrument, common_offset_x_m_s2);

@@ -4,6 +4,7 @@
 #include <complex>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/results/results.hpp"
@@ -35,6 +36,10 @@ inline constexpr std::size_t num_unknowns = num_parameters + 14;
 [[nodiscard]] constexpr std::size_t index(Unknown unknown) {
   return static_cast<std::size_t>(unknown);
 }
+
+/// What a nuisance is, for people: `the bias of the star tracker about Z`.
+/// @pre It is one of the enumerators.
+[[nodiscard]] std::string_view name_of(Unknown nuisance);
 
 /// One value for each unknown, SI.
 using UnknownArray = std::array<double, num_unknowns>;

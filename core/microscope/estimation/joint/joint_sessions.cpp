@@ -226,13 +226,4 @@ void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& 
   }
 }
 
-void check_joint_orbit(double eccentricity) {
-  constexpr double eccentricity_max = 0.1;
-  if (eccentricity <= eccentricity_max) return;
-  throw ConfigError("orbit.eccentricity", fmt::format("{}", eccentricity),
-                    fmt::format("must be <= {} for estimation.method = \"joint\", whose equations "
-                                "leave out its square",
-                                eccentricity_max));
-}
-
 }  // namespace proofmass

@@ -134,5 +134,38 @@ TEST(CampaignDeathTest, HasNoTableValuesBeyondItsTable) {
   EXPECT_DEATH((void)campaign.table_values(RunIndex{3}), "internal invariant broken");
 }
 
+// With x = 13.9 the bound ν + 2√(νx) + 2x of 27 degrees of freedom is 93.5, and 3.5 % more is left
+// to the densities.
+TEST(MicroscopeCampaign, WarnsOfAFitThatChanceDoesNotExplain) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.estimation.method = EstimationMethod{2};
+  RunResult result;
+  result.status = RunStatus::completed;
+  result.truth.assign(num_parameters, 0.0);
+  result.standard_error.assign(num_parameters, 0.0);
+  result.health.assign(health_values().size(), 0.0);
+  result.standard_error[index(Parameter::a_c12)] = 3e-5;
+  result.standard_error[index(Parameter::k2d)] = 20.0;
+  result.fit = {96.0, 27.0};
+  EXPECT_THAT(campaign.warner()(result), IsEmpty());
+  result.fit = {108.0, 27.0};
+  const std::vector<Warning> warnings = campaign.warner()(result);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].effect, "fit");
+  EXPECT_EQ(warnings[0].quantity, index(Parameter::k2d));
+  EXPECT_DOUBLE_EQ(warnings[0].part, 2.0 * 20.0 / 250.0);
+}
+
+// Without any session that is free of excitations nothing measures the noise of the loops.
+TEST(MicroscopeCampaign, NotesThatNoSessionWatchesTheNoise) {
+  MicroscopeCampaign campaign;
+  EXPECT_EQ(campaign.note(), "");
+  std::erase_if(campaign.scenario.sessions,
+                [](const Session& session) { return session.excitations.empty(); });
+  EXPECT_EQ(campaign.note(),
+            "no session watches the noise of the loops, which may move every estimate: add one "
+            "without excitations");
+}
+
 }  // namespace
 }  // namespace proofmass
