@@ -154,6 +154,25 @@ void check_orbit(const OrbitConfig& orbit) {
                                 1e-3 * (perigee_m - earth_radius_m)));
 }
 
+/// a_d11' holds what the constant accelerations of its own session make of the quadratic factors.
+/// Where a test holds another mass, that differs by up to 2 K2d b_1d = 4e-4 of the 3e-10 m/s² that
+/// the loop leaves at f_EP of a test that spins: 3e-14 of δ.
+void check_tests(const std::vector<Session>& sessions) {
+  const auto spelling = [](DragFreeSource source) {
+    return std::string(names_of(source)[static_cast<std::size_t>(source) - 1]);
+  };
+  const DragFreeSource calibrated = drag_free_of_a_d11_prime(sessions);
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const Session& session = sessions[i];
+    if (!is_test(session) || session.spin_rate_rad_s == 0.0) continue;
+    if (session.drag_free == calibrated) continue;
+    throw ConfigError(fmt::format("session[{}].drag_free", i), spelling(session.drag_free),
+                      fmt::format("must be {}, of which a_d11' is, or a test that spins takes its "
+                                  "constant acceleration for a violation",
+                                  spelling(calibrated)));
+  }
+}
+
 }  // namespace
 
 EnvironmentTable parse_environment(std::string_view text, const std::string& name,
@@ -204,6 +223,7 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   try {
     campaign.validate();
     check_orbit(campaign.scenario.orbit);
+    check_tests(campaign.scenario.sessions);
     check_magnitudes(campaign);
     check_regressors(campaign.scenario);
     check_independence(law_set(campaign.dispersions), campaign);
