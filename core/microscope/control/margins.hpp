@@ -14,7 +14,9 @@ using OpenLoop = std::function<ComplexDouble(ComplexDouble z_inverse)>;
 struct Margins {
   /// The least factor above 1 by which L may grow or shrink; 0: it is unstable.
   double gain = 0.0;
-  double phase_rad = 0.0;  ///< The least phase that L may lose or gain where |L| is 1; 0 likewise.
+  /// The least phase that L may lose or gain where |L| is 1; 0 likewise; π if that is nowhere, so
+  /// that the loop is open in effect.
+  double phase_rad = 0.0;
 };
 
 /// Margins from L along the unit circle, from 1e-8 of a turn on, where loops with an integral are

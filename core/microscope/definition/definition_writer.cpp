@@ -89,7 +89,12 @@ class CommentedWriter {
         "one\n"
         "# shown here unless this file was changed. Citations are of [Hardy2013]: Hardy, Levy,\n"
         "# Rodrigues, Touboul, Métris, Validation of the in-flight calibration procedures for the\n"
-        "# MICROSCOPE space mission, Advances in Space Research (2013).\n";
+        "# MICROSCOPE space mission, Advances in Space Research (2013).\n"
+        "#\n"
+        "# Two kinds of tables are not shown, as none is in force: [realism], whose keys\n"
+        "# hardy2013-realistic.toml lists, and [[controller]], a transfer function of one axis of "
+        "a\n"
+        "# loop (core/microscope/control/README.md).\n";
   }
 
   // What a preset sets is shown but not stated: a stated value would win over another preset.
@@ -164,7 +169,7 @@ class CommentedWriter {
   void write_dispersions() {
     text_ +=
         "\n# What is drawn for each run, by its law: uniform (minimum, maximum), normal (mean,\n"
-        "# standard_deviation), truncated_normal (all four), fixed (value), or table (file, "
+        "# standard_deviation), truncated_normal (all four), fixed (value), table (file, "
         "column: a\n"
         "# comma-separated file with headings, one row a run; independent = true: its rows are\n"
         "# independent draws, else no interval or verdict follows from them), discrete (values,\n"

@@ -84,6 +84,14 @@ void check_perigee(const OrbitConfig& orbit) {
                                 1e-3 * lowest_perigee_m, 1e-3 * altitude_m));
 }
 
+/// Of every body: y² + z² of its mass, for one, is not above x² + y² and x² + z² together.
+void check_inertia(const Vector3<double>& moments) {
+  const double largest = std::max({moments.x, moments.y, moments.z});
+  if (2.0 * largest <= moments.x + moments.y + moments.z) return;
+  throw ConfigError("satellite.inertia_kg_m2", fmt::format("{}", largest),
+                    "no principal moment may be above the sum of the others");
+}
+
 }  // namespace
 
 std::string csv_text(const EnvironmentTable& table) {
@@ -126,6 +134,11 @@ EnvironmentTable made_environment(Document& campaign, Document& settings,
   campaign.check();
   const EnvironmentPhysics physics = read_physics(settings);
   settings.check();
+  try {
+    check_inertia(physics.satellite.inertia_kg_m2);
+  } catch (const ConfigError& error) {
+    throw settings.located(error);
+  }
   try {
     validate_sessions(scenario.sessions, scenario.orbit.period_s,
                       scenario.simulation.sample_period_s);
