@@ -7,7 +7,6 @@
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/moments.hpp"
-#include "core/statistics/order.hpp"
 #include "core/statistics/sensitivity.hpp"
 
 namespace proofmass {
@@ -67,6 +66,15 @@ void remove(Column column, Values& values) {
   if (square <= 0.0) return;
   const double factor = dot(column, values) / square;
   for (std::size_t i = 0; i < values.size(); ++i) values[i] -= factor * column[i];
+}
+
+/// Centred, with what is beyond two standard deviations brought there: what is far out counts, but
+/// no sum of products is of a few values alone.
+Values limited(const Values& values) {
+  Values result = centred(values);
+  const double limit = 2.0 * std::sqrt(dot(result, result) / static_cast<double>(result.size()));
+  for (double& value : result) value = std::clamp(value, -limit, limit);
+  return centred(result);
 }
 
 /// Inputs and products of two of so many.
@@ -143,7 +151,8 @@ class TermSearch {
     return candidates;
   }
 
-  /// Two-sided, of one candidate alone.
+  /// Two-sided, of one candidate alone. Not of ranks: where values are tied or one is far out, the
+  /// factors that are taken away would order all others, and with them the ranks of both sides.
   [[nodiscard]] double p_value_of(const Candidate& candidate, Values values) const {
     Values rest = rest_;
     if (candidate.second) {
@@ -157,8 +166,7 @@ class TermSearch {
         remove(factor, rest);
       }
     }
-    const Values a = centred(average_ranks(values));
-    const Values b = centred(average_ranks(rest));
+    const Values a = limited(values), b = limited(rest);
     CompensatedSum sum, squares;
     for (std::size_t i = 0; i < a.size(); ++i) {
       const double product = a[i] * b[i];
