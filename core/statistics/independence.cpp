@@ -17,32 +17,40 @@ constexpr std::size_t num_lags = 5;
 /// Values of so many on average at one level are levels, and not rounded numbers.
 constexpr std::size_t num_at_level_min = 5;
 
-/// The correlation of independent values is normal with the variance 1/n.
+/// The sum of products of the centred ranks of two rows is nearly normal for independent values, of
+/// the variance n σ⁴. Of values that are rare, products of two hardly occur; where one does, the
+/// sum of squares of what occurred is larger.
 double serial_p_value(std::span<const double> values) {
   std::vector<double> ranks = average_ranks(values);
   const auto n = static_cast<double>(ranks.size());
-  double squares = 0.0;
+  double rank_squares = 0.0;
   for (double& rank : ranks) {
     rank -= 0.5 * (n + 1.0);
-    squares += rank * rank;
+    rank_squares += rank * rank;
   }
-  if (squares <= 0.0) return 1.0;
+  if (rank_squares <= 0.0) return 1.0;
   double least = 1.0;
   for (std::size_t lag = 1; lag <= num_lags; ++lag) {
-    double products = 0.0;
-    for (std::size_t i = lag; i < ranks.size(); ++i) products += ranks[i] * ranks[i - lag];
-    least = std::min(least, 2.0 * normal_cumulative(-std::abs(products) * std::sqrt(n) / squares));
+    double sum = 0.0, squares = 0.0;
+    for (std::size_t i = lag; i < ranks.size(); ++i) {
+      const double product = ranks[i] * ranks[i - lag];
+      sum += product;
+      squares += product * product;
+    }
+    const double deviation = std::max(rank_squares / std::sqrt(n), std::sqrt(squares));
+    least = std::min(least, 2.0 * normal_cumulative(-std::abs(sum) / deviation));
   }
   return std::min(1.0, least * static_cast<double>(num_lags));
 }
 
 /// Of levels that each have as many values as the others: Pearson's χ², which is too small there.
+/// Counts are whole: each may be half a value further from what is expected.
 double level_p_value(std::span<const double> ascending, std::size_t num_levels) {
   const auto expected = static_cast<double>(ascending.size()) / static_cast<double>(num_levels);
   double chi_square = 0.0;
   for (auto begin = ascending.begin(); begin != ascending.end();) {
     const auto end = std::upper_bound(begin, ascending.end(), *begin);
-    const double excess = static_cast<double>(end - begin) - expected;
+    const double excess = std::abs(static_cast<double>(end - begin) - expected) + 0.5;
     chi_square += excess * excess / expected;
     begin = end;
   }
