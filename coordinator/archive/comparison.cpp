@@ -14,6 +14,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"
@@ -116,9 +117,13 @@ void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
                  SideErrors& of_first, SideErrors& of_second) {
   std::string why = first.campaign->seed == second.campaign->seed ? "" : "the seeds differ";
   bool has_common_run = false;
+  std::optional<std::vector<double>> first_truth;
+  bool varies = false;
   walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
     if (a != nullptr && b != nullptr) {
       has_common_run = true;
+      if (!first_truth) first_truth = a->truth;
+      varies = varies || a->truth != first_truth;
       if (why.empty() && !have_same_draw(common, *a, *b)) {
         why = fmt::format("the draws of run {} differ", a->run.value);
       }
@@ -127,6 +132,9 @@ void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
     if (b != nullptr && b->is_completed()) of_second.add(*b, partner_of(a));
   });
   if (why.empty() && !has_common_run) why = "no run is finished in both";
+  if (why.empty() && !varies && first.campaign->model().is_imported()) {
+    why = "imported truths that are the same in all runs do not tell whose draws they are";
+  }
   comparison.why_unpaired = why;
   comparison.num_first = of_first.size();
   comparison.num_second = of_second.size();

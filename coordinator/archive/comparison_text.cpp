@@ -250,8 +250,8 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
                           {"", true, 2}},
                          add_cells);
   table.notes.push_back(fmt::format(
-      "from, to: 95 % interval of the change from {}; p: Wilcoxon's signed ranks of pairs; "
-      "as a whole Welch's t, of fewer than {} runs the larger of it and Smirnov's",
+      "from, to: 95 % interval of the change from {}; p: Student's t of pairs; as a whole also "
+      "Welch's; of fewer than {} runs the larger of it and a test of ranks",
       names.names.front(), num_welch_min));
   return table;
 }

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <utility>
+#include <limits>
 
 #include "core/random/normal.hpp"
+#include "core/statistics/distribution.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass {
@@ -53,13 +54,49 @@ Moments scale_moments(std::span<const double> errors) {
   return scale;
 }
 
-/// What a pair has of |error − mean of its campaign| more in the second campaign.
+/// What a pair has of |error − mean of its campaign| more in the second campaign. What rounding
+/// makes of equal distances is 0.
 std::vector<double> deviation_differences(std::span<const double> first,
                                           std::span<const double> second) {
-  const std::vector<double> of_first = distances(first, mean_of(first, {}));
-  std::vector<double> differences = distances(second, mean_of(second, {}));
-  std::ranges::transform(differences, of_first, differences.begin(), std::minus<>());
+  const double mean_first = mean_of(first, {}), mean_second = mean_of(second, {});
+  std::vector<double> differences(first.size());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const double difference = std::abs(second[i] - mean_second) - std::abs(first[i] - mean_first);
+    const double largest = std::max(
+        {std::abs(first[i]), std::abs(second[i]), std::abs(mean_first), std::abs(mean_second)});
+    const bool is_rounding =
+        std::abs(difference) <= 8.0 * std::numeric_limits<double>::epsilon() * largest;
+    differences[i] = is_rounding ? 0.0 : difference;
+  }
   return differences;
+}
+
+/// Student's t, two-sided: is a mean 0?
+double student_p_value(double mean, double standard_error, double degrees) {
+  if (standard_error <= 0.0) return mean == 0.0 ? 1.0 : 0.0;
+  return student_two_sided(mean / standard_error, degrees);
+}
+
+/// Student's t with one scatter for both, which they have if nothing changes. By its own a small
+/// campaign, in which what is rare lacks, is too sure of its mean.
+double pooled_p_value(const Moments& first, const Moments& second) {
+  const auto m = static_cast<double>(first.count), n = static_cast<double>(second.count);
+  const double variance = ((m - 1.0) * first.standard_deviation * first.standard_deviation +
+                           (n - 1.0) * second.standard_deviation * second.standard_deviation) /
+                          (m + n - 2.0);
+  return student_p_value(second.mean - first.mean, std::sqrt(variance * (1.0 / m + 1.0 / n)),
+                         m + n - 2.0);
+}
+
+/// Is the mean of differences 0? Wilcoxon's test asks whether they are symmetric about it, too.
+double paired_p_value(const std::vector<double>& differences) {
+  const Moments about = moments(differences);
+  const auto n = static_cast<double>(about.count);
+  const bool is_small = differences.size() < num_welch_min;
+  const double by_rank = is_small ? rank_test_p_value(differences) : 0.0;
+  if (differences.size() < 2) return by_rank;
+  return std::max(by_rank,
+                  student_p_value(about.mean, about.standard_deviation / std::sqrt(n), n - 1.0));
 }
 
 }  // namespace
@@ -92,9 +129,10 @@ ChangePValues compare_errors(std::span<const double> first, std::span<const doub
         compare_unpaired(distances(first, centre), distances(second, centre), default_confidence)
             .p_value;
   } else {
-    changes.location = compare_means(moments(first), moments(second), default_confidence).p_value;
-    changes.scale =
-        compare_means(scale_moments(first), scale_moments(second), default_confidence).p_value;
+    const Moments a = moments(first), b = moments(second);
+    changes.location =
+        std::max(compare_means(a, b, default_confidence).p_value, pooled_p_value(a, b));
+    changes.scale = pooled_p_value(scale_moments(first), scale_moments(second));
   }
   return changes;
 }
@@ -110,45 +148,56 @@ ChangePValues compare_paired_errors(std::span<const double> first, std::span<con
     if (is_first_beyond && !is_second_beyond) ++num_only_first;
     if (is_second_beyond && !is_first_beyond) ++num_only_second;
   }
-  return {.location = rank_test_p_value(std::move(differences)),
-          .scale = rank_test_p_value(deviation_differences(first, second)),
+  return {.location = paired_p_value(differences),
+          .scale = paired_p_value(deviation_differences(first, second)),
           .tail = sign_test_p_value(num_only_first, num_only_second)};
 }
 
 namespace {
 
-/// The normal deviate that a test statistic must have in the mean to be found.
+/// The normal deviate that a test statistic must exceed to be found.
 double found_deviate(std::size_t num_parameters) {
   const double level =
       (1.0 - default_confidence) * scale_weight / static_cast<double>(num_parameters);
-  return inverse_normal(1.0 - 0.5 * level) + inverse_normal(finding_probability);
+  return inverse_normal(1.0 - 0.5 * level);
 }
 
 }  // namespace
 
-// (f − 1)² = z²(c₁²/m + f² c₂²/n) with the relative deviations c of the distances from the mean.
+// f − 1 = z √(c²/n + f² c²/m) + z' √(c²/m + f² c²/n) with the relative deviation c of the distances
+// from the mean, z and z' of level and probability: the first root is the pooled error.
 std::optional<double> smallest_scale_factor(std::span<const double> first,
                                             std::span<const double> second,
                                             std::size_t num_parameters) {
   if (std::min(first.size(), second.size()) < num_welch_min) return std::nullopt;
-  const auto share = [&](const Moments& scale) {
-    const double relative = found_deviate(num_parameters) * scale.standard_deviation / scale.mean;
-    return relative * relative / static_cast<double>(scale.count);
-  };
-  const double a = share(scale_moments(first));
-  const double b = share(scale_moments(second));
-  if (!(a < 1.0 && b < 1.0)) return std::nullopt;
-  return (1.0 + std::sqrt(1.0 - (1.0 - a) * (1.0 - b))) / (1.0 - b);
+  const Moments a = scale_moments(first), b = scale_moments(second);
+  const auto m = static_cast<double>(a.count), n = static_cast<double>(b.count);
+  const double of_a = a.standard_deviation / a.mean, of_b = b.standard_deviation / b.mean;
+  const double c = std::sqrt(((m - 1.0) * of_a * of_a + (n - 1.0) * of_b * of_b) / (m + n - 2.0));
+  const double z = found_deviate(num_parameters), z_found = inverse_normal(finding_probability);
+  const double slope = c * (z / std::sqrt(m) + z_found / std::sqrt(n));
+  if (!(slope < 0.99)) return std::nullopt;
+  double factor = 1.0;
+  for (int i = 0; i < 2000; ++i) {  // Each time nearer by `slope` at least.
+    const double square = factor * factor;
+    factor =
+        1.0 + c * (z * std::sqrt(1.0 / n + square / m) + z_found * std::sqrt(1.0 / m + square / n));
+  }
+  return factor;
 }
 
-// A signed-rank test needs no more than 1/0.864 times the pairs of Student's t, whatever the law.
+// Of few pairs both tests must find it; Wilcoxon's needs no more than 1/0.864 times the pairs of
+// Student's t, whatever the law.
 std::optional<double> smallest_paired_scale_factor(std::span<const double> first,
                                                    std::span<const double> second,
                                                    std::size_t num_parameters) {
-  constexpr double least_efficiency = 0.864;
+  constexpr std::size_t num_pairs_min = 10;
+  if (first.size() < num_pairs_min) return std::nullopt;
+  const double efficiency = first.size() < num_welch_min ? 0.864 : 1.0;
   const auto n = static_cast<double>(first.size());
   const double deviation = moments(deviation_differences(first, second)).standard_deviation;
-  const double change = found_deviate(num_parameters) * deviation / std::sqrt(least_efficiency * n);
+  const double z = found_deviate(num_parameters) + inverse_normal(finding_probability);
+  const double change = z * deviation / std::sqrt(efficiency * n);
   const double mean = moments(distances(first, mean_of(first, {}))).mean;
   if (!(mean > 0.0)) return std::nullopt;
   return 1.0 + change / mean;

@@ -30,17 +30,19 @@ struct ChangePValues {
 };
 
 /// Of campaigns with draws of their own, two errors at least each. The tail: Fisher's exact test of
-/// the counts beyond tail_limit(). From num_welch_min errors on either side on, Welch's t of the
-/// errors, and of their distances from the mean with the scatter that holds for skew laws, too
-/// (Levene's test; README.md compares it with others). Of fewer errors compare_unpaired() of the
+/// the counts beyond tail_limit(). From num_welch_min errors on either side on, Student's t of the
+/// errors, the larger p-value of Welch's and that with one scatter for both; and with one scatter
+/// of their distances from the mean, with the scatter that holds for skew laws, too (Levene's test;
+/// README.md compares it with others). Of fewer errors compare_unpaired() of the
 /// errors and of |error − mean of both campaigns|: a large change of the bias then shows as one of
 /// the scale too.
 [[nodiscard]] ChangePValues compare_errors(std::span<const double> first,
                                            std::span<const double> second);
 
-/// Of campaigns of the same draws, run by run: Wilcoxon's signed ranks of the differences of the
-/// errors and of their distances from the mean of their campaign, and the sign test of the pairs of
-/// which one error is in the tail (McNemar).
+/// Of campaigns of the same draws, run by run: Student's t of the differences of the errors and of
+/// their distances from the mean of their campaign, below num_welch_min pairs the larger p-value of
+/// it and Wilcoxon's signed ranks; and the sign test of the pairs of which one error is in the tail
+/// (McNemar).
 /// @pre As many errors in both, one at least.
 [[nodiscard]] ChangePValues compare_paired_errors(std::span<const double> first,
                                                   std::span<const double> second);
@@ -53,7 +55,7 @@ inline constexpr double finding_probability = 0.9;
 [[nodiscard]] std::optional<double> smallest_scale_factor(std::span<const double> first,
                                                           std::span<const double> second,
                                                           std::size_t num_parameters);
-/// The factor that compare_paired_errors() would have found.
+/// The factor that compare_paired_errors() would have found; empty of fewer than ten pairs.
 [[nodiscard]] std::optional<double> smallest_paired_scale_factor(std::span<const double> first,
                                                                  std::span<const double> second,
                                                                  std::size_t num_parameters);
