@@ -47,7 +47,8 @@ using ResultColumns = std::vector<ResultColumn>;
 struct ImportSchema {
   std::string name;
   bool is_independent = false;
-  ResultColumns drawn = {};  ///< In the order of the description; the last ones are the truths.
+  std::uint64_t num_runs = 0;  ///< That was fixed before the first result; 0: none.
+  ResultColumns drawn = {};    ///< In the order of the description; the last ones are the truths.
   ResultColumns estimates = {};
   ResultColumns errors = {};  ///< Of the quantities that have one.
   Json description = {};
@@ -105,6 +106,7 @@ void read_quantity(Document& document, const std::string& path, ImportSchema& sc
 ImportSchema read_schema(Document& document, const std::string& file) {
   ImportSchema schema{.name = needed_text(document, "campaign.name")};
   document.read("campaign.independent", schema.is_independent);
+  document.read("campaign.runs", schema.num_runs, range::between(1.0, 1e9));
   schema.description = {{"proofmass_model_program", 1}, {"name", schema.name},
                         {"version", "imported"},        {"imported_from", file},
                         {"drawn", Json::array()},       {"quantities", Json::array()}};
@@ -176,6 +178,12 @@ std::size_t read_columns(const std::filesystem::path& file, ImportSchema& schema
   }
   const std::size_t num_runs = columns.front()->values.size();
   if (num_runs == 0) reader.refuse("no line after that of the headings");
+  if (schema.num_runs != 0 && schema.num_runs != num_runs) {
+    reader.refuse(
+        fmt::format("{} lines after that of the headings (the schema's campaign.runs, "
+                    "fixed before the first result, is {})",
+                    num_runs, schema.num_runs));
+  }
   return num_runs;
 }
 
@@ -255,8 +263,9 @@ void import_results(const std::filesystem::path& results, const std::filesystem:
     const std::uint64_t end_run = std::min(campaign.num_runs, next_run + batch_size);
     return entries_of(schema, std::exchange(next_run, end_run), end_run, campaign.num_runs);
   };
-  Store store = Store::create(database, campaign, campaign.definition(TableColumns::left_out).text,
-                              next_entries);
+  Store store = Store::create_with_results(database, campaign,
+                                           campaign.definition(TableColumns::left_out).text,
+                                           schema.num_runs != 0, next_entries);
   update_statistics(store, campaign);
 }
 

@@ -128,7 +128,7 @@ double Exceedances::add(const RunResult& result) {
   ++num_estimated_;
   if (requirement_.subject == Requirement::Subject::parameter) {
     const double value = value_of(result);
-    if (value >= requirement_.limit) ++num_exceeding_;
+    if (value > requirement_.limit) ++num_exceeding_;
     return value;
   }
   std::vector<double> errors(objectives_.size());

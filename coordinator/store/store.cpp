@@ -88,10 +88,18 @@ Store Store::create_filled(const std::filesystem::path& path, const Campaign& ca
 }
 
 Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
-                    std::string_view definition,
-                    const std::function<std::vector<Entry>()>& next_entries) {
+                    std::string_view definition) {
+  return create_filled(path, campaign, definition, [](Database&) {});
+}
+
+Store Store::create_with_results(const std::filesystem::path& path, const Campaign& campaign,
+                                 std::string_view definition, bool is_number_fixed,
+                                 const std::function<std::vector<Entry>()>& next_entries) {
   return create_filled(path, campaign, definition, [&](Database& database) {
-    if (!next_entries) return;
+    if (!is_number_fixed) {
+      database.execute("UPDATE campaign SET num_runs_fixed = NULL");
+      detail::write_table_digest(database, campaign.model());
+    }
     const ResultSchema results = campaign.results();
     detail::EntryRows rows(database, results);
     for (std::vector<Entry> entries; !(entries = next_entries()).empty();) {

@@ -70,12 +70,17 @@ class Store {
   ///
   /// @param campaign      Validated.
   /// @param definition    The campaign as canonical TOML, for those who open the file.
-  /// @param next_entries  Asked, until it has none, for what the file holds from the beginning, as
-  ///                      of write(); null if that is nothing.
   /// @throws StoreError if the file exists; as write() does.
   static Store create(const std::filesystem::path& path, const Campaign& campaign,
-                      std::string_view definition,
-                      const std::function<std::vector<Entry>()>& next_entries = {});
+                      std::string_view definition);
+
+  /// create() of a campaign whose results exist.
+  ///
+  /// @param is_number_fixed  Whether the number of runs was before the first result.
+  /// @param next_entries     Asked, until it has none, for what the file holds, as of write().
+  static Store create_with_results(const std::filesystem::path& path, const Campaign& campaign,
+                                   std::string_view definition, bool is_number_fixed,
+                                   const std::function<std::vector<Entry>()>& next_entries);
 
   /// Makes a new campaign database of all that several databases of the campaign hold of its runs,
   /// complete or not at all, and opens it like open(). Events stay where they are.

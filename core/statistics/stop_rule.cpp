@@ -70,7 +70,9 @@ StopCheck estimated(const StopRule& rule, std::span<const double> errors) {
 void check_width(const StopRule& rule, StopCheck& check) {
   if (!check.interval) return;
   const double half_width = 0.5 * (check.interval->upper - check.interval->lower);
-  const double relative = half_width == 0.0 ? 0.0 : half_width / std::abs(check.estimate);
+  // Values that are all equal say nothing of those that are rare.
+  if (half_width == 0.0) return;
+  const double relative = half_width / std::abs(check.estimate);
   if (!std::isfinite(relative)) return;
   check.relative_half_width = relative;
   check.is_reached = relative <= rule.relative_half_width;
