@@ -82,10 +82,23 @@ std::string test_note(const Scenario& scenario) {
   std::string note;
   if (rate_rad_s != 0.0)
     note = fmt::format("T is that of a test that turns by {} rad/s\n", rate_rad_s);
+  const auto turns_so = [&](const Session& session) {
+    return session.spin_rate_rad_s == rate_rad_s;
+  };
+  const auto is_tested_so = [&](const Session& session) {
+    return is_test(session) && turns_so(session);
+  };
+  if (scenario.has_tests() && std::ranges::none_of(scenario.sessions, is_tested_so)) {
+    note += "No test of this campaign turns so: budget.test_spin_rate_rad_s chooses another\n";
+  }
   const bool is_elsewhere = std::ranges::any_of(scenario.sessions, [&](const Session& session) {
-    return session.excitations.empty() && session.spin_rate_rad_s != rate_rad_s;
+    return !is_test(session) && session.excitations.empty() && !turns_so(session);
   });
-  if (is_elsewhere) note += "Γ_res is that at f_EP of calibration sessions in another pointing\n";
+  if (is_elsewhere) {
+    note +=
+        "Γ_res is that at f_EP of calibration sessions in another pointing; the loop leaves more "
+        "of the drag at a higher f_EP\n";
+  }
   return note;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/math/elementary.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/instrument/stiffness.hpp"
 #include "core/signal/line_weights.hpp"
@@ -46,6 +47,8 @@ Parameter parameter_of(SessionTarget target) { return found_parameters[index(tar
 
 double mean_motion_rad_s(const Scenario& scenario) { return turn_rad / scenario.orbit.period_s; }
 
+double square(double x) { return x * x; }
+
 /// Γ_mes,cx at 2 f_EP that the loop leaves of [T] r_c, with r_c at its bound along X and Z, m/s².
 double gradient_residual(const Scenario& scenario, const Session& session) {
   const double n = mean_motion_rad_s(scenario);
@@ -55,6 +58,23 @@ double gradient_residual(const Scenario& scenario, const Session& session) {
   return std::abs(drag_free_sensitivity(scenario.drag_free, frequency_hz)) * 1.5 * n * n *
          std::numbers::sqrt2 *
          (centre_offset_max_m + std::max(std::abs(place[0]), std::abs(place[2])));
+}
+
+/// Γ_mes,cx at 2 f_EP that is known beforehand: gradient_residual() and the drag's own line, m/s².
+double known_line(const Scenario& scenario, const Session& session) {
+  const double line = gradient_residual(scenario, session);
+  if (scenario.environment.kind != EnvironmentKind::harmonic) return line;
+  const double drag = scenario.environment.scale * scenario.environment.linear_x.twice_orbital;
+  const double frequency_hz = 2.0 / scenario.orbit.period_s;
+  return line + drag * std::abs(drag_free_sensitivity(scenario.drag_free, frequency_hz));
+}
+
+/// A line A cos ωt has blocks of the length T whose means step by 2A sin x sinc x, x = ½ωT. That is
+/// twice this share of A²T as a density.
+double step_share(double frequency_hz, double block_s) {
+  const double x = 0.5 * turn_rad * frequency_hz * block_s;
+  const double sine = sincos(x).sine;
+  return square(sine * sine / x);
 }
 
 /// What is left of a disturbance that is a quarter of a turn away from the regressor at two lines,
@@ -80,8 +100,6 @@ const Session* first_of(const Scenario& scenario, SessionTarget target) {
   const auto found = std::ranges::find(scenario.sessions, target, &Session::target);
   return found == scenario.sessions.end() ? nullptr : &*found;
 }
-
-double square(double x) { return x * x; }
 
 }  // namespace
 
@@ -157,6 +175,11 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
   for (const Session& session : scenario.sessions) {
     if (is_test(session)) continue;
     duration_s_ += fit_duration_s(scenario, session);
+    if (session.excitations.empty()) {
+      const double frequency_hz = 2.0 * test_frequency_hz(session, scenario.orbit.period_s);
+      known_line_m_s2_ = std::max(known_line_m_s2_, known_line(scenario, session));
+      step_share_ = std::max(step_share_, step_share(std::max(frequency_hz, 1e-9), block_s_));
+    }
     for (const Excitation* const motion : mass_excitations(session)) {
       if (motion == nullptr) continue;
       double& largest = mass_acceleration_m_s2_[index(motion->axis)];
@@ -225,8 +248,8 @@ void ShiftBounds::add_spin(const Scenario& scenario, const Session& session) {
 
 void ShiftBounds::add_residual(double residual_m_s2, Sum& sum) const {
   using enum Parameter;
-  // A line of the residual is at most twice as large as that at f_EP.
-  const double line_m_s2 = 2.0 * residual_m_s2;
+  // Lines of the residual are at most twice as large as that at f_EP, or known.
+  const double line_m_s2 = std::max(2.0 * residual_m_s2, known_line_m_s2_);
   const double square_m_s2 = 0.5 * sum[k2d] * line_m_s2 * line_m_s2;
   for (const Parameter delta : {a_c11_delta_x, a_c11_delta_z}) {
     sum.add(Effect::residual, delta, sum.sensitivity(delta).of_line * square_m_s2);
@@ -245,9 +268,11 @@ void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
   using enum Parameter;
   constexpr double num_deviations = 3.0;
   // The residual's own lines times the constant b_1d, which a_d11' takes up, look like noise too.
-  const double line_m_s2 = 2.0 * sum[k2c] * differential_bias_max_m_s2 * health.residual_m_s2;
-  const double density = std::max(
-      0.0, health.quadratic_noise * least_density_ - 2.0 * line_m_s2 * line_m_s2 * block_s_);
+  const double scale = 2.0 * sum[k2c] * differential_bias_max_m_s2;
+  const double of_lines =
+      2.0 * block_s_ *
+      (square(scale * health.residual_m_s2) + step_share_ * square(scale * known_line_m_s2_));
+  const double density = std::max(0.0, health.quadratic_noise * least_density_ - of_lines);
   for (std::size_t p = 0; p < num_parameters; ++p) {
     const auto parameter = static_cast<Parameter>(p);
     sum.add_noise(Effect::quadratic_noise, parameter,

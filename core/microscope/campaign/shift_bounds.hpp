@@ -73,6 +73,10 @@ class ShiftBounds {
   std::array<Sensitivity, num_parameters> sensitivities_{};
   double least_density_;  ///< Of which LoopHealth::quadratic_noise is a multiple.
   double block_s_;        ///< Duration of a block of BlockSteps.
+  /// Largest line of Γ_mes,cx at 2 f_EP that is known beforehand, m/s², and what of the square of a
+  /// line there BlockSteps take for a density.
+  double known_line_m_s2_ = 0.0;
+  double step_share_ = 0.0;
   double white_density_;  ///< Of Γ_mes,dx, below that of every line; of scale 1 without noise.
   double duration_s_;     ///< Of the records of all sessions that are fitted.
   bool has_noise_;

@@ -224,6 +224,37 @@ TEST(RunPlan, SaysWhatLostARunAndWhichEstimateIsOff) {
             test::loss_of(LossCause::square_noise, k2d));
 }
 
+// Two metres from the centre of mass, the loop leaves 1.5e-9 m/s² of the gradient at 2 f_orb, which
+// 2 K2c b_1d turn into a line that â_d11' takes away: it moves no estimate, although blocks of 512
+// s step by it. Noise of the thrust does.
+TEST(RunPlan, TakesAKnownLineOfTheGradientForNoNoise) {
+  MicroscopeCampaign campaign = short_campaign(10);
+  std::erase_if(campaign.scenario.sessions, [](const Session& session) {
+    return session.target != SessionTarget::a_c11_delta_x &&
+           session.target != SessionTarget::a_d11_prime &&
+           session.target != SessionTarget::k2_sensor_1 &&
+           session.target != SessionTarget::k2_sensor_2;
+  });
+  campaign.scenario.noise.scale = 0.0;
+  campaign.scenario.sensor.position_m = {2.0, 0.0, 0.0};
+  for (const std::string sensor : {"sensor_1_x", "sensor_2_x"}) {
+    test::fix(campaign, "quadratic_factor_s2_m." + sensor, 14000.0);
+  }
+  test::fix(campaign, "parasitic_acceleration_m_s2.sensor_1_x", -1.4e-8);
+  test::fix(campaign, "parasitic_acceleration_m_s2.sensor_2_x", 1.4e-8);
+  const auto largest_part = [](const MicroscopeCampaign& of) {
+    double largest = 0.0;
+    for (const Warning& warning : of.warner()(RunPlan(of).simulate(RunIndex{0}, {}))) {
+      if (warning.effect == "quadratic_noise") largest = std::max(largest, warning.part);
+    }
+    return largest;
+  };
+  EXPECT_EQ(largest_part(campaign), 0.0);
+  campaign.scenario.noise.scale = 1.0;
+  campaign.scenario.noise.thrust_asd_m_s2 = 1e-6;
+  EXPECT_GT(largest_part(campaign), 0.3);
+}
+
 // Estimates are linear in the measured difference.
 TEST(RunPlan, SaysWhenAnEstimateIsOutOfRange) {
   const MicroscopeCampaign campaign = short_campaign(1);
