@@ -92,7 +92,36 @@ Cards open_cards(const Options& options, std::uint64_t reference_digest, const w
   return cards;
 }
 
-proto::Hello hello_for(const Options& options, const ChildStart& start) {
+/// One whose program cannot compute its reference runs is left out, unless there is no other.
+void add_models(proto::Hello& hello, const wire::Log& log) {
+  std::string failure;
+  for (const Model* const model : models()) {
+    const std::string version(model->version());
+    const bool is_program = !model->description().empty();
+    if (is_program) log({.kind = "reference_runs", .fields = {{"model", version}}});
+    std::uint64_t digest = 0;
+    try {
+      digest = model->reference_digest(best_instruction_set());
+    } catch (const Error& error) {
+      failure = error.what();
+      log({.severity = wire::Severity::warning,
+           .kind = "model_left_out",
+           .fields = {{"model", version}, Field::reason(failure)}});
+      continue;
+    }
+    if (model == &built_in_model()) {
+      hello.set_model_version(version);
+      hello.set_reference_digest(digest);
+    } else {
+      proto::OtherModel& other = *hello.add_other_models();
+      other.set_version(version);
+      other.set_reference_digest(digest);
+    }
+  }
+  if (!failure.empty() && hello.other_models_size() == 0) throw Error(failure);
+}
+
+proto::Hello hello_for(const Options& options, const ChildStart& start, const wire::Log& log) {
   const auto process_id = static_cast<std::uint64_t>(getpid());
   proto::Hello hello;
   hello.set_host(wire::host_name());
@@ -101,17 +130,7 @@ proto::Hello hello_for(const Options& options, const ChildStart& start) {
                             : options.name);
   hello.set_process_id(process_id);
   hello.set_build(PROOFMASS_VERSION);
-  for (const Model* const model : models()) {
-    const std::uint64_t digest = model->reference_digest(best_instruction_set());
-    if (model == &built_in_model()) {
-      hello.set_model_version(std::string(model->version()));
-      hello.set_reference_digest(digest);
-    } else {
-      proto::OtherModel& other = *hello.add_other_models();
-      other.set_version(std::string(model->version()));
-      other.set_reference_digest(digest);
-    }
-  }
+  add_models(hello, log);
   if (start.former) *hello.mutable_former() = *start.former;
   if (!wire::is_name(hello.worker_name())) {
     throw InvalidArgument(fmt::format("name = {} ({})", hello.worker_name(), is_name_rule));
@@ -212,7 +231,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
   constexpr int num_threads_beside = 4;  // ZeroMQ's, and one for heartbeats.
   config.session = start.session;
-  config.hello = hello_for(options, start);
+  config.hello = hello_for(options, start, config.log);
   const Cards cards = open_cards(options, config.hello.reference_digest(), config.log);
   const unsigned num_threads = num_threads_of(options, cards.devices.size());
   const std::size_t num_processor_slots = num_threads * wire::slots_per_thread();
@@ -249,12 +268,18 @@ int work(const Options& options, const Program& program, ServeConfig config,
   return conclude();
 }
 
-int run(const Options& options, const Program& program) {
+/// @param left_out  What is wrong with programs of models.
+int run(const Options& options, const Program& program, std::span<const std::string> left_out) {
   const TimePoint program_start = std::chrono::steady_clock::now();
   wire::ignore_broken_pipes();  // What reads the log must not take results with it.
   const wire::Log log =
       wire::make_log(program.name, options.log_format,
                      options.parent ? wire::LogLevel::warning : wire::LogLevel::info);
+  for (const std::string& why : left_out) {
+    log({.severity = wire::Severity::warning,
+         .kind = "model_left_out",
+         .fields = {Field::reason(why)}});
+  }
   if (options.parent) {
     die_with(*options.parent);
     std::signal(SIGINT, SIG_IGN);  // Ctrl-C reaches the campaign, which tells its workers.
@@ -293,7 +318,9 @@ int run_worker(int argc, char** argv, const Program& program) {
   app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
   return reporting_errors(program, [&] {
     wire::settle_surroundings();
-    wire::choose_models(argc, argv);
+    const auto left_out = wire::choose_models(argc, argv, wire::Broken::left_out);
+    // Without any of its programs it is not the worker that somebody meant.
+    if (!left_out.empty() && models().front() == &built_in_model()) throw Error(left_out.front());
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& wish) {
@@ -301,7 +328,7 @@ int run_worker(int argc, char** argv, const Program& program) {
     } catch (const CLI::ParseError& error) {
       throw InvalidArgument(wire::refusal_of(app, error));
     }
-    return run(options, program);
+    return run(options, program, left_out);
   });
 }
 

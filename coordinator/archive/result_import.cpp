@@ -45,7 +45,7 @@ using ResultColumns = std::vector<ResultColumn>;
 
 /// What a schema says of the columns, and the description of a model that it amounts to.
 struct ImportSchema {
-  std::string name;
+  std::string name = {};
   bool is_independent = false;
   std::uint64_t num_runs = 0;  ///< That was fixed before the first result; 0: none.
   ResultColumns drawn = {};    ///< In the order of the description; the last ones are the truths.
@@ -53,16 +53,6 @@ struct ImportSchema {
   ResultColumns errors = {};  ///< Of the quantities that have one.
   Json description = {};
 };
-
-std::string needed_text(Document& document, const std::string& path) {
-  std::string text;
-  if (document.find(path) == nullptr) {
-    document.refuse_absence(path, "must be given");
-  } else {
-    document.read(path, text);
-  }
-  return text;
-}
 
 /// Copies a key into the description, if it is there.
 template <typename Value>
@@ -86,7 +76,7 @@ void read_drawn(Document& document, const std::string& path, const std::string& 
 }
 
 void read_quantity(Document& document, const std::string& path, ImportSchema& schema) {
-  const std::string name = needed_text(document, path + ".name");
+  const std::string name = wire::read_name(document, path);
   read_drawn(document, path, name, "truth", "truth_" + name, schema);
   std::string estimate = "estimate_" + name, error;
   document.read(path + ".estimate", estimate);
@@ -104,7 +94,8 @@ void read_quantity(Document& document, const std::string& path, ImportSchema& sc
 }
 
 ImportSchema read_schema(Document& document, const std::string& file) {
-  ImportSchema schema{.name = needed_text(document, "campaign.name")};
+  ImportSchema schema;
+  document.read_needed("campaign.name", schema.name);
   document.read("campaign.independent", schema.is_independent);
   document.read("campaign.runs", schema.num_runs, range::between(1.0, 1e9));
   schema.description = {{"proofmass_model_program", 1}, {"name", schema.name},
@@ -113,7 +104,7 @@ ImportSchema read_schema(Document& document, const std::string& file) {
   const std::size_t num_inputs = document.num_tables("drawn", inputs_max).value_or(0);
   for (std::size_t i = 0; i < num_inputs; ++i) {
     const std::string path = fmt::format("drawn[{}]", i);
-    const std::string name = needed_text(document, path + ".name");
+    const std::string name = wire::read_name(document, path);
     read_drawn(document, path, name, "column", name, schema);
   }
   const auto num_quantities = document.num_tables("quantities", quantities_max);
@@ -125,20 +116,6 @@ ImportSchema read_schema(Document& document, const std::string& file) {
   }
   document.check();
   return schema;
-}
-
-/// The model that the schema describes, with its errors as those of the schema's file.
-const wire::DescribedModel& model_of(const ImportSchema& schema, const std::string& file) {
-  try {
-    return dynamic_cast<const wire::DescribedModel&>(wire::recorded_model(
-        {.version = schema.name + "-imported", .description = schema.description.dump()}));
-  } catch (const wire::ModelProgramError& error) {
-    const std::string_view text = error.what();
-    constexpr std::string_view before = "description: ";
-    const std::size_t begin = text.find(before);
-    throw DefinitionError(fmt::format(
-        "{}: {}", file, begin == text.npos ? text : text.substr(begin + before.size())));
-  }
 }
 
 double number_in(const CsvReader& reader, const ResultColumn& column) {
@@ -251,7 +228,8 @@ void import_results(const std::filesystem::path& results, const std::filesystem:
       schema_file.string(),
       detail::read_definition_text(schema_file, schema_size_max, detail::Pipes::refused), {});
   ImportSchema schema = read_schema(document, results.filename().string());
-  wire::DescribedCampaign campaign(model_of(schema, schema_file.string()));
+  wire::DescribedCampaign campaign(
+      wire::described_model(schema.description.dump(), 0, schema_file.string()));
   campaign.name = schema.name;
   campaign.num_runs = read_columns(results, schema, is_stopped);
   for (const ResultColumn& column : schema.drawn) campaign.table_columns.push_back(column.values);

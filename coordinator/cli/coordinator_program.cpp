@@ -271,7 +271,8 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 }  // namespace
 
 int run_proofmass_coordinator(int argc, char** argv) {
-  if (const auto refused = refused_model(argc, argv, "proofmass-coordinator")) return *refused;
+  const auto refused = refused_model(argc, argv, "proofmass-coordinator", wire::Broken::refused);
+  if (refused) return *refused;
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
       "On SIGTERM it first lets workers deliver their results; on SIGINT or a second\n"

@@ -15,6 +15,8 @@
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/status_json.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
+#include "proto/command_line/standard_error.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -53,6 +55,10 @@ TerminalStyle style_of(std::FILE* stream) {
 }
 
 void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
+
+void say_reference_runs(const Model& model) {
+  wire::say(fmt::format("proofmass: computing the reference runs of {}\n", model.version()));
+}
 
 void print_written(const std::filesystem::path& file, OutputFormat format) {
   if (format == OutputFormat::json) return print_json({{"file", file.string()}});

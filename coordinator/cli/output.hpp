@@ -10,6 +10,10 @@
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/link/whole_file.hpp"
 
+namespace proofmass {
+class Model;
+}  // namespace proofmass
+
 namespace proofmass::coordinator {
 
 struct ScreenSize {
@@ -30,6 +34,9 @@ struct ScreenSize {
 
 /// How a command prints what it found.
 enum class OutputFormat : std::uint8_t { text, json };
+
+/// Says what a model program is asked for that may take long: Model::reference_digest().
+void say_reference_runs(const Model& model);
 
 /// Says that a file was written.
 void print_written(const std::filesystem::path& file, OutputFormat format);

@@ -6,10 +6,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <exception>
 #include <iostream>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,7 +25,6 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/surroundings.hpp"
-#include "proto/model_program/model_choice.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -98,9 +99,12 @@ void let_stop_signals_kill() {
   for (const int signal : {SIGINT, SIGTERM}) handle_unless_ignored(signal, SIG_DFL);
 }
 
-std::optional<int> refused_model(int argc, char** argv, std::string_view program) {
+std::optional<int> refused_model(int argc, char** argv, std::string_view program,
+                                 wire::Broken broken) {
   try {
-    wire::choose_models(argc, argv);
+    for (const std::string& why : wire::choose_models(argc, argv, broken)) {
+      wire::say(fmt::format("{}: warning: {}; it is left out\n", program, wire::visible_text(why)));
+    }
     return std::nullopt;
   } catch (const Error& error) {
     wire::say(fmt::format("{}: error: {}\n", program, wire::visible_text(error.what())));
@@ -108,9 +112,28 @@ std::optional<int> refused_model(int argc, char** argv, std::string_view program
   }
 }
 
+namespace {
+
+/// Commands whose help has `--model-program`, although all take it: what they compute needs the
+/// programs, and the others read what databases say of their models.
+constexpr std::array<std::string_view, 10> commands_with_programs{
+    "run", "init", "check", "sweep", "models", "replay", "submit", "verify", "merge", "publish"};
+
+/// Those that the variable names: what somebody asks for is not left out.
+wire::Broken broken_programs(std::span<char* const> arguments) {
+  const auto asks = [](std::string_view argument) {
+    return argument.starts_with("--model-program") ||
+           std::ranges::find(commands_with_programs, argument) != commands_with_programs.end();
+  };
+  return std::ranges::any_of(arguments, asks) ? wire::Broken::refused : wire::Broken::left_out;
+}
+
+}  // namespace
+
 int run_proofmass(int argc, char** argv) {
   end_at_stop_signals();  // A program may take a while to say what its model is.
-  if (const std::optional<int> refused = refused_model(argc, argv, "proofmass")) return *refused;
+  const wire::Broken broken = broken_programs({argv, static_cast<std::size_t>(argc)});
+  if (const auto refused = refused_model(argc, argv, "proofmass", broken)) return *refused;
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
@@ -134,10 +157,8 @@ int run_proofmass(int argc, char** argv) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);
   }
-  // All commands take it; these say so.
-  for (const char* const name : {"run", "init", "check", "sweep", "models", "replay", "submit",
-                                 "verify", "merge", "publish"}) {
-    wire::add_model_program_option(*app.get_subcommand(name));
+  for (const std::string_view name : commands_with_programs) {
+    wire::add_model_program_option(*app.get_subcommand(std::string(name)));
   }
   app.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   return run_program(app, argc, argv, [&] {

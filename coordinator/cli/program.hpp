@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/error.hpp"
+#include "proto/model_program/model_choice.hpp"
 
 namespace CLI {
 class App;
@@ -48,8 +49,9 @@ void let_stop_signals_kill();
 
 /// Chooses the model, which is to be done first.
 /// @param program  For the message.
-/// @return The exit code if the program that is to simulate cannot be used, which it has said.
-[[nodiscard]] std::optional<int> refused_model(int argc, char** argv, std::string_view program);
+/// @return The exit code if a program that is to simulate cannot be used, which it has said.
+[[nodiscard]] std::optional<int> refused_model(int argc, char** argv, std::string_view program,
+                                               wire::Broken broken);
 
 /// All of `proofmass`, from its arguments to its exit code.
 [[nodiscard]] int run_proofmass(int argc, char** argv);

@@ -32,9 +32,9 @@ proto::Envelope stop_message() {
   return envelope;
 }
 
-/// Where a program of one version computes something else than it did where the campaigns of this
-/// version began.
-std::optional<proto::Envelope> refusal_of(const State& state, const proto::OtherModel& other) {
+/// Why a worker's model is lent no runs: its program computes something else than it did where the
+/// campaigns of this version began.
+std::optional<std::string> refusal_of(const State& state, const proto::OtherModel& other) {
   std::optional<std::uint64_t> expected;
   for (const CampaignId id : state.served) {
     const CampaignState& campaign = state.campaigns.at(id);
@@ -45,11 +45,10 @@ std::optional<proto::Envelope> refusal_of(const State& state, const proto::Other
     expected = wanted.reference_digest;
   }
   if (!expected) return std::nullopt;
-  return wire::rejection(
-      proto::REJECT_REASON_INCOMPATIBLE,
-      fmt::format("reference_digest of {} = {:016x} (must be {:016x}, where its campaign began, "
-                  "unless that has tolerate_digest = true)",
-                  other.version(), other.reference_digest(), *expected));
+  return fmt::format(
+      "reference_digest of {} = {:016x} (must be {:016x}, where its campaign began, "
+      "unless that has tolerate_digest = true)",
+      other.version(), other.reference_digest(), *expected);
 }
 
 /// Why a worker that says Hello cannot be taken, as a Reject; nothing if it can.
@@ -67,8 +66,17 @@ std::optional<proto::Envelope> refusal(const State& state, const HostId& host,
         fmt::format("reference_digest = {:016x} (must be {:016x}, the coordinator's)",
                     hello.reference_digest(), state.config.reference_digest));
   }
+  std::string changed;
+  int num_changed = 0;
   for (const proto::OtherModel& other : hello.other_models()) {
-    if (auto refused = refusal_of(state, other)) return refused;
+    const std::optional<std::string> why = refusal_of(state, other);
+    if (!why) continue;
+    changed = *why;
+    ++num_changed;
+  }
+  // One that has others computes their runs.
+  if (num_changed > 0 && num_changed == hello.other_models_size()) {
+    return wire::rejection(proto::REJECT_REASON_INCOMPATIBLE, changed);
   }
   if (state.quarantined.contains(host)) {
     return wire::rejection(proto::REJECT_REASON_QUARANTINED,
@@ -139,6 +147,14 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
     fields.emplace_back("model", other.version());
   }
   outbox.log({.kind = "worker_registered", .fields = std::move(fields)});
+  for (const proto::OtherModel& other : hello.other_models()) {
+    const std::optional<std::string> why = refusal_of(state, other);
+    if (!why) continue;
+    outbox.log(
+        {.severity = Severity::warning,
+         .kind = "model_left_out",
+         .fields = {{"worker", id.value}, {"name", worker.name}, wire::Field::reason(*why)}});
+  }
 }
 
 /// True if a Hello may be answered: there is an allowance of so many a second.

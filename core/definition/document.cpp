@@ -123,8 +123,12 @@ Assignment parse_assignment(const std::string& text) {
   return assignment;
 }
 
-Document::Document(std::string name, std::string_view text, std::vector<Assignment> assignments)
-    : name_(std::move(name)), root_(parse_text(text, name_)), assignments_(std::move(assignments)) {
+Document::Document(std::string name, std::string_view text, std::vector<Assignment> assignments,
+                   Lines lines)
+    : name_(std::move(name)),
+      lines_(lines),
+      root_(parse_text(text, name_)),
+      assignments_(std::move(assignments)) {
   std::set<std::string> paths;
   for (Assignment& assignment : assignments_) {
     assignment.path = with_index(root_, assignment);
@@ -264,7 +268,8 @@ Document::Place Document::place_of(std::string path) const {
 
 std::string Document::prefix(const Place& place) const {
   if (place.assignment != 0) return assignments_[place.assignment - 1].origin + ": ";
-  return place.line == 0 ? name_ + ": " : fmt::format("{}:{}: ", name_, place.line);
+  const bool has_line = place.line != 0 && lines_ == Lines::named;
+  return has_line ? fmt::format("{}:{}: ", name_, place.line) : name_ + ": ";
 }
 
 void Document::refuse(const std::string& path, std::string_view rule) {

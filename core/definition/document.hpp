@@ -27,6 +27,10 @@ struct Assignment {
 /// @throws DefinitionError if there is no key or no `=`.
 [[nodiscard]] Assignment parse_assignment(const std::string& text);
 
+/// Whether messages name the line of what is wrong; nobody sees those of a text that was written
+/// from another format.
+enum class Lines : std::uint8_t { named, left_out };
+
 /// A parsed campaign file that remembers which paths were asked for and what was refused, so that
 /// keys that nobody asked for are found and the first error in the file is the one reported.
 ///
@@ -35,7 +39,8 @@ class Document {
  public:
   /// @param name  For messages: the path of the file.
   /// @throws DefinitionError at the first place that is not TOML.
-  Document(std::string name, std::string_view text, std::vector<Assignment> assignments);
+  Document(std::string name, std::string_view text, std::vector<Assignment> assignments,
+           Lines lines = Lines::named);
 
   /// The value at a path, null if absent; the path is a key from now on.
   [[nodiscard]] const toml::node* find(const std::string& path);
@@ -67,6 +72,14 @@ class Document {
     const std::optional<std::size_t> position = read_choice(path, names_of(value));
     if (position) value = static_cast<Choice>(*position + 1);
     return position.has_value();
+  }
+
+  /// Reads what must be there: its absence is refused.
+  template <typename Value>
+  bool read_needed(const std::string& path, Value& value) {
+    if (find(path) != nullptr) return read(path, value);
+    refuse_absence(path, "must be given");
+    return false;
   }
 
   /// Remembers that the value at a path breaks a rule.
@@ -112,6 +125,7 @@ class Document {
                       std::optional<Refusal>& first) const;
 
   std::string name_;
+  Lines lines_;
   toml::table root_;
   std::vector<Assignment> assignments_;
   std::set<std::string> keys_;

@@ -31,7 +31,8 @@ std::vector<DefinitionItem> items_of(std::vector<Entry> entries) {
   return items;
 }
 
-std::string text_of(const std::vector<Entry>& entries, std::string_view between_tables) {
+std::string text_of(const std::vector<Entry>& entries, std::string_view between_tables,
+                    Comments comments) {
   std::string text, table;
   for (const Entry& entry : entries) {
     const std::size_t dot = entry.path.rfind('.');
@@ -39,7 +40,9 @@ std::string text_of(const std::vector<Entry>& entries, std::string_view between_
     if (std::exchange(table, of) != of) {
       text += fmt::format("{}[{}]\n", text.empty() ? "" : between_tables, of);
     }
-    text += fmt::format("{} = {}\n", entry.path.substr(dot + 1), entry.text);
+    text += fmt::format("{} = {}", entry.path.substr(dot + 1), entry.text);
+    if (comments == Comments::included && !entry.comment.empty()) text += "  # " + entry.comment;
+    text += '\n';
   }
   return text;
 }

@@ -49,9 +49,12 @@ template <typename Item, typename TextOf>
 /// Keys and values, as Campaign::items() has them.
 [[nodiscard]] std::vector<DefinitionItem> items_of(std::vector<Entry> entries);
 
+enum class Comments : std::uint8_t { included, left_out };
+
 /// The entries as TOML, with a table for each part of the paths before their last dot.
 [[nodiscard]] std::string text_of(const std::vector<Entry>& entries,
-                                  std::string_view between_tables = "\n");
+                                  std::string_view between_tables = "\n",
+                                  Comments comments = Comments::left_out);
 
 /// What differs but for the number of runs, as Campaign::differences_from() has it. A key that one
 /// side lacks is a difference, too; the names of data files and of their columns are none.

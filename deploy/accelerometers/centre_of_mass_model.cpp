@@ -13,12 +13,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/definition/definition_text.hpp"
 #include "core/math/elementary.hpp"
 #include "core/random/normal_deviates.hpp"
 #include "core/random/stream.hpp"
+#include "core/settings_model.hpp"
 #include "kinematics.hpp"
 #include "normal_equations.hpp"
-#include "settings_model.hpp"
 
 namespace proofmass {
 namespace {
@@ -45,7 +46,7 @@ class Manoeuvres {
   [[nodiscard]] Rotation rotation(std::size_t session, std::size_t sample) const;
   [[nodiscard]] Readings read(std::size_t session, const RandomStream& noise, const RunDraw& draw,
                               const SampleSink& sink) const;
-  [[nodiscard]] SquareMatrix uncertainty(const std::vector<double>& offset_m) const;
+  [[nodiscard]] Eigen::Matrix3d uncertainty(const Eigen::Vector3d& offset_m) const;
 
   std::size_t num_samples_;
   double period_s_, amplitude_rad_s2_, torque_hz_, orbit_rate_rad_s_, sigma_m_s2_, range_m_s2_;
@@ -53,17 +54,18 @@ class Manoeuvres {
   /// What d_l does to each reading of each session, without constant and drift: [session][axis][l].
   std::array<std::array<std::array<std::vector<double>, 3>, 3>, 3> regressors_;
   /// Σ regressor regressorᵀ over what one axis reads, 1/s⁴.
-  std::vector<SquareMatrix> normal_of_axis_ = std::vector<SquareMatrix>(3, SquareMatrix(3));
-  SquareMatrix inverse_{3};  ///< Of the sum of these.
+  std::array<Eigen::Matrix3d, 3> normal_of_axis_;
+  Eigen::Matrix3d inverse_;  ///< Of the sum of these.
 };
 
 struct CentreOfMass {
-  static constexpr std::string_view name = "grace-fo-com", version = "centre-of-mass-1",
+  static constexpr std::string_view name = "grace-fo-com", version = "centre-of-mass-2",
                                     purpose =
                                         "Measures how well torques reveal the offset of an "
                                         "accelerometer from the centre of mass.",
                                     step_name = "torques", example_file = "grace-fo-com.toml";
   static constexpr std::uint64_t num_runs = 1000;
+  static constexpr std::size_t batch_size = 1;
 
   double altitude_m = 490e3;
   double torque_rad_s2 = 1e-5;
@@ -161,17 +163,12 @@ struct CentreOfMass {
     return schema;
   }
   [[nodiscard]] std::int64_t num_rounds_max() const { return 1; }
-  [[nodiscard]] std::vector<double> means() const {
-    std::vector<double> means(drawn().size());
-    for (std::size_t i = 0; i < 3; ++i) means[scales + i] = 1.0;
-    return means;
-  }
-  [[nodiscard]] std::vector<double> deviations() const {
-    std::vector<double> deviations;
+  [[nodiscard]] std::vector<Dispersion> laws() const {
+    std::vector<Dispersion> laws;
     for (const double deviation : {offset_m, scale, bias_m_s2, drag_m_s2, drift_m_s3}) {
-      deviations.insert(deviations.end(), 3, deviation);
+      laws.insert(laws.end(), 3, normal_law(laws.size() == scales ? 1.0 : 0.0, deviation));
     }
-    return deviations;
+    return laws;
   }
   [[nodiscard]] std::vector<double> truth(std::span<const double> drawn) const {
     return {drawn.begin() + offset, drawn.begin() + offset + 3};
@@ -217,8 +214,7 @@ Manoeuvres::Manoeuvres(const CentreOfMass& settings)
       sigma_m_s2_(settings.noise_m_s2_rthz / std::sqrt(2.0 * settings.sample_period_s)),
       range_m_s2_(settings.range_m_s2),
       scale_deviation_(settings.scale) {
-  const double radius_m = 6378137.0 + settings.altitude_m;
-  orbit_rate_rad_s_ = std::sqrt(3.986004418e14 / radius_m) / radius_m;
+  orbit_rate_rad_s_ = orbit_rate_rad_s(settings.altitude_m);
   recording.groups = {
       {"sensor",
        "readings",
@@ -226,7 +222,7 @@ Manoeuvres::Manoeuvres(const CentreOfMass& settings)
   for (const char* const name : {"torque_x", "torque_y", "torque_z"}) {
     recording.sessions.push_back({name, period_s_, num_samples_});
   }
-  SquareMatrix normal(3);
+  normal_of_axis_.fill(Eigen::Matrix3d::Zero());
   for (std::size_t session = 0; session < 3; ++session) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       auto& regressors = regressors_[session][axis];
@@ -235,16 +231,14 @@ Manoeuvres::Manoeuvres(const CentreOfMass& settings)
         for (std::size_t l = 0; l < 3; ++l) regressors[l].push_back(g.row[axis][l]);
       }
       for (std::vector<double>& regressor : regressors) remove_drift(regressor);
-      for (std::size_t i = 0; i < 3; ++i) {
-        for (std::size_t j = 0; j < 3; ++j) {
-          const double sum = sum_of_products(regressors[i], regressors[j]);
-          normal_of_axis_[axis](i, j) += sum;
-          normal(i, j) += sum;
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          normal_of_axis_[axis](i, j) += sum_of_products(regressors[i], regressors[j]);
         }
       }
     }
   }
-  const std::optional<SquareMatrix> inverse = covariance(normal);
+  const auto inverse = covariance(normal_of_axis_[0] + normal_of_axis_[1] + normal_of_axis_[2]);
   PROOFMASS_EXPECT(inverse.has_value());
   inverse_ = *inverse;
 }
@@ -289,7 +283,7 @@ Manoeuvres::Readings Manoeuvres::read(std::size_t session, const RandomStream& n
 RunResult Manoeuvres::operator()(std::uint64_t seed, RunIndex run, const RunDraw& draw,
                                  const SampleSink& sink) const {
   const RandomStream noise(seed, run, stream_id("accelerometer"));
-  std::vector<double> correlation(3);
+  Eigen::Vector3d correlation = Eigen::Vector3d::Zero();
   RunResult result{.num_rounds = 1, .health = {0.0}};
   for (std::size_t session = 0; session < 3; ++session) {
     Readings readings = read(session, noise, draw, sink);
@@ -299,7 +293,7 @@ RunResult Manoeuvres::operator()(std::uint64_t seed, RunIndex run, const RunDraw
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       remove_drift(readings.axes[axis]);
-      for (std::size_t l = 0; l < 3; ++l) {
+      for (int l = 0; l < 3; ++l) {
         correlation[l] += sum_of_products(regressors_[session][axis][l], readings.axes[axis]);
       }
     }
@@ -309,25 +303,19 @@ RunResult Manoeuvres::operator()(std::uint64_t seed, RunIndex run, const RunDraw
     result.num_rounds = 0;
     return result;
   }
-  result.estimate = product(inverse_, correlation);
-  set_uncertainty(result, uncertainty(result.estimate));
+  const Eigen::Vector3d offset_m = inverse_ * correlation;
+  result.estimate.assign(offset_m.begin(), offset_m.end());
+  set_uncertainty(result, uncertainty(offset_m));
   return result;
 }
 
 /// Of the noise, and of S: with Nᵢ the part of the normal matrix N that axis i reads, a deviation
 /// of Sᵢ by 1 moves the estimate by N⁻¹ Nᵢ d.
-SquareMatrix Manoeuvres::uncertainty(const std::vector<double>& offset_m) const {
-  SquareMatrix covariance = inverse_;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) covariance(i, j) *= sigma_m_s2_ * sigma_m_s2_;
-  }
-  for (const SquareMatrix& normal : normal_of_axis_) {
-    const std::vector<double> moved = product(inverse_, product(normal, offset_m));
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) {
-        covariance(i, j) += scale_deviation_ * scale_deviation_ * moved[i] * moved[j];
-      }
-    }
+Eigen::Matrix3d Manoeuvres::uncertainty(const Eigen::Vector3d& offset_m) const {
+  Eigen::Matrix3d covariance = sigma_m_s2_ * sigma_m_s2_ * inverse_;
+  for (const Eigen::Matrix3d& normal : normal_of_axis_) {
+    const Eigen::Vector3d moved = scale_deviation_ * (inverse_ * (normal * offset_m));
+    covariance += moved * moved.transpose();
   }
   return covariance;
 }

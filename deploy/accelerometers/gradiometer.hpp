@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -8,9 +9,9 @@
 #include <vector>
 
 #include "core/random/stream.hpp"
+#include "core/settings_model.hpp"
 #include "fourier.hpp"
 #include "kinematics.hpp"
-#include "settings_model.hpp"
 
 namespace proofmass {
 
@@ -49,12 +50,13 @@ struct Combination {
 
 /// Numbers of the campaign file.
 struct Gradiometer {
-  static constexpr std::string_view name = "nggm-three", version = "gradiometer-2",
+  static constexpr std::string_view name = "nggm-three", version = "gradiometer-3",
                                     purpose =
                                         "Measures how well shaking a satellite calibrates a "
                                         "gradiometer of three accelerometers.",
                                     step_name = "estimations", example_file = "nggm-three.toml";
   static constexpr std::uint64_t num_runs = 1000;
+  static constexpr std::size_t batch_size = 1;
 
   double altitude_m = 396e3;
   double length_m = 0.6;
@@ -79,13 +81,12 @@ struct Gradiometer {
   void check() const;
   [[nodiscard]] ResultSchema results() const;
   [[nodiscard]] std::int64_t num_rounds_max() const { return 10; }
-  [[nodiscard]] std::vector<double> means() const;
-  [[nodiscard]] std::vector<double> deviations() const;
+  [[nodiscard]] std::vector<Dispersion> laws() const;
   [[nodiscard]] std::vector<double> truth(std::span<const double> drawn) const;
   [[nodiscard]] Gradiometer reference() const;
 
-  [[nodiscard]] double orbit_rate_rad_s() const;
-  [[nodiscard]] std::size_t num_samples() const;
+  [[nodiscard]] double orbit_rate_rad_s() const { return proofmass::orbit_rate_rad_s(altitude_m); }
+  [[nodiscard]] std::size_t num_samples() const { return static_cast<std::size_t>(duration_s); }
 
   using Simulator = class Shaking;
 };
@@ -142,7 +143,7 @@ struct Measurement {
 /// What the fit of a measurement finds.
 struct Fit {
   std::vector<double> unknowns;
-  std::vector<double> covariance;  ///< Of unknowns, row by row; empty if some are not observed.
+  Eigen::MatrixXd covariance;  ///< Of unknowns; empty if some are not observed.
   std::uint32_t num_rounds = 0;
   bool has_converged = false;
 };

@@ -178,7 +178,7 @@ std::array<Products, 4> weighted_products(const Gradiometer& settings,
 
 /// Adds the normal equations of one series.
 void add_series(const Derivatives& derivatives, const Products& products, std::size_t residual,
-                SquareMatrix& normal, std::vector<double>& gradient) {
+                Eigen::MatrixXd& normal, Eigen::VectorXd& gradient) {
   for (std::size_t i = 0; i < Unknowns::count; ++i) {
     std::array<double, num_signals> row{};
     for (std::size_t a = 0; a < residual_signal; ++a) {
@@ -206,22 +206,21 @@ Fit fit(const Gradiometer& settings, const FourierTransform& transform,
     }
     const auto products = weighted_products(settings, transform, table);
     const auto of = derivatives(sensors);
-    SquareMatrix normal(Unknowns::count);
-    std::vector<double> gradient(Unknowns::count);
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(Unknowns::count, Unknowns::count);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(Unknowns::count);
     for (std::size_t series = 0; series < 6; ++series) {
       add_series(of[series], products[std::min<std::size_t>(series, 3)], residual_signal + series,
                  normal, gradient);
     }
-    const std::optional<SquareMatrix> inverse = covariance(normal);
+    const std::optional<Eigen::MatrixXd> inverse = covariance(normal);
     if (!inverse) return fit;
-    const std::vector<double> step = product(*inverse, gradient);
-    fit.covariance.clear();
+    const Eigen::VectorXd step = *inverse * gradient;
+    fit.covariance = *inverse;
     fit.has_converged = true;
     for (std::size_t i = 0; i < Unknowns::count; ++i) {
       fit.unknowns[i] += step[i];
       // A thousandth of the standard error.
       if (step[i] * step[i] > 1e-6 * (*inverse)(i, i)) fit.has_converged = false;
-      for (std::size_t j = 0; j < Unknowns::count; ++j) fit.covariance.push_back((*inverse)(i, j));
     }
   }
   return fit;

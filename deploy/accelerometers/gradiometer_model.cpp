@@ -1,6 +1,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/definition/definition_text.hpp"
 #include "gradiometer.hpp"
 #include "normal_equations.hpp"
 
@@ -213,17 +214,15 @@ ResultSchema Gradiometer::results() const {
   return schema;
 }
 
-std::vector<double> Gradiometer::means() const { return std::vector<double>(Unknowns::count); }
-
-std::vector<double> Gradiometer::deviations() const {
-  std::vector<double> deviations;
+std::vector<Dispersion> Gradiometer::laws() const {
+  std::vector<Dispersion> laws;
   for (std::size_t i = 0; i < Unknowns::count; ++i) {
-    deviations.push_back(i < Unknowns::quadratic  ? matrix
-                         : i < Unknowns::coupling ? quadratic_s2_m
-                         : i < Unknowns::place    ? coupling_m
-                                                  : place_m);
+    laws.push_back(normal_law(0.0, i < Unknowns::quadratic  ? matrix
+                                   : i < Unknowns::coupling ? quadratic_s2_m
+                                   : i < Unknowns::place    ? coupling_m
+                                                            : place_m));
   }
-  return deviations;
+  return laws;
 }
 
 std::vector<double> Gradiometer::truth(std::span<const double> drawn) const {
@@ -238,13 +237,6 @@ Gradiometer Gradiometer::reference() const {
   reference.duration_s = 3600.0;
   return reference;
 }
-
-double Gradiometer::orbit_rate_rad_s() const {
-  const double radius_m = 6378137.0 + altitude_m;
-  return std::sqrt(3.986004418e14 / radius_m) / radius_m;
-}
-
-std::size_t Gradiometer::num_samples() const { return static_cast<std::size_t>(duration_s); }
 
 Shaking::Shaking(const Gradiometer& settings)
     : settings_(settings), sampling_{FourierTransform(settings.num_samples()), 1.0} {
@@ -271,7 +263,7 @@ RunResult Shaking::operator()(std::uint64_t seed, RunIndex run, const RunDraw& d
   }
   const Fit found = fit(settings_, sampling_.transform, measurement);
   RunResult result{.num_rounds = found.num_rounds};
-  if (found.covariance.empty()) {
+  if (found.covariance.size() == 0) {
     result.status = RunStatus::lost;
     result.num_rounds = 0;
     result.loss = {.cause = 1, .session = 1};
@@ -279,15 +271,14 @@ RunResult Shaking::operator()(std::uint64_t seed, RunIndex run, const RunDraw& d
   }
   if (!found.has_converged) result.status = RunStatus::not_converged;
   const std::vector<Combination>& all = combinations();
-  SquareMatrix covariance(all.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(all.size(), all.size());
   const double variance_factor = settings_.noise_factor * settings_.noise_factor;
   for (std::size_t a = 0; a < all.size(); ++a) {
     result.estimate.push_back(all[a].of(found.unknowns));
     for (std::size_t b = 0; b < all.size(); ++b) {
       for (const auto& [i, factor] : all[a].terms) {
         for (const auto& [j, other] : all[b].terms) {
-          covariance(a, b) +=
-              variance_factor * factor * other * found.covariance[i * Unknowns::count + j];
+          covariance(a, b) += variance_factor * factor * other * found.covariance(i, j);
         }
       }
     }

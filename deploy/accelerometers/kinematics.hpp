@@ -1,8 +1,16 @@
 #pragma once
 
+#include <cmath>
+
 #include "core/math/vector3.hpp"
 
 namespace proofmass {
+
+/// n of a circular orbit.
+[[nodiscard]] inline double orbit_rate_rad_s(double altitude_m) {
+  const double radius_m = 6378137.0 + altitude_m;
+  return std::sqrt(3.986004418e14 / radius_m) / radius_m;
+}
 
 /// Angular motion of the satellite in its frame: x along track, y across track, z to the Earth.
 struct Rotation {

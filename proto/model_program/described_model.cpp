@@ -279,13 +279,12 @@ void set_lost(RunResult& result) {
   result.loss = {.cause = 1, .session = 1};
 }
 
-namespace {
-
 /// Texts of results point into their model, and so it stays: no more than so many bytes of
 /// descriptions, each of some thousand.
 constexpr std::size_t descriptions_size_max = std::size_t{64} << 20;
 
-const DescribedModel& described_model(const std::string& text, std::uint64_t reference_digest) {
+const DescribedModel& described_model(const std::string& text, std::uint64_t reference_digest,
+                                      const std::string& source) {
   static std::mutex mutex;
   static std::map<std::pair<std::string, std::uint64_t>, DescribedModel> models;
   static std::size_t size = 0;
@@ -293,15 +292,17 @@ const DescribedModel& described_model(const std::string& text, std::uint64_t ref
   const auto known = models.find({text, reference_digest});
   if (known != models.end()) return known->second;
   if (size + text.size() > descriptions_size_max) {
-    throw ModelProgramError(
-        fmt::format("description: this program has read {} others, of {} bytes; start it again",
+    throw DefinitionError(
+        fmt::format("{}: this program has read {} others, of {} bytes; start it again", source,
                     models.size(), size));
   }
-  const auto made =
-      models.try_emplace({text, reference_digest}, description_in(text), reference_digest, nullptr);
+  const auto made = models.try_emplace({text, reference_digest}, description_in(text, source),
+                                       reference_digest, nullptr);
   size += text.size();
   return made.first->second;
 }
+
+namespace {
 
 /// One of this program with the same version, and the same description if both have one; or one in
 /// C++ with the same name, which knows what its older versions recorded.
@@ -324,17 +325,14 @@ const Model* own_model(const ModelRecord& record) {
 const Model& recorded_model(const ModelRecord& record) {
   if (const Model* const own = own_model(record)) return *own;
   if (record.description.empty()) {
-    throw ModelProgramError(fmt::format(
+    throw DefinitionError(fmt::format(
         "is of the model {}, and this program has {}; --model-program names that of another model",
         record.version, model_versions()));
   }
-  try {
-    const Model& described = described_model(record.description, record.reference_digest);
-    if (described.version() == record.version) return described;
-    throw ModelProgramError(fmt::format("description: of {}", described.version()));
-  } catch (const ModelProgramError& error) {
-    throw ModelProgramError(fmt::format("is of the model {}: {}", record.version, error.what()));
-  }
+  const std::string source = fmt::format("is of the model {}: description", record.version);
+  const Model& described = described_model(record.description, record.reference_digest, source);
+  if (described.version() == record.version) return described;
+  throw DefinitionError(fmt::format("{}: of {}", source, described.version()));
 }
 
 }  // namespace proofmass::wire

@@ -133,6 +133,15 @@ void set_estimates(std::vector<double> estimate, std::vector<double> errors, Run
 /// A run without any estimate.
 void set_lost(RunResult& result);
 
+/// The model of a description, without its program. It lives as long as this program, as do the
+/// texts of its results; the same description and digest yield the same model.
+/// @param reference_digest  As of DescribedModel; 0 if it is not known.
+/// @param source            For messages: where the description is from.
+/// @throws DefinitionError if it breaks a rule, or if this program has read too many.
+[[nodiscard]] const DescribedModel& described_model(const std::string& text,
+                                                    std::uint64_t reference_digest,
+                                                    const std::string& source);
+
 /// By which a database, or a client, says what a campaign's model is. All of it may be anything.
 struct ModelRecord {
   std::string version = {};
@@ -142,10 +151,9 @@ struct ModelRecord {
 };
 
 /// The model of a campaign from elsewhere: that of models() if it is there; else what is said of
-/// it. It lives as long as the program, as do the texts of its results; the same record yields the
-/// same model.
-/// @throws ModelProgramError `is of the model ...` if there is no description of it, or one that
-///         breaks a rule; or if this program has read too many.
+/// it, see described_model().
+/// @throws DefinitionError `is of the model ...` if there is no description of it, or one that
+///         breaks a rule.
 [[nodiscard]] const Model& recorded_model(const ModelRecord& record);
 
 }  // namespace proofmass::wire

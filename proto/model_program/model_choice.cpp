@@ -31,10 +31,6 @@ std::vector<ChosenModel>& chosen_models() {
   return chosen;
 }
 
-std::filesystem::path whole_path(std::string_view named) {
-  return std::filesystem::absolute(named).lexically_normal();
-}
-
 /// Of the arguments, or else of the variable, with colons between them.
 std::vector<std::string> named_programs(int argc, const char* const* argv) {
   std::vector<std::string> programs;
@@ -54,14 +50,22 @@ std::vector<std::string> named_programs(int argc, const char* const* argv) {
 
 }  // namespace
 
-void choose_models(int argc, const char* const* argv) {
+std::vector<std::string> choose_models(int argc, const char* const* argv, Broken broken) {
   std::vector<ChosenModel>& chosen = chosen_models();
   std::vector<const Model*> used;
+  std::vector<std::string> left_out;
   for (const std::string& named : named_programs(argc, argv)) {
-    const std::filesystem::path program = whole_path(named);
+    const std::filesystem::path program = std::filesystem::absolute(named).lexically_normal();
     if (std::ranges::find(chosen, program, &ChosenModel::program) != chosen.end()) continue;
     settle_surroundings();  // Its pipes are to be no standard descriptors.
-    std::unique_ptr<const Model> model = model_of(program);
+    std::unique_ptr<const Model> model;
+    try {
+      model = model_of(program);
+    } catch (const Error& error) {
+      if (broken == Broken::refused) throw;
+      left_out.emplace_back(error.what());
+      continue;
+    }
     const auto has_its_version = [&](const Model* other) {
       return other->version() == model->version();
     };
@@ -77,6 +81,7 @@ void choose_models(int argc, const char* const* argv) {
     chosen.push_back({.program = program, .model = std::move(model)});
   }
   use_models(std::move(used));
+  return left_out;
 }
 
 void add_model_programs(std::vector<std::string>& arguments) {
@@ -99,27 +104,13 @@ std::size_t slots_per_thread() {
 }
 
 void add_model_program_option(CLI::App& app) {
-  app.add_option_function<std::vector<std::string>>(
-         std::string(option),
-         [](const std::vector<std::string>& named) {
-           // An argument of a command hides the variable, which this option is given all the same.
-           const std::vector<std::string> of_variable = named_programs(0, nullptr);
-           for (const std::string& program : named) {
-             if (std::ranges::find(of_variable, program) != of_variable.end()) continue;
-             if (std::ranges::find(chosen_models(), whole_path(program), &ChosenModel::program) !=
-                 chosen_models().end()) {
-               continue;
-             }
-             throw InvalidArgument("model-program = " + program +
-                                   " (must be an argument or the variable " + variable +
-                                   ", as it decides what other options mean)");
-           }
-         },
-         "Program that simulates a model of its own; may be\ngiven several times")
+  static std::vector<std::string> followed;  // By choose_models().
+  app.add_option(std::string(option), followed,
+                 "Program that simulates a model of its own; may be\ngiven several times")
       ->type_name(file_type)
       ->envname(variable)
-      ->delimiter(':')
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->configurable(false);
 }
 
 }  // namespace proofmass::wire

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -16,11 +17,16 @@ class Model;
 
 namespace proofmass::wire {
 
+/// What becomes of a program of which model_of() makes no model.
+enum class Broken : std::uint8_t { refused, left_out };
+
 /// Puts the models of the programs before the built-in one which the options `--model-program PATH`
 /// or, without any, the variable PROOFMASS_MODEL_PROGRAM name, the latter with colons between them.
 /// To be called first, by one thread: help texts and options depend on the models.
-/// @throws ModelProgramError as model_of() does; InvalidArgument if two have one version.
-void choose_models(int argc, const char* const* argv);
+/// @return Of each program that is left out, what is wrong with it.
+/// @throws What model_of() does; InvalidArgument if two have one version.
+[[nodiscard]] std::vector<std::string> choose_models(int argc, const char* const* argv,
+                                                     Broken broken);
 
 /// Appends the options that name the programs of choose_models(), for a program that this process
 /// starts.

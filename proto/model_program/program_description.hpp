@@ -12,6 +12,10 @@
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
 
+namespace proofmass {
+class Document;
+}  // namespace proofmass
+
 namespace proofmass::wire {
 
 /// A model program cannot be started, ended, is silent, answers what it must not, or is not there.
@@ -73,8 +77,14 @@ struct ProgramDescription {
   }
 };
 
+/// The name of a quantity, parameter or stream, as files and SQL can have it; empty if it is
+/// refused.
+/// @param path  Of what has it.
+[[nodiscard]] std::string read_name(Document& document, const std::string& path);
+
 /// @param answer  JSON that a program answered or a database holds: anything at all.
-/// @throws ModelProgramError naming field, value and rule.
-[[nodiscard]] ProgramDescription description_in(std::string_view answer);
+/// @param source  For messages: where it is from.
+/// @throws DefinitionError naming source, field, value and rule, also of a key that is none.
+[[nodiscard]] ProgramDescription description_in(std::string_view answer, const std::string& source);
 
 }  // namespace proofmass::wire

@@ -193,12 +193,13 @@ std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> r
 std::unique_ptr<const Model> model_of(const std::filesystem::path& path) {
   constexpr ProgramLimits while_describing{.answer_time_max_s = 60};
   const std::filesystem::path program = std::filesystem::absolute(path);
+  const std::string source = program.string() + ": description";
   ProgramDescription description;
   ProgramProcess(program, while_describing)
       .ask({Json{{"ask", "describe"}}.dump()},
-           [&](std::string_view answer) { description = description_in(answer); });
+           [&](std::string_view answer) { description = description_in(answer, source); });
   if (!description.imported_from.empty()) {
-    throw ModelProgramError("description: imported_from (must not be there: a program computes)");
+    throw DefinitionError(source + ": imported_from (must not be there: a program computes)");
   }
   return std::make_unique<DescribedModel>(
       std::move(description), std::nullopt, [program](const DescribedCampaign& campaign) {

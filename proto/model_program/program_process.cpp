@@ -8,13 +8,16 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
 
+#include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
 
@@ -32,8 +35,8 @@ std::pair<Descriptor, Descriptor> connected_pair() {
       fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
 }
 
-/// A pipe: what holds its first end can be killed when its second end is closed.
-std::pair<Descriptor, Descriptor> life_pipe() {
+/// A pipe: its first end is told what the second one writes, and when that is closed.
+std::pair<Descriptor, Descriptor> new_pipe() {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) == 0) return {Descriptor(ends[0]), Descriptor(ends[1])};
   throw ModelProgramError(
@@ -49,17 +52,39 @@ void kill_at_end_of(int pipe, pid_t group) {
   fcntl(pipe, F_SETFL, O_ASYNC);
 }
 
+constexpr std::size_t first_errors_size_max = 65536;
+constexpr std::size_t last_errors_size_max = 4096;
+
 }  // namespace
+
+void ErrorOutput::take(std::string_view text) {
+  const std::size_t shown =
+      std::min(text.size(), first_errors_size_max - std::min(first_errors_size_max, size_));
+  say_on(stderr, text.substr(0, shown));
+  size_ += text.size();
+  last_ += text.substr(shown);
+  if (last_.size() > last_errors_size_max) last_.erase(0, last_.size() - last_errors_size_max);
+}
+
+void ErrorOutput::end(std::string_view program) {
+  const std::size_t shown = first_errors_size_max + last_.size();
+  if (size_ > shown) {
+    say(fmt::format("\n{}: {} bytes of its standard error are left out here\n", program,
+                    size_ - shown));
+  }
+  say_on(stderr, last_);
+}
 
 ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
     : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
   auto [questions, its_input] = connected_pair();
   auto [answers, its_output] = connected_pair();
-  auto [its_lifeline, lifeline] = life_pipe();
+  auto [errors, its_errors] = new_pipe();
+  auto [its_lifeline, lifeline] = new_pipe();
   try {
     process_id_ = start_program({.arguments = {name_},
                                  .descriptors = {its_input.number(), its_output.number(),
-                                                 STDERR_FILENO, its_lifeline.number()},
+                                                 its_errors.number(), its_lifeline.number()},
                                  .environment = environment_without_settings(),
                                  .has_own_group = true});
   } catch (const Error& error) {
@@ -68,16 +93,21 @@ ProgramProcess::ProgramProcess(const std::filesystem::path& program, const Progr
   kill_at_end_of(its_lifeline.number(), process_id_);
   questions_ = std::move(questions);
   answers_ = std::move(answers);
+  errors_ = std::move(errors);
   lifeline_ = std::move(lifeline);
+  fcntl(errors_.number(), F_SETFL, O_NONBLOCK);
   const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
   const rlimit memory{memory_max, memory_max};
   prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
 }
 
 ProgramProcess::~ProgramProcess() {
-  if (process_id_ == 0) return;
-  kill(process_id_, SIGKILL);
-  (void)wait_for_end(process_id_);
+  if (process_id_ != 0) {
+    kill(process_id_, SIGKILL);
+    (void)wait_for_end(process_id_);
+  }
+  pass_on_errors();
+  error_output_.end(name_);
 }
 
 std::string ProgramProcess::how_it_ended() {
@@ -124,6 +154,14 @@ void ProgramProcess::read_some() {
   }
 }
 
+void ProgramProcess::pass_on_errors() {
+  std::array<char, 65536> part;  // NOLINT: read() fills it.
+  // No more than once what a pipe holds: a program may print without an end.
+  const ssize_t size = read(errors_.number(), part.data(), part.size());
+  if (size > 0) error_output_.take({part.data(), static_cast<std::size_t>(size)});
+  if (size == 0) errors_ = Descriptor();  // It has closed it.
+}
+
 void ProgramProcess::ask(const std::vector<std::string>& questions,
                          const std::function<void(std::string_view answer)>& on_answer) {
   using Clock = std::chrono::steady_clock;
@@ -134,14 +172,17 @@ void ProgramProcess::ask(const std::vector<std::string>& questions,
   std::size_t num_answered = 0;
   Clock::time_point deadline = Clock::now() + answer_time_max_;
   while (num_answered < questions.size()) {
-    std::array<pollfd, 2> ends{{{answers_.number(), POLLIN, 0}, {questions_.number(), POLLOUT, 0}}};
+    std::array<pollfd, 3> ends{{{answers_.number(), POLLIN, 0},
+                                {errors_.number(), POLLIN, 0},
+                                {questions_.number(), POLLOUT, 0}}};
     const auto left =
         std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) {
       fail(fmt::format("no answer within {} s", answer_time_max_.count()));
     }
-    poll(ends.data(), unsent.empty() ? 1 : 2, static_cast<int>(left.count()));
-    if (ends[1].revents != 0) write_some(unsent);
+    poll(ends.data(), unsent.empty() ? 2 : 3, static_cast<int>(left.count()));
+    if (ends[2].revents != 0) write_some(unsent);
+    if (ends[1].revents != 0) pass_on_errors();
     if (ends[0].revents != 0) read_some();
     std::size_t begin = 0;
     for (std::size_t end = 0; (end = received_.find('\n', begin)) != std::string::npos;) {

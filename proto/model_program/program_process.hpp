@@ -14,9 +14,22 @@
 
 namespace proofmass::wire {
 
+/// What a program prints as standard error: its first part is passed on as it comes, and its last
+/// part in the end, with the number of bytes that are left out between them.
+class ErrorOutput {
+ public:
+  void take(std::string_view text);
+  void end(std::string_view program);
+
+ private:
+  std::size_t size_ = 0;  // Of all that was taken.
+  std::string last_;      // Behind the first part.
+};
+
 /// A model program that runs as a child of this process: it reads questions from its standard
 /// input, a line each, and answers each with a line, in their order. What it prints as standard
-/// error is that of this process. It does not outlive this process, however that ends.
+/// error becomes that of this process, up to a limit. It does not outlive this process, however
+/// that ends.
 class ProgramProcess {
  public:
   /// @throws ModelProgramError if it cannot be started.
@@ -37,6 +50,7 @@ class ProgramProcess {
  private:
   void write_some(std::string_view& text) const;
   void read_some();
+  void pass_on_errors();
   void expect_silence() const;
   [[nodiscard]] std::string how_it_ended();
   [[noreturn]] void fail(std::string_view reason) const;
@@ -46,8 +60,10 @@ class ProgramProcess {
   pid_t process_id_ = 0;  // 0 once it has ended.
   Descriptor questions_;
   Descriptor answers_;
+  Descriptor errors_;
   Descriptor lifeline_;
   std::string received_;  // Behind the last line that was taken.
+  ErrorOutput error_output_;
 };
 
 }  // namespace proofmass::wire

@@ -28,9 +28,9 @@ bool matches(const std::string& text, const char* pattern) {
 
 // The parts of core, and those of the model in core/microscope: each may include those before it.
 // A part is a folder, or the files of that name beside the folders.
-constexpr std::array<std::string_view, 11> core_order{
-    "error",    "runs",       "math",  "random",       "signal",    "statistics",
-    "campaign", "definition", "model", "result_rules", "microscope"};
+constexpr std::array<std::string_view, 12> core_order{
+    "error",    "runs",       "math",  "random",       "signal",         "statistics",
+    "campaign", "definition", "model", "result_rules", "settings_model", "microscope"};
 constexpr std::array<std::string_view, 13> microscope_order{
     "orbit",    "environment",      "session",       "results",    "instrument",
     "control",  "estimation",       "campaign",      "simulation", "definition",

@@ -290,8 +290,10 @@ int say_cancelled(const Store& store, std::uint64_t failures_max) {
 
 /// That of a program is needed to make or open a database, and takes as long as the program does:
 /// it is computed before signals are caught.
-void compute_reference_digest(const Model& model) {
-  if (!model.description().empty()) (void)model.reference_digest(best_instruction_set());
+void compute_reference_digest(const Model& model, const RunOptions& options) {
+  if (model.description().empty()) return;
+  if (!options.is_quiet) say_reference_runs(model);
+  (void)model.reference_digest(best_instruction_set());
 }
 
 /// A part must be of the campaign. With a stop rule it would not be known which runs there will be.
@@ -360,7 +362,7 @@ int run_campaign(const RunOptions& options) {
   (void)page_config_of(options.page);  // Before any file is made.
   const std::filesystem::path database = database_of(options);
   const std::uint64_t num_runs = campaign->num_runs;
-  compute_reference_digest(campaign->model());
+  compute_reference_digest(campaign->model(), options);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   std::unique_ptr<RunStart> start;

@@ -52,6 +52,7 @@ proto::RequestEnvelope submit_request(const SubmitOptions& options, const Campai
   wire::set_definition(campaign.definition(TableColumns::included), submit);
   const Model& model = campaign.model();
   if (!model.description().empty()) {
+    say_reference_runs(model);
     submit.set_model_description(std::string(model.description()));
     submit.set_reference_digest(model.reference_digest(best_instruction_set()));
   }

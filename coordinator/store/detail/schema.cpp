@@ -148,7 +148,7 @@ StoredKind stored_kind(const Database& database, std::int64_t version) {
                               .description = row.text(2),
                               .reference_digest = reference_digest_in(database, row.text(3))});
     return {.model = &model, .results = model.results_of(row.text(0), row.text(1))};
-  } catch (const wire::ModelProgramError& error) {
+  } catch (const DefinitionError& error) {
     database.refuse(error.what());
   }
 }

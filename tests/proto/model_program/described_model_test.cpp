@@ -43,7 +43,7 @@ std::unique_ptr<Campaign> example_of(const Model& model) {
 std::string refusal_of(const std::string& text) {
   try {
     (void)ruler(text);
-  } catch (const ModelProgramError& error) {
+  } catch (const DefinitionError& error) {
     return error.what();
   }
   return "accepted";
@@ -171,19 +171,30 @@ TEST(RecordedModel, IsRefusedIfItsDescriptionBreaksARule) {
   struct {
     std::string text, reason;
   } const cases[] = {
-      {"DROP TABLE campaign", "description: no JSON"},
-      {"[]", "answer = [] (must be an object)"},
+      {"DROP TABLE campaign", "description: is no object of JSON"},
+      {"[]", "description: is no object of JSON"},
       {description(R"("version": "2")"), "description: of ruler-2"},
       {description(R"("version": "1\u001b[2J")"), "(must be a text of one line"},
       {description(R"("version": "1\u202e")"), "(must be a text of one line"},
-      {description(R"("quantities": [)" + many + "]"), "must be a list of at most 63"},
+      {description(R"("quantities": [)" + many + "]"),
+       "quantities = 1000 tables (must be at most 63)"},
       {description(R"("quantities": [{"name": "x); DROP TABLE campaign; --", "truth": "1"}])"),
        "must be 1 to 64 of [a-z0-9_], a letter first"},
       {description(R"("quantities": [{"name": "q", "truth": "x"}])"),
        "x is neither drawn nor a parameter"},
-      {description(R"("drawn": [{"name": "scale", "law": "table", "column": "/etc/passwd"}])"),
+      {description(
+           R"("drawn": [{"name": "scale", "law": "table", "file": "/etc", "column": "passwd"}])"),
        "drawn[0].law = \"table\""},
       {description(R"("quantities": )" + deep), "quantities"},
+      {description(R"("colour": "red")"), "description: colour = \"red\" (unknown key"},
+      {description(R"("drawn": [{"name": "scale", "law": "fixed", "value": 3, "units": "m"}])"),
+       "drawn[0].units = \"m\" (unknown key; nearest is drawn[0].unit)"},
+      {description(R"("drawn": [{"name": "scale", "law": "fixed", "value": 3, "mean": 3}])"),
+       "drawn[0].mean = 3 (not a key of law fixed, which has value)"},
+      {description(R"("drawn": [{"name": "scale", "law": "uniform", "minimum": 3}])"),
+       "drawn[0].maximum is missing"},
+      {description(R"("drawn": [{"name": "scale", "value": 3}])"), "drawn[0].law is missing"},
+      {description(R"("purpose": null)"), "purpose = null (must have a value, or be left out)"},
       {description(R"("purpose": ")" + std::string(answer_size_max, 'x') + R"(")"),
        "(must be at most 1048576)"}};
   for (const auto& [text, reason] : cases) {

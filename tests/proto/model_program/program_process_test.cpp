@@ -14,16 +14,22 @@
 namespace proofmass::wire {
 namespace {
 
-/// A pipe whose writing end is the standard error of what is started: it is at its end when the
-/// last of them has ended.
-class ErrorPipe {
- public:
-  ErrorPipe() { EXPECT_EQ(pipe2(ends_.data(), O_CLOEXEC), 0); }
-  ~ErrorPipe() { close(ends_[0]); }
-  ErrorPipe(const ErrorPipe&) = delete;
-  ErrorPipe& operator=(const ErrorPipe&) = delete;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
-  void use_as_standard_error() const { dup2(ends_[1], STDERR_FILENO); }
+constexpr int inherited = 9;  // A descriptor that programs have of whoever starts them.
+
+/// A pipe whose writing end is a descriptor of what is started: it is at its end when the last of
+/// them has ended.
+class SignOfLife {
+ public:
+  SignOfLife() { EXPECT_EQ(pipe2(ends_.data(), O_CLOEXEC), 0); }
+  ~SignOfLife() { close(ends_[0]); }
+  SignOfLife(const SignOfLife&) = delete;
+  SignOfLife& operator=(const SignOfLife&) = delete;
+
+  void hand_down() const { dup2(ends_[1], inherited); }
   void close_writing_end() { close(std::exchange(ends_[1], -1)); }
   /// The next character, 0 at the end; nothing if neither comes within a while.
   [[nodiscard]] std::optional<char> next() const {
@@ -52,22 +58,43 @@ class ProgramProcessTest : public testing::Test {
 // It starts another program, neither reads its input, and signals do not reach their group.
 TEST_F(ProgramProcessTest, DoesNotOutliveAProcessThatIsKilled) {
   const std::filesystem::path hanging =
-      program("sleep 1000 &\nprintf s >&2\nwhile :; do sleep 1000; done\n");
-  ErrorPipe errors;
+      program("sleep 1000 &\nprintf s >&9\nwhile :; do sleep 1000; done\n");
+  SignOfLife sign;
   const pid_t parent = fork();
   if (parent == 0) {
-    errors.use_as_standard_error();
+    sign.hand_down();
     const ProgramProcess process(hanging, {});
-    (void)!write(STDERR_FILENO, "p", 1);
+    (void)!write(inherited, "p", 1);
     pause();
   }
-  errors.close_writing_end();
-  const std::set<std::optional<char>> are_there{errors.next(), errors.next()};
+  sign.close_writing_end();
+  const std::set<std::optional<char>> are_there{sign.next(), sign.next()};
   ASSERT_THAT(are_there, testing::UnorderedElementsAre('p', 's'));
   kill(parent, SIGKILL);
   waitpid(parent, nullptr, 0);
 
-  EXPECT_EQ(errors.next(), '\0');
+  EXPECT_EQ(sign.next(), '\0');
+}
+
+// Some 400 kB in lines of 8 bytes, half of it before its only answer.
+TEST_F(ProgramProcessTest, PassesOnTheFirstAndTheLastOfWhatAProgramPrints) {
+  const std::filesystem::path chatty = program(
+      "seq 1000000 1024999 >&2\nread -r question\nseq 1025000 1049999 >&2\necho\nexec sleep "
+      "1000\n");
+  testing::internal::CaptureStderr();
+
+  {
+    ProgramProcess process(chatty, {});
+    process.ask({"?"}, [](std::string_view) {});
+  }
+
+  const std::string printed = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(printed, StartsWith("1000000\n1000001\n"));
+  EXPECT_THAT(printed, HasSubstr("\n1008191\n\n/"));  // 65,536 bytes are 8,192 lines.
+  EXPECT_THAT(
+      printed,
+      HasSubstr("/program: 330368 bytes of its standard error are left out here\n1049488\n"));
+  EXPECT_THAT(printed, EndsWith("\n1049998\n1049999\n"));
 }
 
 // Threads hand programs on to one another.

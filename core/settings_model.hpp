@@ -2,19 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/recording.hpp"
-#include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
+#include "core/definition/entry.hpp"
 #include "core/model.hpp"
 
 namespace proofmass {
@@ -25,18 +23,27 @@ namespace proofmass {
 //
 //     static constexpr std::string_view name, version, purpose, step_name, example_file;
 //     static constexpr std::uint64_t num_runs;                // Of the example campaign.
+//     static constexpr std::size_t batch_size;                // Runs that are simulated together.
 //     static std::span<const SettingInfo<Settings>> infos();  // Its keys, each table's together.
 //     static std::span<const DrawnQuantity> drawn();
 //     void check() const;                 // Throws ConfigError: the rules about several keys.
 //     ResultSchema results() const;       // With the objectives.
 //     std::int64_t num_rounds_max() const;
-//     std::vector<double> means() const;  // Of each drawn quantity; deviations() likewise.
+//     std::vector<Dispersion> laws() const;  // Of each drawn quantity, none of another one.
 //     std::vector<double> truth(std::span<const double> drawn) const;
 //     Settings reference() const;         // Short, for the digest.
 //     using Simulator = ...;
 //
 // A Simulator is what runs share: made of Settings, with `Recording recording`, `int num_steps()`
 // and `RunResult operator()(seed, run, draw, sink) const`.
+
+/// The law normal; a deviation of 0 stands for a value that is known.
+[[nodiscard]] inline Dispersion normal_law(double mean, double standard_deviation) {
+  Dispersion law{.law = standard_deviation > 0.0 ? Law::normal : Law::fixed};
+  law.mean = law.value = mean;
+  law.standard_deviation = standard_deviation;
+  return law;
+}
 
 /// A key of the campaign file and where its value is.
 template <typename Settings>
@@ -67,29 +74,15 @@ class SettingsCampaign final : public Campaign {
   }
   [[nodiscard]] std::unique_ptr<const Plan> prepare() const override;
   [[nodiscard]] Definition definition(TableColumns /*columns*/) const override {
-    return {.text = text(Comments::left_out)};
+    return {.text = detail::text_of(entries(), "")};
   }
   [[nodiscard]] std::vector<DefinitionItem> items() const override {
-    std::vector<DefinitionItem> items{{"campaign.name", name},
-                                      {"campaign.seed", static_cast<std::int64_t>(seed)},
-                                      {"campaign.runs", static_cast<std::int64_t>(num_runs)}};
-    for (const auto& info : Settings::infos()) {
-      items.push_back({std::string(info.field.path), settings.*info.value});
-    }
-    return items;
+    return detail::items_of(entries());
   }
   [[nodiscard]] std::vector<DefinitionDifference> differences_from(
       const Campaign& other) const override {
-    const std::vector<DefinitionItem> mine = items(), others = other.items();
-    std::vector<DefinitionDifference> differences;
-    for (std::size_t i = 0; i < mine.size(); ++i) {
-      const std::string& key = mine[i].key;
-      if (mine[i].value == others[i].value || key == "campaign.runs") continue;
-      const bool is_identity = key.starts_with("campaign.");
-      differences.push_back({key.substr(is_identity ? 9 : 0), value_text(mine[i].value),
-                             value_text(others[i].value)});
-    }
-    return differences;
+    return detail::differences_between(entries(),
+                                       dynamic_cast<const SettingsCampaign&>(other).entries());
   }
   [[nodiscard]] ResultSchema results() const override { return settings.results(); }
   [[nodiscard]] std::vector<double> objectives() const override {
@@ -101,45 +94,23 @@ class SettingsCampaign final : public Campaign {
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override { return {}; }
 
   [[nodiscard]] RunDraw draw(RunIndex run) const override {
-    const std::vector<double> means = settings.means(), deviations = settings.deviations();
     RunDraw draw{.num_draws = 1};
-    for (std::size_t i = 0; i < means.size(); ++i) {
-      // A deviation of 0 stands for a value that is known.
-      Dispersion law{.law = deviations[i] > 0.0 ? Law::normal : Law::fixed};
-      law.mean = law.value = means[i];
-      law.standard_deviation = deviations[i];
-      draw.values.push_back(draw_value(law, Settings::drawn()[i].name, seed, run, 0, 0.0));
+    for (const Dispersion& law : settings.laws()) {
+      const std::string_view of = Settings::drawn()[draw.values.size()].name;
+      draw.values.push_back(draw_value(law, of, seed, run, 0, 0.0));
     }
     draw.truth = settings.truth(draw.values);
     return draw;
   }
 
-  enum class Comments { included, left_out };
-
-  /// All of the campaign as TOML; without comments it is the one form that campaign_of() takes.
-  [[nodiscard]] std::string text(Comments comments) const {
-    std::string text, table;
-    const auto infos = Settings::infos();
-    const std::vector<DefinitionItem> all = items();
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      const std::size_t dot = all[i].key.find('.');
-      if (std::exchange(table, all[i].key.substr(0, dot)) != all[i].key.substr(0, dot)) {
-        text += fmt::format("{}[{}]\n", comments == Comments::included && i > 0 ? "\n" : "", table);
-      }
-      text += fmt::format("{} = {}", all[i].key.substr(dot + 1), value_text(all[i].value));
-      if (comments == Comments::included && i >= all.size() - infos.size()) {
-        text += fmt::format("  # {}", infos[i + infos.size() - all.size()].field.comment);
-      }
-      text += "\n";
+  /// The keys of its campaign file.
+  [[nodiscard]] std::vector<detail::Entry> entries() const {
+    std::vector<detail::Entry> entries = detail::campaign_entries(*this);
+    for (const auto& [field, value] : Settings::infos()) {
+      entries.push_back(
+          detail::real_entry(field.path, settings.*value, std::string(field.comment)));
     }
-    return text;
-  }
-
- private:
-  [[nodiscard]] static std::string value_text(const DefinitionValue& value) {
-    if (const auto* const whole = std::get_if<std::int64_t>(&value)) return fmt::to_string(*whole);
-    if (const auto* const number = std::get_if<double>(&value)) return detail::number_text(*number);
-    return detail::quoted_text(std::get<std::string>(value));
+    return entries;
   }
 };
 
@@ -197,7 +168,7 @@ class SettingsModel final : public Model {
   [[nodiscard]] std::span<const DataTableSchema> tables() const override { return {}; }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return Settings::drawn(); }
   [[nodiscard]] std::string_view step_name() const override { return Settings::step_name; }
-  [[nodiscard]] std::size_t batch_size() const override { return 1; }
+  [[nodiscard]] std::size_t batch_size() const override { return Settings::batch_size; }
 
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override {
     SettingsCampaign<Settings> campaign;
@@ -222,21 +193,17 @@ class SettingsModel final : public Model {
     return read(document);
   }
   [[nodiscard]] std::string example() const override {
-    using Example = SettingsCampaign<Settings>;
-    return Example().text(Example::Comments::included);
+    return detail::text_of(SettingsCampaign<Settings>().entries(), "\n",
+                           detail::Comments::included);
   }
   [[nodiscard]] std::string_view example_file() const override { return Settings::example_file; }
 
  private:
   [[nodiscard]] static std::unique_ptr<SettingsCampaign<Settings>> read(Document& document) {
     auto campaign = std::make_unique<SettingsCampaign<Settings>>();
-    auto seed = static_cast<std::int64_t>(campaign->seed);
-    auto num_runs = static_cast<std::int64_t>(campaign->num_runs);
     document.read("campaign.name", campaign->name);
-    document.read("campaign.seed", seed, range::not_negative);
-    document.read("campaign.runs", num_runs, range::between(1, double{num_runs_max}));
-    campaign->seed = static_cast<std::uint64_t>(seed);
-    campaign->num_runs = static_cast<std::uint64_t>(num_runs);
+    document.read("campaign.seed", campaign->seed, range::not_negative);
+    document.read("campaign.runs", campaign->num_runs, range::between(1, double{num_runs_max}));
     for (const auto& info : Settings::infos()) {
       document.read(std::string(info.field.path), campaign->settings.*info.value, info.field.range);
     }
