@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,23 +33,15 @@ void share(std::vector<Shared>& all, const std::string& text, const std::string&
 std::vector<std::pair<std::string, std::vector<Shared>>> differing_keys(
     std::span<const ComparedMember> members, const MemberNames& names) {
   std::vector<std::pair<std::string, std::vector<Shared>>> keys;
-  const auto values_of = [&](const DefinitionDifference& difference) -> std::vector<Shared>& {
-    for (auto& [key, values] : keys) {
-      if (key == difference.field) return values;
-    }
-    return keys.emplace_back(difference.field, std::vector<Shared>()).second;
-  };
   for (const ComparedMember& member : members.subspan(1)) {
-    for (const auto& difference : member.comparison->differences) (void)values_of(difference);
+    for (const auto& [field, of_first, of_other] : member.comparison->differences) {
+      const bool is_new =
+          std::ranges::none_of(keys, [&](const auto& key) { return key.first == field; });
+      if (is_new) keys.push_back({field, {{of_first, {names.names.front()}}}});
+    }
   }
   for (auto& [key, values] : keys) {
-    std::string of_first;
-    for (const ComparedMember& member : members.subspan(1)) {
-      for (const auto& difference : member.comparison->differences) {
-        if (difference.field == key) of_first = difference.first;
-      }
-    }
-    share(values, of_first, names.names.front());
+    const std::string of_first = values.front().first;
     for (std::size_t i = 1; i < members.size(); ++i) {
       const auto& differences = members[i].comparison->differences;
       const auto own = std::ranges::find(differences, key, &DefinitionDifference::field);
@@ -64,16 +55,10 @@ Table definition_table(std::span<const ComparedMember> members, const MemberName
   const auto keys = differing_keys(members, names);
   if (keys.empty()) return {.remarks = {{"The definitions agree."}}};
   Table table{.columns = {{"the definitions differ in", true}, {"value", true}, {"of", true}}};
-  constexpr std::size_t value_begin = 40;  // Leaves room for most keys, and for the campaigns.
   for (const auto& [key, values] : keys) {
     for (const auto& [value, of] : values) {
       const bool is_first = &value == &values.front().first;
-      table.rows.push_back({is_first ? key : "", "", fmt::format("{}", fmt::join(of, " "))});
-      std::istringstream lines(wrapped(value, value_begin, value_begin));
-      for (std::string line; std::getline(lines >> std::ws, line);) {
-        if (!table.rows.back()[1].text.empty()) table.rows.push_back({"", "", ""});
-        table.rows.back()[1] = line;
-      }
+      table.rows.push_back({is_first ? key : "", value, fmt::format("{}", fmt::join(of, " "))});
     }
   }
   return table;
@@ -192,8 +177,9 @@ std::vector<Quantity> all_quantities(std::span<const ComparedMember> members) {
 
 /// The p-value, and a mark if it is significant.
 void add_p(double p_value, Row& row) {
-  row.emplace_back(measured_figure(p_value));
-  row.emplace_back(p_value < significance ? " *" : "", Tone::changed);
+  const bool is_significant = p_value < significance;
+  row.emplace_back(measured_figure(p_value) + (is_significant ? " *" : "  "),
+                   is_significant ? Tone::changed : Tone::plain);
 }
 
 std::string percent(std::size_t count, std::size_t of) {
@@ -246,8 +232,7 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
                           {"change", false, 10},
                           {"from", false, 10},
                           {"to", false, 10},
-                          {"p", false, 9},
-                          {"", true, 2}},
+                          {"p  ", false, 11}},
                          add_cells);
   table.notes.push_back(fmt::format(
       "from, to: 95 % interval of the change from {}; p: Student's t of pairs; as a whole also "
@@ -276,13 +261,11 @@ Table scatter_table(std::span<const ComparedMember> members, const MemberNames& 
   Table table = table_of(
       members, names, "Scatter and tail: standard deviation of estimate − truth, and runs far off",
       {{"std", false, 8},
-       {"p", false, 8},
-       {"", true, 2},
+       {"p  ", false, 10},
        {"found", false, 8},
        {"tail " + first, false, 8},
        {"tail", false, 8},
-       {"p", false, 8},
-       {"", true, 2}},
+       {"p  ", false, 10}},
       add_cells);
   table.notes = {
       fmt::format(
@@ -346,7 +329,7 @@ MemberNames lettered(std::size_t count) {
 
 std::string comparison_text(std::span<const ComparedMember> members, const MemberNames& names,
                             Paint paint) {
-  const TerminalStyle style{.paint = paint};
+  const TerminalStyle style = document_style(paint);
   std::string text = terminal_text(campaign_table(members, names), style) + "\n" +
                      terminal_text(definition_table(members, names), style);
   if (std::ranges::any_of(members, has_changes)) {

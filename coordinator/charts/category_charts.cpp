@@ -25,9 +25,8 @@ double opacity_of_series(std::size_t index) {
 std::vector<LegendEntry> legend_of_series(const BarChart& chart) {
   std::vector<LegendEntry> entries;
   for (std::size_t i = 0; i < chart.series.size(); ++i) {
-    entries.push_back({.name = chart.series[i].name,
-                       .ink = chart.series[i].ink,
-                       .opacity = opacity_of_series(i)});
+    entries.push_back(
+        {.name = chart.series[i].name, .ink = chart.series[i].ink, .look = opacity_of_series(i)});
   }
   return entries;
 }

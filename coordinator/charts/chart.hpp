@@ -42,20 +42,13 @@ struct Bars {
   Ink ink = Ink::first;
 };
 
-/// Points joined by straight lines. A point that is not finite, or not above 0 on a logarithmic
-/// axis, ends the line; the next one begins it anew.
-struct Line {
+/// Points joined by straight lines, or marked. A point that is not finite, or not above 0 on a
+/// logarithmic axis, ends the line; the next one begins it anew.
+struct Curve {
   std::string name = {};  ///< In the legend; if empty, it is not listed there.
   std::vector<Point> points = {};
   Ink ink = Ink::first;
-  Dash dash = Dash::solid;
-};
-
-struct Markers {
-  std::string name = {};  ///< In the legend; if empty, it is not listed there.
-  std::vector<Point> points = {};
-  Ink ink = Ink::first;
-  Shape shape = Shape::triangle;
+  std::variant<Dash, Shape> look = Dash::solid;  ///< Of the line, or of each mark.
 };
 
 struct BandPoint {
@@ -79,7 +72,7 @@ struct LimitLine {
   Dash dash = Dash::dashed;
 };
 
-using Layer = std::variant<Bars, Line, Markers, Band, LimitLine>;
+using Layer = std::variant<Bars, Curve, Band, LimitLine>;
 
 /// What every chart has.
 struct ChartText {

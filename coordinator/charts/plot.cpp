@@ -20,11 +20,8 @@ struct Extents {
     y.add(0.0);
     has_data |= !bars.heights.empty();
   }
-  void add(const Line& line) {
-    for (const Point& point : line.points) add(point);
-  }
-  void add(const Markers& markers) {
-    for (const Point& point : markers.points) add(point);
+  void add(const Curve& curve) {
+    for (const Point& point : curve.points) add(point);
   }
   void add(const Band& band) {
     for (const BandPoint& point : band.points) {
@@ -49,18 +46,13 @@ Extents extents_of(const Chart& chart) {
 }
 
 LegendEntry entry_of(const Bars& bars) { return {.name = bars.name, .ink = bars.ink}; }
-LegendEntry entry_of(const Line& line) {
-  return {
-      .name = line.name, .sample = LegendEntry::Sample::line, .ink = line.ink, .dash = line.dash};
-}
-LegendEntry entry_of(const Markers& markers) {
-  return {.name = markers.name,
-          .sample = LegendEntry::Sample::marker,
-          .ink = markers.ink,
-          .shape = markers.shape};
+LegendEntry entry_of(const Curve& curve) {
+  LegendEntry entry{.name = curve.name, .ink = curve.ink};
+  std::visit([&](const auto look) { entry.look = look; }, curve.look);
+  return entry;
 }
 LegendEntry entry_of(const Band& band) {
-  return {.name = band.name, .ink = band.ink, .opacity = 0.25};
+  return {.name = band.name, .ink = band.ink, .look = 0.25};
 }
 LegendEntry entry_of(const LimitLine&) { return {}; }  // It has its label.
 
@@ -111,6 +103,11 @@ double label_margin(const AxisRange& range) {
   return width + 10.0;
 }
 
+bool is_marked(const Layer& layer) {
+  const auto* const curve = std::get_if<Curve>(&layer);
+  return curve != nullptr && std::holds_alternative<Shape>(curve->look);
+}
+
 void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
   writer.raw(fmt::format(
       "<clipPath id=\"{}-clip\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath>\n"
@@ -118,12 +115,12 @@ void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
       chart.text.id, coordinate(area.box.left), coordinate(area.box.top),
       coordinate(area.box.width), coordinate(area.box.height), chart.text.id));
   for (const Layer& layer : chart.layers) {
-    if (!std::holds_alternative<Markers>(layer)) draw_layer(layer, area, writer);
+    if (!is_marked(layer)) draw_layer(layer, area, writer);
   }
   writer.raw("</g>\n");
   // Half of a marker, and its label, may be outside of the axes.
   for (const Layer& layer : chart.layers) {
-    if (std::holds_alternative<Markers>(layer)) draw_layer(layer, area, writer);
+    if (is_marked(layer)) draw_layer(layer, area, writer);
   }
 }
 

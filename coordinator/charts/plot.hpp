@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/charts/svg_writer.hpp"
@@ -45,13 +46,9 @@ double draw_title(std::string_view title, Point corner, double width, SvgWriter&
 
 /// A line of the legend: how a layer looks, and its name.
 struct LegendEntry {
-  enum class Sample : std::uint8_t { area, line, marker };
   std::string name = {};
-  Sample sample = Sample::area;
   Ink ink = Ink::first;
-  Dash dash = Dash::solid;
-  Shape shape = Shape::triangle;
-  double opacity = 1.0;
+  std::variant<double, Dash, Shape> look = 1.0;  ///< An area of an opacity, a line or a mark.
 };
 
 /// @return The height that it took; 0 without entries.

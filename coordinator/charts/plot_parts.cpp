@@ -38,18 +38,14 @@ constexpr double sample_width = 22.0;
 void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
   const double middle = place.y - 4.5;
   const std::string colour = writer.colour(entry.ink);
-  switch (entry.sample) {
-    case LegendEntry::Sample::area:
-      writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
-                                entry.opacity, {.colour = colour, .width = 1.0});
-      return;
-    case LegendEntry::Sample::line:
-      writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
-                  {.colour = colour, .width = 2.0, .dash = entry.dash});
-      return;
-    case LegendEntry::Sample::marker:
-      writer.marker({place.x + 8.0, middle}, entry.shape, entry.ink);
-      return;
+  if (const auto* const shape = std::get_if<Shape>(&entry.look)) {
+    writer.marker({place.x + 8.0, middle}, *shape, entry.ink);
+  } else if (const auto* const dash = std::get_if<Dash>(&entry.look)) {
+    writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
+                {.colour = colour, .width = 2.0, .dash = *dash});
+  } else {
+    writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
+                              std::get<double>(entry.look), {.colour = colour, .width = 1.0});
   }
 }
 
@@ -171,26 +167,23 @@ void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
   }
 }
 
-void draw(const Line& line, const PlotArea& area, SvgWriter& writer) {
+void draw(const Curve& curve, const PlotArea& area, SvgWriter& writer) {
+  const auto* const shape = std::get_if<Shape>(&curve.look);
   std::string path;
   bool is_begun = false;
-  for (const Point& point : line.points) {
-    if (!area.x.has(point.x) || !area.y.has(point.y)) {
-      is_begun = false;
-      continue;
+  for (const Point& point : curve.points) {
+    const bool has_place = area.x.has(point.x) && area.y.has(point.y);
+    if (shape != nullptr) {
+      if (!area.x.contains(point.x) || !area.y.contains(point.y)) continue;
+      writer.marker({area.x.at(point.x), area.y.at(point.y)}, *shape, curve.ink);
+    } else if (has_place) {
+      path += place_text(is_begun ? 'L' : 'M', area.x.at(point.x), area.y.at(point.y));
     }
-    path += place_text(is_begun ? 'L' : 'M', area.x.at(point.x), area.y.at(point.y));
-    is_begun = true;
+    is_begun = has_place;
   }
   if (path.empty()) return;
-  writer.outline(path, {.colour = writer.colour(line.ink), .width = 2.0, .dash = line.dash});
-}
-
-void draw(const Markers& markers, const PlotArea& area, SvgWriter& writer) {
-  for (const Point& point : markers.points) {
-    if (!area.x.contains(point.x) || !area.y.contains(point.y)) continue;
-    writer.marker({area.x.at(point.x), area.y.at(point.y)}, markers.shape, markers.ink);
-  }
+  writer.outline(
+      path, {.colour = writer.colour(curve.ink), .width = 2.0, .dash = std::get<Dash>(curve.look)});
 }
 
 void draw(const Band& band, const PlotArea& area, SvgWriter& writer) {

@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
-#include <span>
+#include <utility>
 
 #include "coordinator/charts/svg.hpp"
 
@@ -56,66 +57,43 @@ ShownTime shown_time(const RecentAttempts& attempts) {
   return {.begin_s = std::min(begin_s, end_s - 1.0), .end_s = end_s};
 }
 
-std::vector<TimelineBar> bars_of(const AttemptLane& lane, double last_s) {
-  std::vector<TimelineBar> bars;
-  for (const PlacedAttempt& attempt : lane.attempts) {
-    bars.push_back(
-        {.begin = attempt.begin_s() - last_s,
-         .end = attempt.end_s - last_s,
-         .tooltip = fmt::format("{}, {:.3g} s, attempt {}", runs_text(attempt.computed->runs),
-                                attempt.computed->compute_s, attempt.computed->attempt.value)});
-  }
-  return bars;
-}
-
-std::vector<TimelineMark> losses_of(const RecentAttempts& attempts, std::uint64_t worker_key,
-                                    double last_s) {
-  std::vector<TimelineMark> marks;
-  for (const LostAttempt& lost : attempts.lost) {
-    if (lost.worker_key != worker_key) continue;
-    marks.push_back({.time = static_cast<double>(lost.lost_unix_s) - last_s,
-                     .tooltip = fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)});
-  }
-  return marks;
-}
-
-// Lanes end with the span of the chart: others have nothing to show.
-std::vector<AttemptLane> shown_lanes(const RecentAttempts& attempts, const ShownTime& shown) {
-  std::vector<AttemptLane> lanes = lanes_of(attempts);
-  std::erase_if(lanes, [&](const AttemptLane& lane) {
-    return lane.number > 0 && lane.attempts.front().end_s < shown.begin_s;
-  });
-  return lanes;
-}
-
 }  // namespace
 
-std::vector<AttemptLane> lanes_of(const RecentAttempts& attempts) {
+std::vector<TimelineLane> lanes_of(const RecentAttempts& attempts, double last_s) {
   // Backwards in time: a lane is free for what ends before its earliest attempt begins, or could
   // have, as far as the second is known.
   constexpr double shift_s_max = 1.0;
-  std::map<std::uint64_t, std::vector<AttemptLane>> lanes;
+  std::map<std::uint64_t, std::vector<TimelineLane>> lanes;
+  const auto lanes_of_worker = [&](std::uint64_t key) -> std::vector<TimelineLane>& {
+    std::vector<TimelineLane>& of_worker = lanes[key];
+    if (of_worker.empty()) of_worker.push_back({.label = worker_name(attempts, key)});
+    return of_worker;
+  };
   for (const LostAttempt& lost : attempts.lost) {
-    auto& of_worker = lanes[lost.worker_key];
-    if (of_worker.empty()) of_worker.push_back({.worker_key = lost.worker_key, .attempts = {}});
+    lanes_of_worker(lost.worker_key)
+        .front()
+        .marks.push_back(
+            {.time = static_cast<double>(lost.lost_unix_s) - last_s,
+             .tooltip = fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)});
   }
   for (const ComputedRuns& computed : attempts.computed) {
-    auto& of_worker = lanes[computed.worker_key];
-    const double end_s = end_of(computed);
-    const auto free_until = [&](const AttemptLane& lane) {
-      return lane.attempts.empty() ? end_s : std::min(end_s, lane.attempts.back().begin_s());
+    std::vector<TimelineLane>& of_worker = lanes_of_worker(computed.worker_key);
+    const double end_s = end_of(computed) - last_s;
+    const auto free_until = [&](const TimelineLane& lane) {
+      return lane.bars.empty() ? end_s : std::min(end_s, lane.bars.back().begin);
     };
-    auto lane = std::ranges::find_if(of_worker, [&](const AttemptLane& candidate) {
+    auto lane = std::ranges::find_if(of_worker, [&](const TimelineLane& candidate) {
       return free_until(candidate) >= end_s - shift_s_max;
     });
-    if (lane == of_worker.end()) {
-      of_worker.push_back(
-          {.worker_key = computed.worker_key, .number = of_worker.size(), .attempts = {}});
-      lane = std::prev(of_worker.end());
-    }
-    lane->attempts.push_back({.computed = &computed, .end_s = free_until(*lane)});
+    if (lane == of_worker.end()) lane = of_worker.insert(lane, TimelineLane());
+    const double placed_end_s = free_until(*lane);
+    lane->bars.push_back(
+        {.begin = placed_end_s - computed.compute_s,
+         .end = placed_end_s,
+         .tooltip = fmt::format("{}, {:.3g} s, attempt {}", runs_text(computed.runs),
+                                computed.compute_s, computed.attempt.value)});
   }
-  std::vector<AttemptLane> all;
+  std::vector<TimelineLane> all;
   for (auto& [key, of_worker] : lanes) std::ranges::move(of_worker, std::back_inserter(all));
   return all;
 }
@@ -125,8 +103,13 @@ std::string attempts_chart(const RecentAttempts& attempts) {
     return "<p class=\"note\">none yet</p>\n";
   }
   const ShownTime shown = shown_time(attempts);
-  const std::vector<AttemptLane> lanes = shown_lanes(attempts, shown);
-  const std::size_t num_shown = std::min(lanes.size(), chart_lanes_max);
+  std::vector<TimelineLane> lanes = lanes_of(attempts, shown.end_s);
+  // Lanes end with the span of the chart: others have nothing to show.
+  std::erase_if(lanes, [&](const TimelineLane& lane) {
+    return lane.label.empty() && lane.bars.front().end < shown.begin_s - shown.end_s;
+  });
+  const std::size_t num_lanes = lanes.size();
+  lanes.resize(std::min(num_lanes, chart_lanes_max));
   Timeline timeline{
       .text = {.id = "attempts",
                .title = "Attempts by worker",
@@ -135,20 +118,15 @@ std::string attempts_chart(const RecentAttempts& attempts) {
                                           attempts.workers.size(), shown.end_s - shown.begin_s)},
       .x = {.label = "time until the last result, s",
             .from = shown.begin_s - shown.end_s,
-            .to = 0.0}};
-  for (const AttemptLane& lane : std::span(lanes).first(num_shown)) {
-    TimelineLane& drawn = timeline.lanes.emplace_back();
-    drawn.bars = bars_of(lane, shown.end_s);
-    if (lane.number > 0) continue;
-    drawn.label = worker_name(attempts, lane.worker_key);
-    drawn.marks = losses_of(attempts, lane.worker_key, shown.end_s);
-  }
+            .to = 0.0},
+      .lanes = std::move(lanes)};
   std::string html = fmt::format(
       "<div class=\"scroll attempts\" tabindex=\"0\" role=\"region\" "
       "aria-label=\"Timeline of attempts\">{}</div>\n",
       svg_of(timeline, SvgUse::embedded));
-  if (num_shown < lanes.size()) {
-    html += fmt::format("<p class=\"note\">showing {} of {} lanes</p>\n", num_shown, lanes.size());
+  if (num_lanes > chart_lanes_max) {
+    html +=
+        fmt::format("<p class=\"note\">showing {} of {} lanes</p>\n", chart_lanes_max, num_lanes);
   }
   return html;
 }

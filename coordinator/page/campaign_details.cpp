@@ -43,32 +43,6 @@ void append_events(const Store& history, std::deque<StoredEvent>& events) {
   while (events.size() > page_events_max) events.pop_front();
 }
 
-/// What was read before, read further.
-template <typename Part, typename Read>
-std::shared_ptr<const Part> read_part(const CampaignRecord& campaign, const Part* before,
-                                      const Read& read_further) {
-  auto now = before == nullptr ? std::make_shared<Part>() : std::make_shared<Part>(*before);
-  now->failure.clear();
-  try {
-    read_further(*now);
-  } catch (const std::exception& error) {
-    now->failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
-  }
-  return now;
-}
-
-std::shared_ptr<const CampaignEvents> read_events_of(const CampaignRecord& campaign,
-                                                     const CampaignEvents* before) {
-  return read_part(campaign, before, [&](CampaignEvents& now) {
-    const Store history = Store::open_read_only(campaign.file);
-    append_events(history, now.events);
-    now.losses = history.losses();
-    now.ends = history.ends_without_estimate();
-    now.given_up = history.given_up_records(page_given_up_max);
-    now.attempts = history.recent_attempts(page_attempts_max, page_losses_max);
-  });
-}
-
 /// A range of runs that has to be looked up costs as much as so many results of one range.
 constexpr std::uint64_t results_a_range = 32;
 
@@ -88,17 +62,15 @@ bool goes_on(const ResultsReading* reading, const Store& store, const CampaignRe
          reading->num_read() <= num_runs_in(store.finished_runs());
 }
 
-std::shared_ptr<const CampaignResults> read_results_of(const CampaignRecord& campaign,
-                                                       const CampaignResults* before) {
-  return read_part(campaign, before, [&](CampaignResults& now) {
-    const Store store = Store::open_read_only(campaign.file);
-    const bool is_further = goes_on(now.reading.get(), store, campaign);
-    ResultsReading reading = is_further ? *now.reading : ResultsReading(store);
-    reading.read_further(store, page_results_a_reading);
-    now.html = reading.results().html();
-    now.num_runs = reading.num_read();
-    now.reading = std::make_shared<const ResultsReading>(std::move(reading));
-  });
+/// Some results more, if the coordinator knows of others than those that were read.
+void read_results(const Store& store, const CampaignRecord& campaign, CampaignDetails& now) {
+  const bool is_further = goes_on(now.reading.get(), store, campaign);
+  if (is_further && now.num_runs == campaign.status.num_done()) return;
+  ResultsReading reading = is_further ? *now.reading : ResultsReading(store);
+  reading.read_further(store, page_results_a_reading);
+  now.html = reading.results().html();
+  now.num_runs = reading.num_read();
+  now.reading = std::make_shared<const ResultsReading>(std::move(reading));
 }
 
 void become_unimportant() {
@@ -126,20 +98,12 @@ bool is_same(const CampaignRecord& a, const CampaignRecord& b) {
   return a.id == b.id && a.file == b.file;
 }
 
-/// Whether there is something to be read. There may be more results than are known to be finished,
-/// because a reading is newer than the number, or because the file is an older copy now.
-bool has_other_results(const CampaignResults* read, const CampaignRecord& campaign) {
-  return read == nullptr || !read->failure.empty() || read->num_runs != campaign.status.num_done();
-}
-
-CampaignDetails without_room(TimePoint now) {
-  const std::string failure =
+std::shared_ptr<const CampaignDetails> without_room() {
+  CampaignDetails details;
+  details.failure =
       fmt::format("campaigns that are looked at = {} (must be fewer; try again in {} s)",
                   DetailReader::num_campaigns_max, DetailReader::wanted_for.count());
-  auto events = std::make_shared<CampaignEvents>();
-  auto results = std::make_shared<CampaignResults>();
-  events->failure = results->failure = failure;
-  return {.events = events, .results = results, .results_at = now};
+  return std::make_shared<const CampaignDetails>(std::move(details));
 }
 
 }  // namespace
@@ -167,8 +131,21 @@ void ResultsReading::read_further(const Store& store, std::uint64_t num_results_
   next_run_ = 0;
 }
 
-DetailSources database_sources() {
-  return {.read_events = read_events_of, .read_results = read_results_of};
+CampaignDetails read_details(const CampaignRecord& campaign, const CampaignDetails* before) {
+  CampaignDetails now = before == nullptr ? CampaignDetails() : *before;
+  now.failure.clear();
+  try {
+    const Store store = Store::open_read_only(campaign.file);
+    append_events(store, now.events);
+    now.losses = store.losses();
+    now.ends = store.ends_without_estimate();
+    now.given_up = store.given_up_records(page_given_up_max);
+    now.attempts = store.recent_attempts(page_attempts_max, page_losses_max);
+    read_results(store, campaign, now);
+  } catch (const std::exception& error) {
+    now.failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
+  }
+  return now;
 }
 
 TimePoint next_reading(TimePoint ended_at, Duration cpu_time) {
@@ -179,8 +156,8 @@ TimePoint end_of_rest(TimePoint ended_at, Duration cpu_time) {
   return ended_at + reading_share_of_all * cpu_time;
 }
 
-DetailReader::DetailReader(DetailSources sources)
-    : sources_(std::move(sources)), thread_([this] { work(); }) {}
+DetailReader::DetailReader(ReadDetails read)
+    : read_(std::move(read)), thread_([this] { work(); }) {}
 
 DetailReader::~DetailReader() {
   {
@@ -191,10 +168,11 @@ DetailReader::~DetailReader() {
   thread_.join();
 }
 
-CampaignDetails DetailReader::details(const CampaignRecord& campaign, TimePoint now) {
+std::shared_ptr<const CampaignDetails> DetailReader::details(const CampaignRecord& campaign,
+                                                             TimePoint now) {
   const std::string& name = campaign.status.name();
   const std::lock_guard lock(mutex_);
-  if (!watched_.contains(name) && !make_room(now)) return without_room(now);
+  if (!watched_.contains(name) && !make_room(now)) return without_room();
   Watched& watched = watched_[name];
   if (!is_same(watched.campaign, campaign)) watched = {};  // Another one of that name.
   watched.campaign = campaign;
@@ -212,64 +190,40 @@ bool DetailReader::make_room(TimePoint now) {
   return true;
 }
 
-std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
-                                                         TimePoint& look_again) const {
-  look_again = now + wanted_for;
-  if (now < rests_until_) {
-    look_again = rests_until_;
-    return std::nullopt;
+std::optional<std::string> DetailReader::choose(TimePoint now, TimePoint& look_again) const {
+  const decltype(watched_)::value_type* first = nullptr;
+  for (const auto& item : watched_) {
+    if (!is_wanted(item.second.asked_at, now)) continue;
+    if (first == nullptr || item.second.due < first->second.due) first = &item;
   }
-  std::optional<Choice> choice;
-  TimePoint due_first = now;
-  const auto consider = [&](const std::string& name, const Watched& watched,
-                            TimePoint Watched::*part) {
-    const TimePoint due = watched.*part;
-    if (due > now) {
-      look_again = std::min(look_again, due);
-    } else if (!choice || due < due_first) {
-      choice = Choice{.name = name, .due = part};
-      due_first = due;
-    }
-  };
-  for (const auto& [name, watched] : watched_) {
-    if (!is_wanted(watched.asked_at, now)) continue;
-    consider(name, watched, &Watched::events_due);
-    if (has_other_results(watched.details.results.get(), watched.campaign)) {
-      consider(name, watched, &Watched::results_due);
-    }
-  }
-  return choice;
+  look_again = std::max(first == nullptr ? now + wanted_for : first->second.due, rests_until_);
+  return look_again <= now ? std::optional(first->first) : std::nullopt;
 }
 
-void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock) {
-  const CampaignRecord campaign = watched_.at(choice.name).campaign;
-  CampaignDetails details = watched_.at(choice.name).details;
+void DetailReader::read(const std::string& name, std::unique_lock<std::mutex>& lock) {
+  const CampaignRecord campaign = watched_.at(name).campaign;
+  const std::shared_ptr<const CampaignDetails> before = watched_.at(name).details;
   lock.unlock();
   const TimePoint began_at = steady_now();
   const Duration cpu_before = cpu_time_of_thread();
-  if (choice.due == &Watched::events_due) {
-    details.events = sources_.read_events(campaign, details.events.get());
-  } else {
-    // What a reading that failed has is as old as before.
-    const bool is_first = details.results == nullptr;
-    details.results = sources_.read_results(campaign, details.results.get());
-    if (is_first || details.results->failure.empty()) details.results_at = began_at;
-  }
+  auto details = std::make_shared<CampaignDetails>(read_(campaign, before.get()));
+  // What a reading that failed has is as old as before.
+  if (before == nullptr || details->failure.empty()) details->read_at = began_at;
   const TimePoint ended_at = steady_now();
   const Duration cpu_time = cpu_time_of_thread() - cpu_before;
   lock.lock();
   rests_until_ = end_of_rest(ended_at, cpu_time);
-  const auto found = watched_.find(choice.name);
+  const auto found = watched_.find(name);
   if (found == watched_.end() || !is_same(found->second.campaign, campaign)) return;
-  found->second.*choice.due = next_reading(ended_at, cpu_time);
+  found->second.due = next_reading(ended_at, cpu_time);
   found->second.details = std::move(details);
 }
 
 void DetailReader::read_next(std::unique_lock<std::mutex>& lock) {
   TimePoint look_again{};
-  const std::optional<Choice> choice = choose(steady_now(), look_again);
-  if (choice) {
-    read(*choice, lock);
+  const std::optional<std::string> name = choose(steady_now(), look_again);
+  if (name) {
+    read(*name, lock);
   } else {
     changed_.wait_until(lock, look_again);
   }

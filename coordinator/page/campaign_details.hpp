@@ -57,50 +57,31 @@ class ResultsReading {
   std::uint64_t next_run_ = 0;  ///< Where the next call begins.
 };
 
-/// What happened to a campaign, as its database has it.
-struct CampaignEvents {
+/// What a campaign database has for people, as far as it was read.
+struct CampaignDetails {
   std::deque<StoredEvent> events = {};  ///< In order; at most page_events_max.
   std::vector<LossCount> losses = {};
   std::vector<EndCount> ends = {};           ///< Without an estimate.
   std::vector<GivenUpRecord> given_up = {};  ///< At most page_given_up_max.
   RecentAttempts attempts = {};
-  /// Why the last reading failed; the other members are those of the reading before it.
-  std::string failure = {};
-};
-
-/// What those results of a campaign yield that were read so far.
-struct CampaignResults {
-  std::string html = {};       ///< Of LiveResults; empty before the first reading.
-  std::uint64_t num_runs = 0;  ///< Finished runs that were read.
-  /// Why the last reading failed; the other members are those of the reading before it.
-  std::string failure = {};
+  std::string html = {};                               ///< Of LiveResults.
+  std::uint64_t num_runs = 0;                          ///< Finished runs that were read for it.
   std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.
+  /// Why the last reading failed; the other members are those of the reading before it.
+  std::string failure = {};
+  TimePoint read_at{};  ///< When the last reading that did not fail began, or the first one.
 };
 
-/// What was read, and when the results were. Parts are null before they were read for the first
-/// time.
-struct CampaignDetails {
-  std::shared_ptr<const CampaignEvents> events = {};
-  std::shared_ptr<const CampaignResults> results = {};
-  TimePoint results_at{};
-};
+/// How campaign databases are read: each time further than before, which is null at first.
+using ReadDetails = std::function<CampaignDetails(const CampaignRecord&, const CampaignDetails*)>;
 
-/// How campaign databases are read: each time further than before.
-struct DetailSources {
-  /// @param before  What was read of the campaign last time; null at first.
-  template <typename Part>
-  using ReadPart =
-      std::function<std::shared_ptr<const Part>(const CampaignRecord&, const Part* before)>;
-  ReadPart<CampaignEvents> read_events;
-  ReadPart<CampaignResults> read_results;  ///< Some results at a time.
-};
+/// Reads a campaign database, as a coordinator and `run` want it: all but the results, and some of
+/// those. A file that lacks what was read of it before is read anew from the beginning: it is an
+/// older copy, or another campaign has its place.
+[[nodiscard]] CampaignDetails read_details(const CampaignRecord& campaign,
+                                           const CampaignDetails* before);
 
-/// Reads campaign databases, as a coordinator and `run` want it. A file that lacks what was read of
-/// it before is read anew from the beginning: it is an older copy, or another campaign has its
-/// place.
-[[nodiscard]] DetailSources database_sources();
-
-/// When something is read again whose reading ended at `ended_at` and took so much processor time:
+/// When a campaign is read again whose reading ended at `ended_at` and took so much processor time:
 /// not before 2 s, nor before 150 times that time. So it takes 0.67 % of a core at most.
 [[nodiscard]] TimePoint next_reading(TimePoint ended_at, Duration cpu_time);
 
@@ -116,37 +97,33 @@ class DetailReader {
   static constexpr std::chrono::seconds wanted_for{60};
   static constexpr std::size_t num_campaigns_max = 64;
 
-  explicit DetailReader(DetailSources sources);
+  explicit DetailReader(ReadDetails read);
   ~DetailReader();  ///< Waits until what is being read is read.
   DetailReader(const DetailReader&) = delete;
   DetailReader& operator=(const DetailReader&) = delete;
 
-  /// What was read of the campaign so far; asks for more. Never waits. If too many others are
-  /// wanted, both parts say so.
-  [[nodiscard]] CampaignDetails details(const CampaignRecord& campaign, TimePoint now);
+  /// What was read of the campaign so far, null before the first reading; asks for more. Never
+  /// waits. If too many others are wanted, it says so.
+  [[nodiscard]] std::shared_ptr<const CampaignDetails> details(const CampaignRecord& campaign,
+                                                               TimePoint now);
 
  private:
   struct Watched {
     CampaignRecord campaign;
     TimePoint asked_at;
-    CampaignDetails details;
-    TimePoint events_due{};
-    TimePoint results_due{};
-  };
-  struct Choice {
-    std::string name;
-    TimePoint Watched::*due;  ///< Says which part is meant.
+    std::shared_ptr<const CampaignDetails> details;
+    TimePoint due{};
   };
 
   void work();
-  /// What is to be read now, if anything, and otherwise when to look again.
-  [[nodiscard]] std::optional<Choice> choose(TimePoint now, TimePoint& look_again) const;
-  void read(const Choice& choice, std::unique_lock<std::mutex>& lock);
+  /// The name of the campaign that is to be read now, if any, and otherwise when to look again.
+  [[nodiscard]] std::optional<std::string> choose(TimePoint now, TimePoint& look_again) const;
+  void read(const std::string& name, std::unique_lock<std::mutex>& lock);
   void read_next(std::unique_lock<std::mutex>& lock);
   /// @return Whether there is room for one more campaign.
   [[nodiscard]] bool make_room(TimePoint now);
 
-  DetailSources sources_;
+  ReadDetails read_;
   std::mutex mutex_;  ///< For what follows.
   std::condition_variable changed_;
   std::map<std::string, Watched> watched_;  ///< By name.

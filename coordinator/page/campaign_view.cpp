@@ -31,18 +31,12 @@ std::string facts_of(const CampaignRecord& campaign) {
 }
 
 std::string results_of(const CampaignDetails& details, std::uint64_t num_done, TimePoint now) {
-  if (details.results == nullptr) return "<p class=\"note\">The results are being read.</p>\n";
-  const CampaignResults& results = *details.results;
-  std::string notes;
-  if (!results.failure.empty()) {
-    notes = notes_list({{"the results cannot be read now: " + results.failure}});
-  }
-  if (results.html.empty()) return notes;
+  if (details.html.empty()) return {};
   return fmt::format(
-      "{}<section><h2>Results</h2>\n<p class=\"note\">{} of {} finished runs, read "
+      "<section><h2>Results</h2>\n<p class=\"note\">{} of {} finished runs, read "
       "{} ago</p>\n{}</section>\n",
-      notes, grouped(results.num_runs), grouped(std::max(num_done, results.num_runs)),
-      duration_text(seconds(now - details.results_at)), results.html);
+      grouped(details.num_runs), grouped(std::max(num_done, details.num_runs)),
+      duration_text(seconds(now - details.read_at)), details.html);
 }
 
 /// A table under a heading; nothing without rows.
@@ -51,19 +45,19 @@ std::string titled(std::string_view title, const Table& table) {
   return fmt::format("<h3>{}</h3>\n{}", title, html_table(table));
 }
 
-std::string ends_table(const CampaignEvents& events) {
+std::string ends_table(const CampaignDetails& details) {
   Table table{.caption = "Finished runs without an estimate",
               .columns = {{"status", true}, {"cause", true}, {"session", true}, {"runs"}}};
-  for (const EndCount& end : events.ends) {
+  for (const EndCount& end : details.ends) {
     table.rows.push_back({end.status, end.cause, end.session, grouped(end.num_runs)});
   }
   return titled(table.caption, table);
 }
 
-std::string given_up_table(const CampaignEvents& events, std::uint64_t num_given_up) {
+std::string given_up_table(const CampaignDetails& details, std::uint64_t num_given_up) {
   Table table{.caption = "Runs that were given up",
               .columns = {{"run"}, {"reason", true}, {"attempts"}, {"given up", true}}};
-  for (const GivenUpRecord& run : events.given_up) {
+  for (const GivenUpRecord& run : details.given_up) {
     table.rows.push_back(
         {std::to_string(run.run.value), run.reason, grouped(run.num_attempts), run.given_up_utc});
   }
@@ -74,25 +68,24 @@ std::string given_up_table(const CampaignEvents& events, std::uint64_t num_given
   return titled(table.caption, table);
 }
 
-std::string losses_table(const CampaignEvents& events) {
+std::string losses_table(const CampaignDetails& details) {
   Table table{.caption = "Attempts without a result",
               .columns = {{"reason", true}, {"losses"}, {"runs"}, {"counted against runs"}}};
-  for (const LossCount& loss : events.losses) {
+  for (const LossCount& loss : details.losses) {
     table.rows.push_back(
         {loss.reason, grouped(loss.num_losses), grouped(loss.num_runs), grouped(loss.num_blamed)});
   }
   return titled("Attempts without a result, lent again", table);
 }
 
-std::string failures_of(const CampaignEvents& events, std::uint64_t num_given_up) {
+std::string failures_of(const CampaignDetails& details, std::uint64_t num_given_up) {
   const std::string tables =
-      ends_table(events) + given_up_table(events, num_given_up) + losses_table(events);
+      ends_table(details) + given_up_table(details, num_given_up) + losses_table(details);
   return "<section><h2>Failures</h2>\n" +
          (tables.empty() ? "<p class=\"note\">none</p>\n" : tables) + "</section>\n";
 }
 
-std::string attempts_of(const CampaignEvents& events) {
-  const RecentAttempts& attempts = events.attempts;
+std::string attempts_of(const RecentAttempts& attempts) {
   std::string html = "<section><h2>Attempts</h2>\n" + attempts_chart(attempts) +
                      "<p class=\"note\">A bar is the time that runs of one batch took; a line is a "
                      "loss.";
@@ -102,51 +95,51 @@ std::string attempts_of(const CampaignEvents& events) {
   return html + "</p></section>\n";
 }
 
-std::string events_of(const CampaignEvents& events, const std::string& name, std::size_t page) {
-  const std::size_t count = std::min(events.events.size(), shown_events_max);
+std::string events_of(const std::deque<StoredEvent>& events, const std::string& name,
+                      std::size_t page) {
+  const std::size_t count = std::min(events.size(), shown_events_max);
   const PageOfList list = page_of_list(page, count, rows_per_page);
   Table table{.caption = "Events", .columns = {{"time", true}, {"event", true}, {"details", true}}};
   for (std::size_t i = list.first; i < list.end; ++i) {
-    const StoredEvent& event = events.events[events.events.size() - 1 - i];
+    const StoredEvent& event = events[events.size() - 1 - i];
     Cell details(event.text);
     details.markup = "<span class=\"long\">" + markup_text(event.text) + "</span>";
     table.rows.push_back({event.time_utc, event.kind, std::move(details)});
   }
   std::string html = "<section><h2>Events</h2>\n" + table_or_nothing(table);
   html += list_navigation(list, "events, the newest first", percent_encoded(name) + "?events=");
-  if (events.events.size() > count) {
+  if (events.size() > count) {
     html += fmt::format(
         "<p class=\"note\">{} older events are in the table <code>event</code> of the "
         "database</p>\n",
-        grouped(events.events.size() - count));
+        grouped(events.size() - count));
   }
   return html + "</section>\n";
 }
 
-std::string history_of(const CampaignDetails& details, const CampaignRecord& campaign,
-                       const PageRequest& request) {
-  if (details.events == nullptr) return "<p class=\"note\">The database is being read.</p>\n";
-  const CampaignEvents& events = *details.events;
+std::string text_of(const CampaignDetails* details, const CampaignRecord& campaign,
+                    const PageRequest& request, TimePoint now) {
+  if (details == nullptr) return "<p class=\"note\">The database is being read.</p>\n";
   std::string html;
-  if (!events.failure.empty()) {
-    html += notes_list({{"the database cannot be read now: " + events.failure}});
+  if (!details->failure.empty()) {
+    html = notes_list({{"the database cannot be read now: " + details->failure}});
   }
-  const std::string& name = campaign.status.name();
-  return html + failures_of(events, campaign.status.num_given_up()) + attempts_of(events) +
-         events_of(events, name, request.number("events").value_or(1));
+  const proto::CampaignStatus& status = campaign.status;
+  return html + results_of(*details, status.num_done(), now) +
+         failures_of(*details, status.num_given_up()) + attempts_of(details->attempts) +
+         events_of(details->events, status.name(), request.number("events").value_or(1));
 }
 
 }  // namespace
 
-PageContent campaign_page(const CampaignRecord& campaign, const CampaignDetails& details,
+PageContent campaign_page(const CampaignRecord& campaign, const CampaignDetails* details,
                           const PageRequest& request, TimePoint now) {
   const proto::CampaignStatus& status = campaign.status;
   return {.title = "Campaign " + status.name(),
           .to_root = "../",
           .live = fmt::format("<p class=\"large\">{}</p>\n", progress_bar(status, "progress")) +
                   facts_of(campaign) + notes_list(notes_about(status)) +
-                  results_of(details, status.num_done(), now) +
-                  history_of(details, campaign, request)};
+                  text_of(details, campaign, request, now)};
 }
 
 }  // namespace proofmass::coordinator

@@ -68,7 +68,7 @@ struct Page::Impl {
   explicit Impl(const PageConfig& page_config)
       : address(page_config.address),
         board(clock_now()),
-        reader(database_sources()),
+        reader(read_details),
         site({.access = PageAccess(token_of(page_config)),
               .board = &board,
               .details = [this](const CampaignRecord& campaign,

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "coordinator/report/status_notes.hpp"
+#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -76,7 +77,8 @@ std::string progress_bar(const proto::CampaignStatus& campaign, std::string_view
 }
 
 std::string rate_text(const proto::CampaignStatus& campaign) {
-  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
+  const bool is_computed = campaign.phase() == proto::CAMPAIGN_PHASE_ACTIVE;
+  return is_computed && campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
 }
 
 std::string time_left_text(const proto::CampaignStatus& campaign) {
@@ -96,7 +98,7 @@ std::string grouped(std::uint64_t count) {
 std::string notes_list(const std::vector<Remark>& notes) {
   if (notes.empty()) return {};
   std::string html = "<ul class=\"notes\">\n";
-  for (const Remark& note : notes) html += fmt::format("<li>{}</li>\n", markup_text(note.text));
+  for (const Remark& note : notes) html += fmt::format("<li>{}</li>\n", sentence_markup(note.text));
   return html + "</ul>\n";
 }
 

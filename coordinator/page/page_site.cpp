@@ -49,7 +49,7 @@ HttpAnswer about_campaign(const PageSite& site, const PageRequest& request,
   if (found == campaigns.end()) return not_found();
   const TimePoint now = site.now();
   // The page shows what has been read by now. Two seconds later its script asks again.
-  return html_answer(request, campaign_page(*found, site.details(*found, now), request, now));
+  return html_answer(request, campaign_page(*found, site.details(*found, now).get(), request, now));
 }
 
 HttpAnswer answer_of(const PageSite& site, const PageRequest& request,

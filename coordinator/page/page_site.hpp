@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "coordinator/page/campaign_details.hpp"
@@ -16,7 +17,7 @@ struct PageSite {
   PageAccess access{std::nullopt};
   SnapshotBoard* board = nullptr;  ///< Outlives the site; not null.
   /// As DetailReader::details().
-  std::function<CampaignDetails(const CampaignRecord&, TimePoint)> details;
+  std::function<std::shared_ptr<const CampaignDetails>(const CampaignRecord&, TimePoint)> details;
   std::function<HttpCounts()> counts;  ///< Of the server.
   std::function<TimePoint()> now;      ///< Steady clock.
 

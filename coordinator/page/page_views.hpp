@@ -48,8 +48,9 @@ struct ChosenWorkers {
 [[nodiscard]] PageContent workers_page(const ServiceSnapshot& snapshot, const PageRequest& request,
                                        TimePoint now);
 /// One campaign: `campaigns/NAME`.
+/// @param details  Null before they were read for the first time.
 [[nodiscard]] PageContent campaign_page(const CampaignRecord& campaign,
-                                        const CampaignDetails& details, const PageRequest& request,
+                                        const CampaignDetails* details, const PageRequest& request,
                                         TimePoint now);
 
 }  // namespace proofmass::coordinator

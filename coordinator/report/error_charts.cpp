@@ -58,12 +58,12 @@ std::string below_sentence(const Histogram& histogram) {
 }
 
 /// Marks on the axis.
-Markers worst_markers(const Review& review, std::size_t index, double scale) {
+Curve worst_markers(const Review& review, std::size_t index, double scale) {
   const std::vector<RunValue>& all = review.figures[index].worst;
-  Markers markers{
+  Curve markers{
       .name = all.empty() ? "" : fmt::format("worst runs (the worst: run {})", all[0].run.value),
       .ink = Ink::fourth,
-      .shape = Shape::triangle};
+      .look = Shape::triangle};
   for (const RunValue& worst : all) markers.points.push_back({worst.value / scale, 0.0});
   return markers;
 }
@@ -162,9 +162,9 @@ Chart error_chart(const Review& review, std::size_t index) {
 Chart convergence_chart(const Review& review, std::size_t index) {
   const Quantity& quantity = quantity_at(review, index);
   const double scale = quantity.display_scale;
-  Line worst{.name = "worst", .ink = Ink::second, .dash = Dash::dashed};
-  Line mean{.name = "mean", .ink = Ink::first};
-  Line deviation{.name = "std", .ink = Ink::third, .dash = Dash::dotted};
+  Curve worst{.name = "worst", .ink = Ink::second, .look = Dash::dashed};
+  Curve mean{.name = "mean", .ink = Ink::first};
+  Curve deviation{.name = "std", .ink = Ink::third, .look = Dash::dotted};
   Band mean_band;
   Band deviation_band{.name = "95 % intervals", .ink = Ink::third};
   for (const ConvergencePoint& point : review.figures[index].convergence) {
@@ -218,8 +218,8 @@ ChartGrid convergence_overview(const Review& review) {
                .description =
                    "Half the width of each interval over the value, against the number of runs."}};
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
-    Line mean{.name = i == 0 ? "mean" : ""};
-    Line deviation{.name = i == 0 ? "std" : "", .ink = Ink::second, .dash = Dash::dashed};
+    Curve mean{.name = i == 0 ? "mean" : ""};
+    Curve deviation{.name = i == 0 ? "std" : "", .ink = Ink::second, .look = Dash::dashed};
     for (const ConvergencePoint& point : review.figures[i].convergence) {
       const auto n = static_cast<double>(point.num_runs);
       if (const auto width = relative_percent(point.mean_interval, point.mean)) {

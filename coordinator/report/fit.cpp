@@ -7,16 +7,10 @@
 #include <utility>
 
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/review_tables.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
-
-void leave_out_intervals(std::vector<FitStatistic>& fit) {
-  for (FitStatistic& of : fit) {
-    of.ratio_error.reset();
-    of.p_value.reset();
-  }
-}
 
 RunningFit::RunningFit(const ResultSchema& schema)
     : sessions_(schema.fit_parts), tolerance_(schema.fit_tolerance) {
@@ -85,7 +79,9 @@ Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit
         fit.size(), 100.0 * schema.fit_tolerance));
   }
   for (const FitStatistic& of : fit) {
-    Row row{of.session, figure_cell(of.chi_squared), figure_cell(of.degrees_of_freedom),
+    Cell session(of.session);
+    session.document = name_in_symbols(schema, of.session);
+    Row row{std::move(session), figure_cell(of.chi_squared), figure_cell(of.degrees_of_freedom),
             of.ratio > 0.0 ? figure_cell(of.ratio) : no_figure()};
     if (has_p_values) {
       const bool is_by_chance = of.p_value.value_or(1.0) >= 1.0 - default_confidence;

@@ -24,9 +24,6 @@ struct FitStatistic {
   std::optional<double> p_value = {};
 };
 
-/// Ratios of runs that are not independent have neither standard error nor chance.
-void leave_out_intervals(std::vector<FitStatistic>& fit);
-
 /// Computes them from results that are seen once. Memory is fixed.
 class RunningFit {
  public:

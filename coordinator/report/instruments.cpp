@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -12,7 +12,6 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/figures.hpp"
-#include "core/error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -21,20 +20,14 @@ GroupedShare share_of(const GroupedHits& hits) {
   return {hits.share(), hits.interval(default_confidence)};
 }
 
-template <typename IsHit>
-std::uint64_t count_of(std::span<const RunResult> runs, const IsHit& is_hit) {
-  return static_cast<std::uint64_t>(std::ranges::count_if(runs, is_hit));
-}
-
 }  // namespace
 
 RunningInstruments::RunningInstruments(const ResultSchema& schema, std::vector<double> objectives,
                                        std::uint64_t realisations)
-    : objectives_(std::move(objectives)), realisations_(realisations), within_(realisations) {
-  PROOFMASS_EXPECT(realisations_ > 1);
-  counts_.realisations = realisations_;
-  const GroupedHits hits(realisations_);
-  quantities_.assign(objectives_.size(), {.errors = GroupedValues(realisations_),
+    : objectives_(std::move(objectives)), groups_(realisations), within_(realisations) {
+  counts_.realisations = realisations;
+  const GroupedHits hits(realisations);
+  quantities_.assign(objectives_.size(), {.errors = GroupedValues(realisations),
                                           .beyond = hits,
                                           .covered = hits,
                                           .covered_within = hits});
@@ -45,86 +38,70 @@ RunningInstruments::RunningInstruments(const ResultSchema& schema, std::vector<d
 }
 
 void RunningInstruments::add(const RunResult& run) {
-  const auto instrument_of = [&](const RunResult& of) { return of.run.value / realisations_; };
-  if (!runs_.empty() && instrument_of(runs_.front()) != instrument_of(run)) {
-    ++counts_.num_incomplete;
-    runs_.clear();
-  }
-  runs_.push_back(run);
-  if (runs_.size() < realisations_) return;
-  finish_instrument();
-  runs_.clear();
-}
-
-bool RunningInstruments::is_within_objectives(const RunResult& run) const {
-  if (!run.is_completed()) return false;
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    if (std::abs(run.error(i)) > objectives_[i]) return false;
-  }
-  return true;
-}
-
-void RunningInstruments::finish_instrument() {
-  add_objectives();
-  for (std::size_t i = 0; i < objectives_.size(); ++i) add_shares(i);
-  if (!std::ranges::all_of(runs_, &RunResult::is_completed)) {
+  const Runs runs = groups_.add(run);
+  if (runs.empty()) return;
+  add_objectives(runs);
+  for (std::size_t i = 0; i < objectives_.size(); ++i) add_shares(runs, i);
+  if (!std::ranges::all_of(runs, &RunResult::is_completed)) {
     ++counts_.num_not_estimated;
     return;
   }
-  for (std::size_t i = 0; i < objectives_.size(); ++i) add_values(i);
+  for (std::size_t i = 0; i < objectives_.size(); ++i) add_values(runs, i);
 }
 
-void RunningInstruments::add_objectives() {
-  const std::uint64_t num_within =
-      count_of(runs_, [&](const RunResult& run) { return is_within_objectives(run); });
+void RunningInstruments::add_objectives(Runs runs) {
+  const std::uint64_t num_within = count_of(runs, [&](const RunResult& run) {
+    for (std::size_t i = 0; i < objectives_.size(); ++i) {
+      if (is_beyond(run, i, objectives_[i])) return false;
+    }
+    return true;
+  });
   within_.add(num_within);
-  if (num_within == realisations_) ++num_within_always_;
+  if (num_within == runs.size()) ++num_within_always_;
   if (counts_.num_instruments == 0 || num_within < counts_.temporal) {
     counts_.temporal = num_within;
     counts_.num_temporal = 0;
-    counts_.temporal_instrument = runs_.front().run.value / realisations_;
+    counts_.temporal_instrument = runs.front().run.value / runs.size();
   }
   if (num_within == counts_.temporal) ++counts_.num_temporal;
   ++counts_.num_instruments;
 }
 
-void RunningInstruments::add_shares(std::size_t i) {
+void RunningInstruments::add_shares(Runs runs, std::size_t i) {
   Quantity& quantity = quantities_[i];
-  quantity.beyond.add(count_of(runs_, [&](const RunResult& run) {
-    return !run.is_completed() || std::abs(run.error(i)) > objectives_[i];
-  }));
-  const std::optional<std::size_t>& position = quantity.position;
-  if (!position) return;
+  quantity.beyond.add(
+      count_of(runs, [&](const RunResult& run) { return is_beyond(run, i, objectives_[i]); }));
+  if (!quantity.position) return;
   const auto has_sigma = [](const RunResult& run) {
     return run.is_completed() && !run.standard_error.empty();
   };
-  const auto is_covered = [&](const RunResult& run, double error) {
-    return std::abs(error) < normal_95 * run.standard_error[*position];
-  };
   CompensatedSum errors;
   double count = 0.0;
-  for (const RunResult& run : runs_) {
+  for (const RunResult& run : runs) {
     if (!has_sigma(run)) continue;
     have_standard_errors_ = true;
     errors.add(run.error(i));
     count += 1.0;
   }
-  quantity.covered.add(count_of(runs_, [&](const RunResult& run) {
-    return has_sigma(run) && is_covered(run, run.error(i));
-  }));
-  quantity.covered_within.add(count_of(runs_, [&](const RunResult& run) {
-    return count > 1.0 && has_sigma(run) &&
-           is_covered(run,
-                      (run.error(i) - errors.value() / count) * std::sqrt(count / (count - 1.0)));
-  }));
+  const auto add = [&](GroupedHits& hits, double centre, double factor) {
+    hits.add(count_of(runs, [&](const RunResult& run) {
+      return has_sigma(run) && std::abs((run.error(i) - centre) * factor) <
+                                   normal_95 * run.standard_error[*quantity.position];
+    }));
+  };
+  add(quantity.covered, 0.0, 1.0);
+  // A single run has no distance from the mean of its instrument: its error is infinitely far.
+  const double factor =
+      count > 1.0 ? std::sqrt(count / (count - 1.0)) : std::numeric_limits<double>::infinity();
+  add(quantity.covered_within, errors.value() / count, factor);
 }
 
-void RunningInstruments::add_values(std::size_t i) {
+void RunningInstruments::add_values(Runs runs, std::size_t i) {
   Quantity& quantity = quantities_[i];
   const std::optional<std::size_t>& position = quantity.position;
   std::vector<double> errors;
   CompensatedSum magnitudes;
-  for (const RunResult& run : runs_) {
+  for (const RunResult& run : runs) {
     errors.push_back(run.error(i));
     magnitudes.add(std::abs(run.error(i)));
     if (!position || run.standard_error.empty()) continue;
@@ -132,7 +109,7 @@ void RunningInstruments::add_values(std::size_t i) {
     quantity.squared_standard_errors += sigma * sigma;
   }
   quantity.errors.add(errors);
-  quantity.magnitudes.add(magnitudes.value() / static_cast<double>(realisations_));
+  quantity.magnitudes.add(magnitudes.value() / static_cast<double>(runs.size()));
 }
 
 InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
@@ -157,9 +134,8 @@ InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
 }
 
 InstrumentStatistics RunningInstruments::statistics() {
-  if (!runs_.empty()) ++counts_.num_incomplete;
-  runs_.clear();
   InstrumentStatistics statistics = counts_;
+  statistics.num_incomplete = groups_.incomplete().size();
   if (statistics.num_instruments == 0) return statistics;
   const auto instruments = static_cast<double>(statistics.num_instruments);
   const auto always = static_cast<double>(num_within_always_);

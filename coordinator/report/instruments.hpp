@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
@@ -77,16 +79,14 @@ class RunningInstruments {
     std::optional<std::size_t> position = {};  ///< Of its standard error, if it has one.
     double squared_standard_errors = 0.0;      ///< Sum over the runs in `errors`.
   };
-  void finish_instrument();
-  void add_objectives();
-  void add_shares(std::size_t i);
-  void add_values(std::size_t i);
+  using Runs = std::span<const RunResult>;  // Of an instrument.
+  void add_objectives(Runs runs);
+  void add_shares(Runs runs, std::size_t i);
+  void add_values(Runs runs, std::size_t i);
   [[nodiscard]] InstrumentQuantity statistics_of(std::size_t i) const;
-  [[nodiscard]] bool is_within_objectives(const RunResult& run) const;
 
   std::vector<double> objectives_;
-  std::uint64_t realisations_;
-  std::vector<RunResult> runs_;  ///< Of the instrument that is not complete yet.
+  RunGroups groups_;
   InstrumentStatistics counts_;
   GroupedHits within_;
   std::uint64_t num_within_always_ = 0;

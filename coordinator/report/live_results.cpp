@@ -1,9 +1,5 @@
 #include "coordinator/report/live_results.hpp"
 
-#include <cmath>
-#include <cstddef>
-#include <utility>
-
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review.hpp"
@@ -19,15 +15,12 @@ LiveResults::LiveResults(const Campaign& campaign, const ResultSchema& schema)
       are_draws_independent_(why_not_independent(campaign).empty()),
       statistics_(objectives_),
       standard_errors_(schema_),
-      magnitudes_(objectives_.size()) {}
+      figures_(objectives_.size(), 0) {}
 
 void LiveResults::add(const RunResult& result) {
   statistics_.add(result);
   standard_errors_.add(result);
-  if (!result.is_completed()) return;
-  for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
-    magnitudes_[i].add(std::abs(result.error(i)));
-  }
+  figures_.add(result);
 }
 
 CampaignStatistics LiveResults::statistics() const {
@@ -41,15 +34,7 @@ std::string LiveResults::html() const {
   review.schema = schema_;
   review.objectives = objectives_;
   review.results.statistics = statistics();
-  for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
-    QuantityFigures figures{
-        .magnitudes = magnitudes_[i].histogram(), .errors = {}, .worst = {}, .convergence = {}};
-    const AccuracyStatistic& accuracy = review.results.statistics.accuracy[i];
-    if (review.results.statistics.num_estimated > 0) {
-      figures.worst.push_back({.run = accuracy.worst_run, .value = accuracy.worst});
-    }
-    review.figures.push_back(std::move(figures));
-  }
+  review.figures = ErrorFigures(figures_).figures();
   StandardErrorStatistics errors = standard_errors_.statistics();
   if (!are_draws_independent_) leave_out_intervals(errors);
   std::string html = "<h3>Accuracy so far</h3>\n" + html_table(accuracy_table(review));

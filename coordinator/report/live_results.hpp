@@ -33,7 +33,7 @@ class LiveResults {
   bool are_draws_independent_;
   RunningStatistics statistics_;
   RunningStandardErrors standard_errors_;
-  std::vector<MagnitudeBins> magnitudes_;  ///< Of each quantity.
+  ErrorFigures figures_;
 };
 
 }  // namespace proofmass::coordinator

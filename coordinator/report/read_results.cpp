@@ -79,9 +79,9 @@ void end_totals(std::vector<double> totals, std::optional<RunTotals>& of_runs) {
 
 /// Statistics whose unit is an instrument or a replicate, of several runs each. They need all of
 /// these runs: those that were given up, which have no result, count as lost.
-class RunGroups {
+class DependentRuns {
  public:
-  RunGroups(const Store& store, const Campaign& campaign, std::vector<RunRange> given_up)
+  DependentRuns(const Store& store, const Campaign& campaign, std::vector<RunRange> given_up)
       : given_up_(std::move(given_up)) {
     const std::uint64_t realisations = campaign.num_realisations();
     const SamplingDesign design = campaign.sampling_design();
@@ -190,10 +190,11 @@ void add_warnings(const Warner& warner, const RunResult& result, CampaignWarning
 std::string warnings_text(const ResultSchema& schema, const CampaignWarnings& warnings) {
   if (warnings.num_runs == 0) return "";
   std::string text =
-      fmt::format("          {} completed with a warning, of shifts up to\n", warnings.num_runs);
+      fmt::format("          {} completed with a warning; the largest shifts, in objectives:\n",
+                  warnings.num_runs);
   for (const WarnedQuantity& of : warnings.quantities) {
-    text += fmt::format("          {:.2g} of the objective of {}, by {} ({}, most in run {})\n",
-                        of.largest_part, schema.quantities[of.quantity].symbol, of.effect,
+    text += fmt::format("          {:.2g} of {}, by {} ({}, most in run {})\n", of.largest_part,
+                        schema.quantities[of.quantity].symbol, of.effect,
                         counted(of.num_runs, "run"), of.run.value);
   }
   return text;
@@ -212,7 +213,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   store.read_one_state([&] {
     results.given_up = store.given_up_runs();
     results.missing.num_given_up = num_runs_in(results.given_up);
-    RunGroups groups(store, campaign, results.given_up);
+    DependentRuns groups(store, campaign, results.given_up);
     Digest digest(store.schema());
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, store.schema());

@@ -62,7 +62,7 @@ struct CampaignWarnings {
   std::vector<RunWarning> first;           ///< num_warnings_kept at most, in run order.
 };
 
-/// `12 with a warning` and a line for each effect and quantity; empty without warnings.
+/// `12 completed with a warning ...` and a line for each effect and quantity; empty without any.
 [[nodiscard]] std::string warnings_text(const ResultSchema& schema,
                                         const CampaignWarnings& warnings);
 

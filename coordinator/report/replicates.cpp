@@ -10,59 +10,57 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/figures.hpp"
-#include "core/error.hpp"
 
 namespace proofmass::coordinator {
-namespace {
-
-constexpr std::size_t num_incomplete_named = 5;
-
-}  // namespace
 
 RunningReplicates::RunningReplicates(const ResultSchema& schema, std::vector<double> objectives,
                                      const SamplingDesign& design)
-    : objectives_(std::move(objectives)), quantities_(objectives_.size()) {
-  PROOFMASS_EXPECT(design.points > 1);
+    : objectives_(std::move(objectives)), groups_(design.points), quantities_(objectives_.size()) {
   counts_.design = design;
+  std::size_t num_standard_errors = 0;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
-    quantities_[i].has_standard_error = schema.quantities[i].has_standard_error;
+    if (schema.quantities[i].has_standard_error) quantities_[i].position = num_standard_errors++;
   }
 }
 
 void RunningReplicates::add(const RunResult& result) {
-  const std::uint64_t replicate = result.run.value / counts_.design.points;
-  if (replicate != replicate_) finish_replicate();
-  replicate_ = replicate;
-  ++num_runs_;
-  if (result.num_draws > 1) ++num_drawn_again_;
-  if (result.is_completed()) return add_errors(result);
-  for (Quantity& quantity : quantities_) quantity.beyond.sum += 1.0;
-}
-
-void RunningReplicates::add_errors(const RunResult& result) {
-  ++num_estimated_;
-  have_standard_errors_ = have_standard_errors_ || !result.standard_error.empty();
-  bool is_within = true;
-  auto sigma = result.standard_error.begin();  // Only some quantities have one.
+  const std::span<const RunResult> runs = groups_.add(result);
+  if (runs.empty()) return;
+  const std::uint64_t num_estimated = count_of(runs, &RunResult::is_completed);
+  ++counts_.num_replicates;
+  counts_.num_estimated += num_estimated;
+  counts_.num_drawn_again += count_of(runs, [](const auto& run) { return run.num_draws > 1; });
+  std::vector<bool> is_within(runs.size(), true);
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     Quantity& quantity = quantities_[i];
-    const double error = result.error(i);
-    const bool is_beyond = std::abs(error) > objectives_[i];
-    quantity.magnitude.sum += std::abs(error);
-    quantity.bias.sum += error;
-    quantity.mean_square.sum += error * error;
-    quantity.beyond.sum += is_beyond ? 1.0 : 0.0;
-    is_within = is_within && !is_beyond;
-    if (sigma == result.standard_error.end()) continue;
-    if (!quantity.has_standard_error) continue;
-    quantity.covered.sum += std::abs(error) < normal_95 * *sigma++ ? 1.0 : 0.0;
+    double magnitude = 0.0, bias = 0.0, mean_square = 0.0, beyond = 0.0, covered = 0.0;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const RunResult& run = runs[k];
+      const bool is_run_beyond = is_beyond(run, i, objectives_[i]);
+      is_within[k] = is_within[k] && !is_run_beyond;
+      beyond += is_run_beyond ? 1.0 : 0.0;
+      if (!run.is_completed()) continue;
+      const double error = run.error(i);
+      magnitude += std::abs(error);
+      bias += error;
+      mean_square += error * error;
+      if (run.standard_error.empty() || !quantity.position) continue;
+      have_standard_errors_ = true;
+      covered += std::abs(error) < normal_95 * run.standard_error[*quantity.position] ? 1.0 : 0.0;
+    }
+    quantity.beyond.add(beyond, runs.size());
+    if (num_estimated == 0) continue;
+    quantity.magnitude.add(magnitude, num_estimated);
+    quantity.bias.add(bias, num_estimated);
+    quantity.mean_square.add(mean_square, num_estimated);
+    quantity.covered.add(covered, num_estimated);
   }
-  within_.sum += is_within ? 1.0 : 0.0;
+  within_.add(static_cast<double>(std::ranges::count(is_within, true)), runs.size());
 }
 
-void RunningReplicates::Mean::finish(std::uint64_t num_runs) {
+void RunningReplicates::Mean::add(double sum, std::uint64_t num_runs) {
   total += sum;
-  const double mean = std::exchange(sum, 0.0) / static_cast<double>(num_runs);
+  const double mean = sum / static_cast<double>(num_runs);
   if (!means) means.emplace(mean);
   means->add(mean);
 }
@@ -94,45 +92,21 @@ ReplicatedMean RunningReplicates::Mean::share(std::uint64_t num_runs) const {
   return of;
 }
 
-void RunningReplicates::finish_replicate() {
-  const std::uint64_t num_runs = std::exchange(num_runs_, 0);
-  const std::uint64_t num_estimated = std::exchange(num_estimated_, 0);
-  const std::uint64_t num_drawn_again = std::exchange(num_drawn_again_, 0);
-  if (num_runs == counts_.design.points) {
-    ++counts_.num_replicates;
-    counts_.num_estimated += num_estimated;
-    counts_.num_drawn_again += num_drawn_again;
-    within_.finish(num_runs);
-  } else if (num_runs > 0) {
-    ++counts_.num_incomplete;
-    if (counts_.incomplete.size() < num_incomplete_named) counts_.incomplete.push_back(replicate_);
-  }
-  within_.sum = 0.0;
-  for (Quantity& quantity : quantities_) {
-    if (num_runs == counts_.design.points) quantity.beyond.finish(num_runs);
-    quantity.beyond.sum = 0.0;
-    for (Mean* const mean :
-         {&quantity.magnitude, &quantity.bias, &quantity.mean_square, &quantity.covered}) {
-      if (num_runs == counts_.design.points && num_estimated > 0) mean->finish(num_estimated);
-      mean->sum = 0.0;
-    }
-  }
-}
-
-ReplicateStatistics RunningReplicates::statistics() const {
-  RunningReplicates all = *this;
-  all.finish_replicate();
-  ReplicateStatistics statistics = all.counts_;
+ReplicateStatistics RunningReplicates::statistics() {
+  ReplicateStatistics statistics = counts_;
+  constexpr std::size_t num_named = 5;
+  statistics.incomplete = groups_.incomplete();
+  statistics.num_incomplete = statistics.incomplete.size();
+  statistics.incomplete.resize(std::min(statistics.incomplete.size(), num_named));
   const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
-  statistics.within_objectives = all.within_.share(num_runs);
+  statistics.within_objectives = within_.share(num_runs);
   if (statistics.num_estimated == 0) return statistics;
-  for (std::size_t i = 0; i < quantities_.size(); ++i) {
-    const Quantity& quantity = all.quantities_[i];
+  for (const Quantity& quantity : quantities_) {
     ReplicatedQuantity of{.magnitude = quantity.magnitude.mean(),
                           .bias = quantity.bias.mean(),
                           .mean_square = quantity.mean_square.mean(),
                           .beyond = quantity.beyond.share(num_runs)};
-    if (have_standard_errors_ && quantity.has_standard_error) {
+    if (have_standard_errors_ && quantity.position) {
       of.covered = quantity.covered.share(statistics.num_estimated);
     }
     statistics.quantities.push_back(std::move(of));
@@ -208,12 +182,12 @@ Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& sta
   constexpr const char* beyond = "beyond, %";
   Table table{.id = "replicate-table",
               .caption = "95 % intervals from replicates of the design, in the units above",
-              .columns = {{"parameter", true, 11},
+              .columns = {{"parameter", true, 10},
                           {"from", false, 8, magnitude},
                           {"to", false, 8, magnitude},
                           {"from", false, 9, bias, true},
-                          {"to", false, 10, bias},
-                          {"from", false, 9, rms, true},
+                          {"to", false, 9, bias},
+                          {"from", false, 8, rms, true},
                           {"to", false, 9, rms},
                           {"from", false, 8, beyond, true},
                           {"to", false, 8, beyond}},

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/sampling_design.hpp"
@@ -66,31 +67,29 @@ class RunningReplicates {
   void add(const RunResult& result);
   /// An interval needs num_replicates_of_interval replicates, one of a share also
   /// num_hits_of_interval runs that are counted and as many that are not, and count_deviation_min.
-  [[nodiscard]] ReplicateStatistics statistics() const;
+  /// @pre Every result was added; to be called once.
+  [[nodiscard]] ReplicateStatistics statistics();
 
  private:
   /// A mean of each replicate.
   struct Mean {
-    double sum = 0.0;    ///< Over the runs of the replicate that is not finished yet.
     double total = 0.0;  ///< Over all runs of complete replicates.
     std::optional<MomentSums> means = {};
 
-    void finish(std::uint64_t num_runs);
+    /// @param sum  Over so many runs of a replicate.
+    void add(double sum, std::uint64_t num_runs);
     [[nodiscard]] ReplicatedMean mean() const;
     /// Of values 0 and 1.
     [[nodiscard]] ReplicatedMean share(std::uint64_t num_runs) const;
   };
   struct Quantity {
-    bool has_standard_error = false;
-    Mean magnitude, bias, mean_square, beyond, covered;
+    std::optional<std::size_t> position = {};  ///< Of its standard error, if it has one.
+    Mean magnitude = {}, bias = {}, mean_square = {}, beyond = {}, covered = {};
   };
-  void add_errors(const RunResult& result);
-  void finish_replicate();
 
   std::vector<double> objectives_;
+  RunGroups groups_;
   ReplicateStatistics counts_;
-  std::uint64_t replicate_ = 0;  ///< That is not finished yet; the others are of its runs.
-  std::uint64_t num_runs_ = 0, num_estimated_ = 0, num_drawn_again_ = 0;
   bool have_standard_errors_ = false;
   Mean within_;
   std::vector<Quantity> quantities_;

@@ -14,23 +14,23 @@ namespace proofmass::coordinator {
 std::string report_text(const Review& review, Paint paint) {
   const ReadResults& results = review.results;
   std::string text =
-      wire::visible_lines(summary_text(review)) + given_up_text(results.given_up, paint) +
+      fitted(wire::visible_lines(summary_text(review))) + given_up_text(results.given_up, paint) +
       note_text(review.note) +
-      wire::visible_lines(warnings_text(review.schema, results.warnings) + review.stop);
+      fitted(wire::visible_lines(warnings_text(review.schema, results.warnings) + review.stop));
   std::vector<Table> tables = accuracy_tables(review);
   const auto further = std::back_inserter(tables);
   std::ranges::move(standard_error_tables(review.schema, results.standard_errors), further);
   std::ranges::move(group_tables(review), further);
   tables.push_back(budget_table(review));
   for (const Table& table : tables) {
-    if (!table.rows.empty()) text += "\n" + terminal_text(table, {.paint = paint});
+    if (!table.rows.empty()) text += "\n" + terminal_text(table, document_style(paint));
   }
   return text;
 }
 
 std::string note_text(const std::string& note) {
   if (note.empty()) return {};
-  return wire::visible_lines("Note      " + wrapped(note, 10, 10) + "\n");
+  return fitted("Note      " + wire::visible_text(note));
 }
 
 std::string summary_text(const Review& review) {

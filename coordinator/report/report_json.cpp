@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -216,11 +215,8 @@ std::string report_json(const Review& review, std::span<const StatedRequirement>
   if (results.instruments) json["instruments"] = json_of(schema, *results.instruments);
   if (results.replicates) json["replicates"] = json_of(schema, *results.replicates);
   json["why_not_independent"] = review.why_not_independent;
-  const auto id_of = [](const RequirementAnswer& row) -> const std::string& {
-    return row.stated.id;
-  };
   for (const StatedRequirement& each : stated) {
-    json["requirements"].push_back(json_of(*std::ranges::find(review.matrix, each.id, id_of)));
+    json["requirements"].push_back(json_of(answer_to(each, review)));
   }
   for (const RequirementAnswer& row : review.matrix) {
     if (!review.why_not_independent.empty()) break;

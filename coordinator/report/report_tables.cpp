@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -112,23 +113,6 @@ std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_est
   return text + " (one parameter by itself, not all together)";
 }
 
-void add_percentiles(const AccuracyStatistic& accuracy, double scale, Row& row) {
-  for (const PercentileStatistic& percentile : accuracy.percentiles) {
-    row.push_back(figure_cell(percentile.value, scale));
-  }
-}
-
-Row error_row(const Quantity& quantity, double objective, const AccuracyStatistic& accuracy) {
-  const double scale = quantity.display_scale;
-  Row row{quantity.symbol};
-  add_ends(accuracy.error.bias_interval, scale, row);
-  add_percentiles(accuracy, scale, row);
-  for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
-    row.push_back(std::isfinite(objective) ? figure_cell(share, 0.01) : no_figure());
-  }
-  return row;
-}
-
 /// That chance alone makes such a bias, by Student's law; 1 where nothing is known.
 double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
   if (num_runs < 2 || error.bias == 0.0) return 1.0;
@@ -180,30 +164,26 @@ std::string level_sentence(const Review& review) {
                      budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
 }
 
-/// What error_table() shows where draws are not independent and there is no interval.
-Table dependent_error_table(const Review& review) {
-  const CampaignStatistics& statistics = review.results.statistics;
-  constexpr const char* percentiles = "percentiles of |error|";
-  Table table{
-      .id = "error-table",
-      .caption = "Errors, in the units above",
-      .columns = {{"parameter", true, 11},
-                  {"bias", false, 9},
-                  {"skew", false, 8},
-                  {"50 %", false, 8, percentiles, true},
-                  {"90 %", false, 8, percentiles},
-                  {"95 %", false, 8, percentiles},
-                  {"99 %", false, 8, percentiles}},
-      .notes = {"no intervals over runs: " + review.why_not_independent, joint_sentence(review)}};
-  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    const Quantity& quantity = review.schema.quantities[i];
-    const AccuracyStatistic& accuracy = statistics.accuracy[i];
-    Row row{quantity.symbol, figure_cell(accuracy.error.bias, quantity.display_scale),
-            skewness_cell(accuracy, statistics.num_estimated)};
-    add_percentiles(accuracy, quantity.display_scale, row);
-    table.rows.push_back(std::move(row));
+/// What error_table() shows of a quantity.
+Row error_row(const Quantity& quantity, double objective, const AccuracyStatistic& accuracy,
+              const Review& review) {
+  const double scale = quantity.display_scale;
+  const bool has_intervals = review.why_not_independent.empty();
+  Row row{quantity.symbol};
+  if (has_intervals) {
+    add_ends(accuracy.error.bias_interval, scale, row);
+  } else {
+    row.push_back(figure_cell(accuracy.error.bias, scale));
+    row.push_back(skewness_cell(accuracy, review.results.statistics.num_estimated));
   }
-  return table;
+  for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    row.push_back(figure_cell(percentile.value, scale));
+  }
+  if (!has_intervals) return row;
+  for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
+    row.push_back(std::isfinite(objective) ? figure_cell(share, 0.01) : no_figure());
+  }
+  return row;
 }
 
 // Published totals, too, add up the worst errors of all parameters, which no single run has.
@@ -323,30 +303,34 @@ Table interval_table(const Review& review) {
 
 Table error_table(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  const std::vector<double>& objectives = review.objectives;
   if (statistics.num_estimated == 0) return {};
-  if (!review.why_not_independent.empty()) return dependent_error_table(review);
   constexpr const char* percentiles = "percentiles of |error|";
+  constexpr const char* beyond = "beyond, %";
   static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
+  const bool has_intervals = review.why_not_independent.empty();
   Table table{.id = "error-table",
-              .caption = "95 % intervals of bias and of draws beyond the objective",
-              .columns = {{"parameter", true, 10},
-                          {"from", false, 9, "bias"},
-                          {"to", false, 10, "bias"},
-                          {"50 %", false, 8, percentiles, true},
-                          {"90 %", false, 8, percentiles},
-                          {"95 %", false, 8, percentiles},
-                          {"99 %", false, 9, percentiles},
-                          {"from", false, 7, "beyond, %", true},
-                          {"to", false, 8, "beyond, %"}}};
-  const bool has_objective =
-      std::ranges::any_of(objectives, [](double objective) { return std::isfinite(objective); });
+              .caption = has_intervals ? "95 % intervals of bias and of draws beyond the objective"
+                                       : "Errors, in the units above",
+              .columns = {{"parameter", true, 10}}};
+  const auto add = [&](std::initializer_list<Column> columns) {
+    table.columns.insert(table.columns.end(), columns);
+  };
+  if (has_intervals) add({{"from", false, 9, "bias"}, {"to", false, 10, "bias"}});
+  if (!has_intervals) add({{"bias", false, 9}, {"skew", false, 8}});
+  add({{"50 %", false, 8, percentiles, true},
+       {"90 %", false, 8, percentiles},
+       {"95 %", false, 8, percentiles},
+       {"99 %", false, 9, percentiles}});
+  if (has_intervals) add({{"from", false, 7, beyond, true}, {"to", false, 8, beyond}});
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(
-        error_row(review.schema.quantities[i], objectives[i], statistics.accuracy[i]));
+    table.rows.push_back(error_row(review.schema.quantities[i], review.objectives[i],
+                                   statistics.accuracy[i], review));
   }
-  table.notes.push_back(bias_sentence(review));
-  if (has_objective) table.notes.push_back(joint_sentence(review));
+  table.notes.push_back(has_intervals ? bias_sentence(review)
+                                      : "no intervals over runs: " + review.why_not_independent);
+  const bool has_objective = std::ranges::any_of(
+      review.objectives, [](double objective) { return std::isfinite(objective); });
+  if (has_objective || !has_intervals) table.notes.push_back(joint_sentence(review));
   return table;
 }
 

@@ -59,8 +59,8 @@ std::string count_lines(const RequirementAnswer& answer) {
       is_joint ? check.num_runs - check.num_exceedances : check.num_exceedances, check.num_runs);
   std::string text = counts + "\n";
   if (check.exceedance) {
-    text = line_of(counts + ";", bounds_text(answer.requirement, *check.exceedance, check.verdict),
-                   margin);
+    text = fmt::format("{}; {}\n", counts,
+                       bounds_text(answer.requirement, *check.exceedance, check.verdict));
   }
   return text +
          fmt::format("{}     {} of all draws\n", is_joint ? "Required" : "Allowed ",
@@ -202,11 +202,11 @@ Tone tone_of(RequirementVerdict verdict) {
 }
 
 std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
-  return fmt::format("Requirement  {}\n{}Answer       {}\nRule         {}\n{}{}{}",
-                     wire::visible_text(answer.stated.requirement), limit_line(answer),
-                     in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
-                     rule_text(answer), count_lines(answer), bound_line(answer),
-                     needed_line(answer));
+  return fitted(
+      fmt::format("Requirement  {}\n{}Answer       {}\nRule         {}\n{}{}{}",
+                  wire::visible_text(answer.stated.requirement), limit_line(answer),
+                  in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
+                  rule_text(answer), count_lines(answer), bound_line(answer), needed_line(answer)));
 }
 
 }  // namespace proofmass::coordinator

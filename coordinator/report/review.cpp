@@ -1,5 +1,6 @@
 #include "coordinator/report/review.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
@@ -62,6 +63,11 @@ std::optional<RunIndex> worst_run_of(const Review& review) {
     if (row.is_joint() && row.worst) return row.worst->run;
   }
   return std::nullopt;
+}
+
+const RequirementAnswer& answer_to(const StatedRequirement& stated, const Review& review) {
+  return *std::ranges::find(review.matrix, stated.id,
+                            [](const auto& row) { return row.stated.id; });
 }
 
 Review read_review(const Store& store, const Campaign& campaign, ReviewDepth depth,

@@ -53,6 +53,10 @@ struct Review {
 /// estimate or no quantity has an objective.
 [[nodiscard]] std::optional<RunIndex> worst_run_of(const Review& review);
 
+/// What the matrix of a review says of a requirement that it was read with.
+[[nodiscard]] const RequirementAnswer& answer_to(const StatedRequirement& stated,
+                                                 const Review& review);
+
 /// What a review has beside the results, each with what comes before it.
 enum class ReviewDepth : std::uint8_t {
   tables,

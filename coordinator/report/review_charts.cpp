@@ -39,8 +39,8 @@ double largest_shown(const Review& review, const Tolerance& tolerance) {
   return std::min(end, 1.0);
 }
 
-Markers observed_fractions(const Review& review, const Tolerance& tolerance) {
-  Markers markers{.name = "seen in this campaign", .ink = Ink::fourth, .shape = Shape::diamond};
+Curve observed_fractions(const Review& review, const Tolerance& tolerance) {
+  Curve markers{.name = "seen in this campaign", .ink = Ink::fourth, .look = Shape::diamond};
   for (const RequirementAnswer& row : review.matrix) {
     const RequirementCheck& check = row.check;
     if (!is_same(row.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
@@ -57,7 +57,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
   const RequirementCheck& check = first.check;
   const double end = largest_shown(review, tolerance);
   constexpr int num_points = 120;
-  Line line{.name = fmt::format("{} draws", check.num_runs)};
+  Curve line{.name = fmt::format("{} draws", check.num_runs)};
   for (int i = 0; i <= num_points; ++i) {
     const double probability = end * i / num_points;
     line.points.push_back({100.0 * probability, 100.0 * probability_to_meet(check, probability)});
@@ -200,18 +200,18 @@ std::string ratio_text(const NoiseRatio& ratio) {
   return fmt::format("{:.2f} ± {:.2f}", ratio.value, ratio.standard_error);
 }
 
-Line line_of(const SessionSpectrum& spectrum, std::string name, double SpectrumPoint::*density,
-             Ink ink, Dash dash) {
-  Line line{.name = std::move(name), .points = {}, .ink = ink, .dash = dash};
+Curve line_of(const SessionSpectrum& spectrum, std::string name, double SpectrumPoint::*density,
+              Ink ink, Dash dash) {
+  Curve line{.name = std::move(name), .points = {}, .ink = ink, .look = dash};
   for (const SpectrumPoint& point : spectrum.points) {
     line.points.push_back({point.frequency_hz, point.*density});
   }
   return line;
 }
 
-Markers line_markers(const SessionSpectrum& spectrum, bool is_used, std::string name, Ink ink,
-                     Shape shape) {
-  Markers markers{.name = {}, .points = {}, .ink = ink, .shape = shape};
+Curve line_markers(const SessionSpectrum& spectrum, bool is_used, std::string name, Ink ink,
+                   Shape shape) {
+  Curve markers{.name = {}, .points = {}, .ink = ink, .look = shape};
   for (const SpectrumLine& line : spectrum.lines) {
     if (line.is_used == is_used) markers.points.push_back({line.frequency_hz, line.height});
   }

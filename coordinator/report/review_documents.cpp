@@ -23,29 +23,20 @@ constexpr std::string_view policy =
     "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
 
 constexpr std::string_view page_style =
-    R"(*{box-sizing:border-box}
-body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
-body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
-header,main,footer{padding:0 1rem;max-width:90rem;margin:0 auto}
-h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
+    R"(header,main,footer{padding:0 1rem;max-width:90rem;margin:0 auto}
 h2{font-size:1.3rem;margin:2rem 0 .5rem;border-bottom:2px solid var(--chart-first)}
-h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
-a{color:inherit}
 nav ul{display:flex;flex-wrap:wrap;gap:.2rem 1rem;padding:0;margin:.5rem 0;list-style:none}
 p{max-width:48rem}
-td.words{overflow-wrap:anywhere;min-width:6rem}
 #matrix{font-size:.85rem}
 #matrix th,#matrix td{padding:.25rem .4rem}
-#matrix td:nth-child(2){min-width:16rem}
+#matrix td:nth-child(2){min-width:min(16rem,35vw)}
 #summary{max-width:60rem;padding-left:1.3rem}
-.skip{position:absolute;left:-99rem}
-.skip:focus{position:static}
 @page{size:A4 landscape;margin:12mm}
 @media print{
 body{font-size:10pt}
 nav,.skip{display:none}
-.scroll{overflow:visible}
-table,#matrix{font-size:7.5pt}
+.scroll{overflow:visible;background:none}
+table,#matrix,.note{font-size:7.5pt}
 th,td,#matrix th,#matrix td{padding:.1rem .25rem}
 #matrix td:nth-child(2){min-width:13rem}
 h2,h3{break-after:avoid}
@@ -53,7 +44,7 @@ figure,tr{break-inside:avoid}
 .flow{display:block}
 .flow>*{display:inline-block;vertical-align:top;margin-right:.2rem}
 table{break-inside:avoid}
-figure{zoom:.72}
+figure{zoom:.62}
 }
 )";
 
@@ -111,17 +102,16 @@ std::string characteristics_markup(const Review& review) {
   std::string html;
   for (const Chart& chart : characteristic_charts(review)) html += figure_of(chart);
   if (html.empty()) return "";
-  return html +
-         fmt::format(
-             "<p class=\"note\">How probable it is that a campaign of as many draws meets a "
-             "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
-             "good instruments from bad ones; more draws make it steeper.</p>\n",
-             name_of(review.interpretation));
+  return fmt::format(
+      "<div>\n{}<p class=\"note\">How probable it is that a campaign of as many draws meets a "
+      "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
+      "good instruments from bad ones; more draws make it steeper.</p>\n</div>\n",
+      html, name_of(review.interpretation));
 }
 
 std::string accuracy_markup(const Review& review, Tables tables) {
-  return flow(table_part(tables.front()) + characteristics_markup(review)) +
-         table_parts(tables.subspan(1));
+  return flow(table_part(tables.front()) + characteristics_markup(review) +
+              table_parts(tables.subspan(1)));
 }
 
 std::string standard_errors_markup(const Review& review, Tables tables) {
@@ -198,8 +188,8 @@ std::string summary_markup(const Review& review, std::span<const Section> sectio
       fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.name));
   for (const auto& [text, source] : review_summary(review)) {
     const auto section = std::ranges::find(sections, source, &Section::title);
-    html += fmt::format("<li>{} (<a href=\"#{}\">{}</a>)</li>\n", markup_text(text), section->id,
-                        section->title);
+    html += fmt::format("<li>{} (<a href=\"#{}\">{}</a>)</li>\n", sentence_markup(text),
+                        section->id, section->title);
   }
   return html + "</ol>\n";
 }
@@ -233,20 +223,35 @@ std::string review_html(const Review& review) {
 }
 
 std::string review_style() {
-  // Verdicts: the inks of the charts are for lines; text needs 4.5:1.
+  // The inks of the charts are for lines; text needs 4.5:1.
   constexpr std::string_view light =
-      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;";
+      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;--faint:#566070;"
+      "--warn-ground:#fff3d6;";
   constexpr std::string_view dark =
-      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;";
+      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;--faint:#a3adbb;"
+      "--warn-ground:#3a2e10;";
   return fmt::format(
              ":root{{color-scheme:light dark;{}{}}}\n"
              "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
              "@media print{{:root{{{}{}}}}}\n",
              light_colours(), light, dark_colours(), dark, light_colours(), light) +
-         R"(.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
-.scroll:focus-visible,a:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
+         R"(*{box-sizing:border-box}
+body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
+body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
+a{color:inherit}
+:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
+.skip{position:absolute;left:-99rem}
+.skip:focus{position:static}
+h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
+h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
+p,li{text-wrap:pretty}
+.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
+.scroll{background:linear-gradient(to left,var(--chart-ground) 1rem,transparent) right/2rem 100%,
+linear-gradient(to left,rgb(128 128 128/.4),transparent) right/1rem 100%}
+.scroll{background-repeat:no-repeat;background-attachment:local,scroll}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
-caption{text-align:left;font-weight:600;padding:.3rem 0;white-space:nowrap}
+caption{text-align:left;font-weight:600;padding:.3rem 0}
+caption{position:sticky;left:0;max-width:calc(100vw - 2rem)}
 th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
 th,td{border-bottom:1px solid var(--chart-grid)}
 thead th{vertical-align:bottom}
@@ -254,7 +259,7 @@ thead th,thead td{background:var(--heading)}
 th[scope=colgroup]{text-align:center}
 th.words,td.words{text-align:left}
 td{white-space:nowrap}
-td.words{white-space:normal}
+td.words{white-space:normal;overflow-wrap:anywhere;min-width:6rem}
 tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
 .met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
 td strong{white-space:nowrap}
@@ -265,6 +270,7 @@ figure svg{display:block;height:auto;max-width:100%}
 .scroll figure,.scroll svg{max-width:none}
 .flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
 .flow>div{max-width:100%}
+.flow>div>.note{width:0;min-width:100%}
 )";
 }
 

@@ -129,10 +129,7 @@ std::string not_found_text(const DrawnRuns& drawn) {
 Table term_table(const DrawnRuns& drawn, std::size_t quantity) {
   const std::vector<ExplanatoryTerm> terms = terms_of(drawn, quantity);
   if (terms.empty()) return {.notes = {not_found_text(drawn)}};
-  Table table{.columns = {{.title = "error as a sum of",
-                           .is_text = true,
-                           .width = 44,
-                           .has_lines_of_its_own = true},
+  Table table{.columns = {{"error as a sum of", true, 44},
                           {"slope", false, 12},
                           {"of variance", false, 13},
                           {"p", false, 11}},
@@ -274,7 +271,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
 
 std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                              std::optional<std::size_t> num_rows, Paint paint) {
-  const TerminalStyle style{.paint = paint};
+  const TerminalStyle style = document_style(paint);
   const auto both = sensitivities_of(drawn, quantity);
   const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
   Table drivers = driver_table(drawn, of_error, "error", std::nullopt);
@@ -294,7 +291,7 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
 
 std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
                              std::optional<std::size_t> num_rows, Paint paint) {
-  const TerminalStyle style{.paint = paint};
+  const TerminalStyle style = document_style(paint);
   const std::size_t position = position_of(drawn, run);
   const Quantity& info = drawn.quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];

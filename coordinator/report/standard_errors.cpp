@@ -22,7 +22,7 @@ double share_within(const StandardErrorStatistic& statistic) {
 Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statistic, bool is_first) {
   const Histogram& histogram = statistic.pulls;
   Bars bars{.edges = histogram.edges};
-  Line law{.name = is_first ? "normal law" : "", .ink = Ink::second, .dash = Dash::dashed};
+  Curve law{.name = is_first ? "normal law" : "", .ink = Ink::second, .look = Dash::dashed};
   for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
     bars.heights.push_back(static_cast<double>(histogram.counts[i]));
     const double from = histogram.edges[i], to = histogram.edges[i + 1];
@@ -46,7 +46,10 @@ void leave_out_intervals(StandardErrorStatistics& statistics) {
     statistic.squared_ratio_error.reset();
     statistic.within.reset();
   }
-  leave_out_intervals(statistics.fit);
+  for (FitStatistic& of : statistics.fit) {
+    of.ratio_error.reset();
+    of.p_value.reset();
+  }
 }
 
 RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema) : fit_(schema) {

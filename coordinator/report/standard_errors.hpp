@@ -38,7 +38,7 @@ struct StandardErrorStatistics {
   std::vector<FitStatistic> fit;                   ///< Of these runs.
 };
 
-/// Intervals and the standard error of the ratio, for draws that are not independent.
+/// Intervals, chances and the standard errors of ratios, for draws that are not independent.
 void leave_out_intervals(StandardErrorStatistics& statistics);
 
 /// Computes them from results that are seen once. Memory is fixed.

@@ -8,23 +8,23 @@ namespace proofmass::coordinator {
 namespace {
 
 /// Null where there is nothing to say.
+Json or_null(bool is_known, double value) { return is_known ? Json(value) : Json(nullptr); }
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 Json factory_object(const proto::FactoryStatus& factory) {
   const proto::FactoryReport& report = factory.report();
-  Json json{{"name", report.name()},
-            {"batch_system", report.batch_system()},
-            {"phase", wire::name_of(report.phase())},
-            {"num_wanted", report.num_wanted()},
-            {"num_registered", report.num_registered()},
-            {"num_queued", report.num_queued()},
-            {"wait_s", nullptr},
-            {"reason", text_or_null(report.reason())},
-            {"interval_s", report.interval_s()},
-            {"silent_s", factory.silent_s()},
-            {"owner", text_or_null(factory.owner())}};
-  if (report.phase() == proto::FACTORY_PHASE_WAITING) json["wait_s"] = report.wait_s();
-  return json;
+  const bool is_waiting = report.phase() == proto::FACTORY_PHASE_WAITING;
+  return {{"name", report.name()},
+          {"batch_system", report.batch_system()},
+          {"phase", wire::name_of(report.phase())},
+          {"num_wanted", report.num_wanted()},
+          {"num_registered", report.num_registered()},
+          {"num_queued", report.num_queued()},
+          {"wait_s", or_null(is_waiting, report.wait_s())},
+          {"reason", text_or_null(report.reason())},
+          {"interval_s", report.interval_s()},
+          {"silent_s", factory.silent_s()},
+          {"owner", text_or_null(factory.owner())}};
 }
 
 Json campaign_object(const proto::CampaignStatus& campaign) {
@@ -35,30 +35,27 @@ Json campaign_object(const proto::CampaignStatus& campaign) {
     json[std::string(counter.name)] = (campaign.*counter.count)();
   }
   json.update({{"rate_hz", campaign.rate_hz()},
-               {"remaining_s", nullptr},
+               {"remaining_s", or_null(campaign.has_remaining_s(), campaign.remaining_s())},
                {"storage_failure", text_or_null(campaign.storage_failure())},
                {"model_version", text_or_null(campaign.model_version())},
                {"missing_model", text_or_null(campaign.missing_model())},
                {"crashes_everywhere", campaign.crashes_everywhere()},
                {"owner", text_or_null(campaign.owner())}});
-  if (campaign.has_remaining_s()) json["remaining_s"] = campaign.remaining_s();
   return json;
 }
 
 Json worker_object(const proto::WorkerStatus& worker) {
-  Json json{{"worker_id", worker.worker_id()},
-            {"name", worker.name()},
-            {"host", worker.host()},
-            {"process_id", worker.process_id()},
-            {"num_slots", worker.num_slots()},
-            {"num_lent", worker.num_lent()},
-            {"num_results", worker.num_results()},
-            {"silent_s", worker.silent_s()},
-            {"is_quarantined", worker.is_quarantined()},
-            {"cards", text_or_null(worker.cards())},
-            {"card_rate_hz", nullptr}};
-  if (worker.card_rate_hz() > 0.0) json["card_rate_hz"] = worker.card_rate_hz();
-  return json;
+  return {{"worker_id", worker.worker_id()},
+          {"name", worker.name()},
+          {"host", worker.host()},
+          {"process_id", worker.process_id()},
+          {"num_slots", worker.num_slots()},
+          {"num_lent", worker.num_lent()},
+          {"num_results", worker.num_results()},
+          {"silent_s", worker.silent_s()},
+          {"is_quarantined", worker.is_quarantined()},
+          {"cards", text_or_null(worker.cards())},
+          {"card_rate_hz", or_null(worker.card_rate_hz() > 0.0, worker.card_rate_hz())}};
 }
 
 Json status_object(const proto::StatusReply& status) {
@@ -76,8 +73,7 @@ Json status_object(const proto::StatusReply& status) {
   json["num_quarantined_hosts"] = status.num_quarantined_hosts();
   json["num_refusals"] = status.num_refusals();
   json["last_refusal"] = text_or_null(status.last_refusal());
-  json["last_refusal_s"] = nullptr;
-  if (status.num_refusals() > 0) json["last_refusal_s"] = status.last_refusal_s();
+  json["last_refusal_s"] = or_null(status.num_refusals() > 0, status.last_refusal_s());
   json["factories"] = Json::array();
   for (const auto& factory : status.factories())
     json["factories"].push_back(factory_object(factory));

@@ -5,11 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <set>
 #include <utility>
-
-#include "coordinator/report/digest.hpp"
-#include "core/result_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -138,35 +134,6 @@ std::vector<RequirementAnswer> VerificationMatrix::answers() {
   end_results();
   std::vector<RequirementAnswer> answers;
   for (const Row& row : rows_) answers.push_back(row.answer);
-  return answers;
-}
-
-std::vector<RequirementAnswer> check_requirements(const Store& store,
-                                                  std::span<const double> objectives,
-                                                  std::vector<StatedRequirement> stated,
-                                                  const std::optional<ErrorBudget>& budget) {
-  if (stated.empty()) return {};
-  std::vector<RequirementAnswer> answers;
-  store.read_one_state([&] {
-    VerificationMatrix matrix(store.schema(), std::move(stated), objectives,
-                              num_runs_in(store.given_up_runs()), store.num_runs_fixed(), budget);
-    (void)walk_checked(store, [&](const RunResult& result) {
-      require_in_range(result, store.schema());
-      matrix.add(result);
-    });
-    std::set<std::size_t> parameters;
-    for (const RequirementAnswer& answer : matrix.answers()) {
-      if (answer.is_of_error) parameters.insert(answer.requirement.parameter);
-    }
-    for (const std::size_t parameter : parameters) {
-      std::vector<double> magnitudes;
-      store.for_each_error(parameter, num_runs_max,
-                           [&](double error) { magnitudes.push_back(std::abs(error)); });
-      std::ranges::sort(magnitudes);
-      matrix.add_magnitudes(parameter, magnitudes);
-    }
-    answers = matrix.answers();
-  });
   return answers;
 }
 

@@ -74,13 +74,4 @@ class VerificationMatrix {
   bool have_results_ended_ = false;
 };
 
-/// Holds requirements against the results in a campaign database; runs without an estimate, and
-/// those that were given up, count as exceedances.
-/// @param objectives  Those of the campaign's scenario.
-/// @param budget      Of the campaign, for requirements about it.
-/// @throws ConfigError as parse_requirement(); StoreError as walk_checked().
-[[nodiscard]] std::vector<RequirementAnswer> check_requirements(
-    const Store& store, std::span<const double> objectives, std::vector<StatedRequirement> stated,
-    const std::optional<ErrorBudget>& budget = std::nullopt);
-
 }  // namespace proofmass::coordinator

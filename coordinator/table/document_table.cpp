@@ -86,10 +86,22 @@ std::string opening_of(const Table& table) {
 }
 
 std::string paragraph(std::string_view text) {
-  return text.empty() ? "" : fmt::format("<p class=\"note\">{}</p>\n", markup_text(text));
+  return text.empty() ? "" : fmt::format("<p class=\"note\">{}</p>\n", sentence_markup(text));
 }
 
 }  // namespace
+
+std::string sentence_markup(std::string_view text) {
+  std::string markup;
+  for (;;) {
+    const std::size_t begin = std::min(text.find('`'), text.size());
+    const std::size_t end = text.find('`', begin + 1);
+    if (end == std::string_view::npos) return markup + markup_text(text);
+    markup += fmt::format("{}<code>{}</code>", markup_text(text.substr(0, begin)),
+                          markup_text(text.substr(begin + 1, end - begin - 1)));
+    text.remove_prefix(end + 1);
+  }
+}
 
 std::string html_table(const Table& table) {
   std::string html = opening_of(table) + "<thead>\n" + group_line(table) + title_line(table) +

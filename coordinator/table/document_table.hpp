@@ -13,6 +13,9 @@ namespace proofmass::coordinator {
 /// tell it.
 [[nodiscard]] std::string html_table(const Table& table);
 
+/// Sentences as markup; what stands between backticks is code.
+[[nodiscard]] std::string sentence_markup(std::string_view text);
+
 /// A table as html_table() writes it; empty if it has no rows.
 [[nodiscard]] std::string table_or_nothing(const Table& table);
 

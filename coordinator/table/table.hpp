@@ -50,9 +50,8 @@ struct Column {
   std::size_t width = 0;
   /// Heading above this column and the next ones with the same one, up to a vertical line.
   std::string group = {};
-  bool is_after_line = false;         ///< A vertical line separates it from the column before it.
-  bool is_for_documents = false;      ///< A terminal has no room for it.
-  bool has_lines_of_its_own = false;  ///< A text that is too wide stands on a line above its row.
+  bool is_after_line = false;     ///< A vertical line separates it from the column before it.
+  bool is_for_documents = false;  ///< A terminal has no room for it.
   std::string sort = {};    ///< `ascending` or `descending` if the rows are in this column's order.
   std::string markup = {};  ///< The title as HTML shows it; empty: the title.
 };

@@ -1,6 +1,7 @@
 #include "coordinator/table/terminal_table.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <sstream>
@@ -13,6 +14,34 @@ namespace {
 constexpr std::size_t columns_max = 80;  // Of what is broken to lines.
 constexpr std::size_t gap = 2;           // Before a column that is as wide as its cells.
 constexpr std::size_t text_width_min = 8;
+
+/// Words in lines of at most `first` columns, and then of `width`; a longer word has its own.
+std::vector<std::string> lines_of(const std::string& text, std::size_t first, std::size_t width) {
+  std::istringstream words(text);
+  std::vector<std::string> lines{""};
+  for (std::string word; words >> word;) {
+    std::string longer = lines.back().empty() ? word : fmt::format("{} {}", lines.back(), word);
+    const bool fits = display_width(longer) <= (lines.size() == 1 ? first : width);
+    if (fits || lines.back().empty()) {
+      lines.back() = std::move(longer);
+    } else {
+      lines.push_back(std::move(word));
+    }
+  }
+  return lines;
+}
+
+/// Lines of at most `width` columns, whatever the words are.
+std::vector<std::string> broken(const std::string& text, std::size_t width) {
+  std::vector<std::string> lines = lines_of(text, width, width);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (display_width(lines[i]) <= width) continue;
+    const std::size_t size = shortened(lines[i], width).size() - std::string_view("…").size();
+    lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i) + 1, lines[i].substr(size));
+    lines[i].resize(size);
+  }
+  return lines;
+}
 
 std::string without_end_blanks(std::string line) {
   line.erase(line.find_last_not_of(' ') + 1);
@@ -40,7 +69,6 @@ class TerminalTable {
       return width - (has_own_width() ? 1 : lead);
     }
     [[nodiscard]] std::size_t width_min() const {
-      if (column->has_lines_of_its_own) return column->width;
       return has_own_width() ? std::min(column->width, text_width_min + 1) : text_width_min + lead;
     }
   };
@@ -49,7 +77,8 @@ class TerminalTable {
   [[nodiscard]] bool continues_group(std::size_t i) const;
   void fit();
   [[nodiscard]] bool is_before_line(std::size_t i) const;
-  [[nodiscard]] std::string cell(std::size_t i, const Cell& cell) const;
+  [[nodiscard]] std::vector<std::string> lines_in(const ShownColumn& shown, const Cell& cell) const;
+  [[nodiscard]] std::string cell(std::size_t i, const std::string& text, const Cell& cell) const;
   [[nodiscard]] std::string row(const Row& cells) const;
   [[nodiscard]] std::string groups() const;
   [[nodiscard]] std::string rule() const;
@@ -74,7 +103,7 @@ TerminalTable::TerminalTable(const Table& table, const TerminalStyle& style)
     shown.width = std::max(column.width, title + (column.is_text ? blanks : shown.lead));
     for (const Row& row : table.rows) {
       const std::size_t needed = display_width(wire::visible_text(row[i].text)) + blanks;
-      if (!column.has_lines_of_its_own) shown.width = std::max(shown.width, needed);
+      shown.width = std::max(shown.width, needed);
     }
     columns_.push_back(shown);
   }
@@ -124,9 +153,16 @@ bool TerminalTable::is_before_line(std::size_t i) const {
   return i + 1 < columns_.size() && columns_[i + 1].column->is_after_line;
 }
 
-std::string TerminalTable::cell(std::size_t i, const Cell& cell) const {
+std::vector<std::string> TerminalTable::lines_in(const ShownColumn& shown, const Cell& cell) const {
+  const std::string text = wire::visible_text(cell.text);
+  const bool is_wrapped =
+      style_.wraps_cells && shown.column->is_text && display_width(text) > shown.room();
+  return is_wrapped ? broken(text, shown.room()) : std::vector{shortened(text, shown.room())};
+}
+
+/// One line of what a cell shows.
+std::string TerminalTable::cell(std::size_t i, const std::string& text, const Cell& cell) const {
   const ShownColumn& shown = columns_[i];
-  const std::string text = shortened(wire::visible_text(cell.text), shown.room());
   const std::size_t taken = shown.lead + display_width(text);
   std::string blanks(shown.width > taken ? shown.width - taken : 0, ' ');
   std::string line = shown.column->is_after_line ? "│" : "";
@@ -141,15 +177,21 @@ std::string TerminalTable::cell(std::size_t i, const Cell& cell) const {
 }
 
 std::string TerminalTable::row(const Row& cells) const {
-  std::string above, line;
-  for (std::size_t i = 0; i < columns_.size(); ++i) {
-    const Cell& shown = cells[columns_[i].index];
-    const bool is_above = columns_[i].column->has_lines_of_its_own &&
-                          display_width(wire::visible_text(shown.text)) > columns_[i].room();
-    if (is_above) above += wire::visible_text(shown.text) + "\n";
-    line += cell(i, is_above ? Cell("") : shown);
+  std::vector<std::vector<std::string>> shown;
+  std::size_t height = 0;
+  for (const ShownColumn& column : columns_) {
+    shown.push_back(lines_in(column, cells[column.index]));
+    height = std::max(height, shown.back().size());
   }
-  return above + without_end_blanks(std::move(line)) + "\n";
+  std::string text;
+  for (std::size_t k = 0; k < height; ++k) {
+    std::string line;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      line += cell(i, k < shown[i].size() ? shown[i][k] : "", cells[columns_[i].index]);
+    }
+    text += without_end_blanks(std::move(line)) + "\n";
+  }
+  return text;
 }
 
 /// Each group in the middle of its columns; empty if no column has one.
@@ -182,10 +224,11 @@ std::string TerminalTable::rule() const {
 }
 
 std::string TerminalTable::heading() const {
-  std::string titles;
-  for (std::size_t i = 0; i < columns_.size(); ++i) titles += cell(i, columns_[i].column->title);
-  return groups() + in_tone(without_end_blanks(std::move(titles)), Tone::heading, style_.paint) +
-         "\n" + rule();
+  Row cells;
+  for (const Column& column : table_.columns) cells.emplace_back(column.title);
+  std::string titles = row(cells);
+  titles.pop_back();  // The end of the line is not painted.
+  return groups() + in_tone(titles, Tone::heading, style_.paint) + "\n" + rule();
 }
 
 std::string TerminalTable::records() const {
@@ -243,6 +286,10 @@ std::string in_tone(std::string_view text, Tone tone, Paint paint) {
   return fmt::format("\033[1;38;5;{}m{}\033[0m", colour, text);
 }
 
+TerminalStyle document_style(Paint paint) {
+  return {.line_width_max = columns_max, .paint = paint, .wraps_cells = true};
+}
+
 std::string terminal_text(const Table& table, const TerminalStyle& style) {
   return TerminalTable(table, style).text();
 }
@@ -253,29 +300,24 @@ std::string left_aligned(std::string_view text, std::size_t width) {
 }
 
 std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin) {
-  std::istringstream stream(text);
-  std::string lines, word;
-  std::size_t column = begin;
-  while (stream >> word) {
-    const bool is_first = lines.empty();
-    if (!is_first && column + 1 + display_width(word) > columns_max) {
-      lines += '\n';
-      lines.append(indent, ' ');
-      column = indent;
-    } else if (!is_first) {
-      lines += " ";
-      ++column;
-    }
-    lines += word;
-    column += display_width(word);
-  }
-  return lines;
+  const std::vector<std::string> lines = lines_of(text, columns_max - begin, columns_max - indent);
+  return fmt::format("{}", fmt::join(lines, fmt::format("\n{:{}}", "", indent)));
 }
 
-std::string line_of(std::string_view first, std::string_view second, std::size_t margin) {
-  const bool fits = display_width(first) + 1 + display_width(second) <= columns_max;
-  return fits ? fmt::format("{} {}\n", first, second)
-              : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);
+std::string fitted(std::string_view text) {
+  constexpr std::size_t label_width_max = 16;
+  std::istringstream stream{std::string(text)};
+  std::string lines;
+  for (std::string line; std::getline(stream, line); lines += line + "\n") {
+    if (display_width(line) <= columns_max) continue;
+    const std::size_t gap = std::min(line.find("  "), line.size());
+    const bool has_label = gap > 0 && gap < label_width_max;
+    const std::size_t begin =
+        std::min(line.find_first_not_of(' ', has_label ? gap : 0), line.size());
+    line.replace(begin, line.size(),
+                 wrapped(line.substr(begin), begin + (has_label ? 0 : 2), begin));
+  }
+  return lines;
 }
 
 }  // namespace proofmass::coordinator

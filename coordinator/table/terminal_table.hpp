@@ -21,7 +21,11 @@ struct TerminalStyle {
   std::size_t line_width_max = std::numeric_limits<std::size_t>::max();
   Paint paint = Paint::no;
   bool cuts_remarks = false;  ///< Remarks are cut to the line, else they take what they need.
+  bool wraps_cells = false;   ///< Text that a column has no room for goes on below, else it is cut.
 };
+
+/// Of a text that nobody cuts: lines of at most 80 columns, on a terminal or not.
+[[nodiscard]] TerminalStyle document_style(Paint paint);
 
 /// Number of a tone's colour among the 256 of a terminal, or 0 for the terminal's own. Blue and
 /// orange can be told apart by colour-blind people, and have a contrast of at least 4:1 on black
@@ -42,9 +46,8 @@ struct TerminalStyle {
 /// spaces; the first one begins at column `begin`. No end of the last line.
 [[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin);
 
-/// Two parts of a line with a space between; below each other, the second behind `margin` spaces,
-/// if they take more than the 80 columns of a terminal.
-[[nodiscard]] std::string line_of(std::string_view first, std::string_view second,
-                                  std::size_t margin);
+/// Lines, those of more than 80 columns broken between words. What follows of such a line stands
+/// below what it has behind its label, as in `Note      text`, else two columns further right.
+[[nodiscard]] std::string fitted(std::string_view text);
 
 }  // namespace proofmass::coordinator

@@ -225,13 +225,12 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
       return;
     }
     case FileUse::requirement: {
-      const std::vector<double> objectives = MicroscopeCampaign{}.objectives();
+      const Store store = Store::open_read_only(file);
       const std::array<std::string, 2> texts{"a_c12 < 9e-4 for 90% with 90%",
                                              "all objectives for 90% with 90%"};
-      for (const auto& answer : check_requirements(Store::open_read_only(file), objectives,
-                                                   numbered_requirements(texts))) {
-        (void)requirement_text(answer);
-      }
+      const Review review = read_review(store, *stored_campaign(store), ReviewDepth::matrix,
+                                        numbered_requirements(texts));
+      for (const auto& answer : review.matrix) (void)requirement_text(answer);
       return;
     }
     case FileUse::sensitivity:

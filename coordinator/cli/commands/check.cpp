@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/shared_options.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/campaign/campaign.hpp"
@@ -112,27 +112,25 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
   return text;
 }
 
-using CheckJson = nlohmann::ordered_json;
-
-CheckJson check_json(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
-                     const Outlook& outlook, const CostEstimate& cost) {
-  CheckJson json{{"file", options.file.string()},
-                 {"campaign", campaign.name},
-                 {"seed", std::to_string(campaign.seed)},
-                 {"num_runs", campaign.num_runs},
-                 {"note", campaign.note()},
-                 {"num_steps", plan.num_steps()},
-                 {"step_name", campaign.model().step_name()},
-                 {"one_core_s", cost.one_core_s},
-                 {"all_cores_s", cost.all_cores_s},
-                 {"num_cores", wire::num_processors()},
-                 {"disk_bytes", cost.disk_mb * 1e6},
-                 {"num_drawn", outlook.num_drawn},
-                 {"num_draws", outlook.num_draws},
-                 {"num_without_draw", outlook.num_without_draw},
-                 {"num_simulated", outlook.num_simulated},
-                 {"num_without_estimate", outlook.missing.total()},
-                 {"differences", CheckJson::array()}};
+Json check_json(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
+                const Outlook& outlook, const CostEstimate& cost) {
+  Json json{{"file", options.file.string()},
+            {"campaign", campaign.name},
+            {"seed", std::to_string(campaign.seed)},
+            {"num_runs", campaign.num_runs},
+            {"note", campaign.note()},
+            {"num_steps", plan.num_steps()},
+            {"step_name", campaign.model().step_name()},
+            {"one_core_s", cost.one_core_s},
+            {"all_cores_s", cost.all_cores_s},
+            {"num_cores", wire::num_processors()},
+            {"disk_bytes", cost.disk_mb * 1e6},
+            {"num_drawn", outlook.num_drawn},
+            {"num_draws", outlook.num_draws},
+            {"num_without_draw", outlook.num_without_draw},
+            {"num_simulated", outlook.num_simulated},
+            {"num_without_estimate", outlook.missing.total()},
+            {"differences", Json::array()}};
   for (const auto& [field, own, example] :
        campaign.differences_from(*example_campaign(campaign.model()))) {
     json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});
@@ -160,7 +158,7 @@ int check_campaign_file(const CheckOptions& options) {
   if (options.format == OutputFormat::json) {
     print_json(check_json(options, *campaign, *plan, outlook, cost));
   } else {
-    print_lines(check_text(options, *campaign, *plan, outlook, cost));
+    print_lines(fitted(check_text(options, *campaign, *plan, outlook, cost)));
   }
   return exit_done;
 }

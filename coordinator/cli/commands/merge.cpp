@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/dispatch/run_set.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
@@ -94,13 +94,11 @@ std::string missing_text(const Store& store, const RunSet& missing, const MergeO
       missing.size(), store.num_runs(), to_text(missing), options.whole.string());
 }
 
-using MergeJson = nlohmann::ordered_json;
-
 void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
                   const MergeOptions& options) {
   const std::string digest = whole.summary()->digests.results;
   std::string lines;
-  MergeJson json{{"file", options.whole.string()}, {"parts", MergeJson::array()}};
+  Json json{{"file", options.whole.string()}, {"parts", Json::array()}};
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::string file = options.parts[i].string();
     lines += fmt::format("{}: {}\n", file, count_text(parts[i]));
@@ -114,7 +112,7 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
   }
   json["num_runs"] = whole.num_runs();
   json["num_missing"] = missing.size();
-  json["missing"] = MergeJson::array();
+  json["missing"] = Json::array();
   for (const RunRange& range : missing.ranges()) {
     json["missing"].push_back({{"first_run", range.first.value}, {"num_runs", range.count}});
   }

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/shared_options.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -53,10 +53,8 @@ struct ModelsOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-using ModelsJson = nlohmann::ordered_json;
-
-ModelsJson models_json() {
-  auto list = ModelsJson::array();
+Json models_json() {
+  auto list = Json::array();
   for (const Model* const model : models()) {
     const std::uint64_t digest = model->reference_digest(best_instruction_set());
     const auto program = wire::program_of(*model);
@@ -66,7 +64,7 @@ ModelsJson models_json() {
                     {"num_drawn", model->drawn().size()},
                     {"num_results", model->results_of({}, model->version()).quantities.size()},
                     {"reference_digest", fmt::format("{:016x}", digest)},
-                    {"program", program ? ModelsJson(program->string()) : nullptr}});
+                    {"program", program ? Json(program->string()) : nullptr}});
   }
   return list;
 }
@@ -78,10 +76,10 @@ Table models_table() {
                           {.title = "results"},
                           {.title = "digest", .is_text = true},
                           {.title = "program", .is_text = true}}};
-  const auto text_of = [](const ModelsJson& value) {
+  const auto text_of = [](const Json& value) {
     return value.is_string() ? value.get<std::string>() : value.dump();
   };
-  for (const ModelsJson& model : models_json()) {
+  for (const Json& model : models_json()) {
     Row& row = table.rows.emplace_back();
     for (const char* const key :
          {"name", "version", "num_drawn", "num_results", "reference_digest"}) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -19,6 +18,7 @@
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/shared_options.hpp"
 #include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/campaign/allocation.hpp"
 #include "core/campaign/plan_study.hpp"
@@ -168,7 +168,6 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
     write_standard_output("\n" + terminal_text(session_table(plan), style));
     return;
   }
-  using Json = nlohmann::ordered_json;
   Json json{{"file", options.file.string()},
             {"method", plan.study.method()},
             {"note", plan.note},
@@ -177,11 +176,10 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"num_instruments", plan.study.num_instruments()},
             {"num_probed", plan.study.num_probed()},
             {"misses_any", plan.bound.misses_any},
-            {"mean_budget", nullptr},
+            {"mean_budget", plan.bound.mean_budget},
             {"losses", Json::array()},
             {"parameters", Json::array()},
             {"sessions", Json::array()}};
-  if (plan.bound.mean_budget) json["mean_budget"] = *plan.bound.mean_budget;
   for (const PlanLoss& loss : plan.bound.losses) {
     json["losses"].push_back({{"cause", loss.cause},
                               {"session", loss.session},

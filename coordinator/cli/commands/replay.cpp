@@ -7,13 +7,13 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/report/json.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
@@ -97,8 +97,6 @@ std::string text_of(const RunResult& result, const ResultSchema& schema) {
                      name_at(schema.loss_sessions, result.loss.session));
 }
 
-using ReplayJson = nlohmann::ordered_json;
-
 /// Simulates the runs one after the other. What was written of a run stays if a later one fails.
 class ReplayCommand {
  public:
@@ -120,7 +118,7 @@ class ReplayCommand {
       }
       if (options_.has_directory()) directory.emplace(options_.output);
     }
-    ReplayJson json{{"runs", ReplayJson::array()}};
+    Json json{{"runs", Json::array()}};
     for (const RunResult& result : results) {
       const std::vector<ResultDifference> differences = replay_one(result);
       if (is_json()) {
@@ -152,13 +150,13 @@ class ReplayCommand {
     return replay_.run(stored, output.get(), is_stopped_);
   }
 
-  [[nodiscard]] ReplayJson json_of(const RunResult& stored,
-                                   const std::vector<ResultDifference>& differences) const {
-    ReplayJson json{{"run", stored.run.value},
-                    {"status", name_of(stored.status)},
-                    {"is_equal", differences.empty()},
-                    {"differences", ReplayJson::array()},
-                    {"files", ReplayJson::array()}};
+  [[nodiscard]] Json json_of(const RunResult& stored,
+                             const std::vector<ResultDifference>& differences) const {
+    Json json{{"run", stored.run.value},
+              {"status", name_of(stored.status)},
+              {"is_equal", differences.empty()},
+              {"differences", Json::array()},
+              {"files", Json::array()}};
     for (const auto& [run, column, value, computed] : differences) {
       json["differences"].push_back({{"column", column}, {"stored", value}, {"now", computed}});
     }

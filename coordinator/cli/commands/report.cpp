@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,7 +22,6 @@
 #include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/independence.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
@@ -54,10 +52,11 @@ std::vector<StatedRequirement> stated_in(const ReportOptions& options,
   return read_requirements(options.requirements_file, results);
 }
 
-std::string answers_text(const std::vector<RequirementAnswer>& answers, Paint paint) {
+std::string answers_text(const Review& review, const std::vector<StatedRequirement>& stated,
+                         Paint paint) {
   std::string text;
-  for (const RequirementAnswer& answer : answers) {
-    text += (text.empty() ? "" : "\n") + requirement_text(answer, paint);
+  for (const StatedRequirement& each : stated) {
+    text += (text.empty() ? "" : "\n") + requirement_text(answer_to(each, review), paint);
   }
   return text;
 }
@@ -76,16 +75,11 @@ int print_remote_report(const ReportOptions& options) {
   return print_answer(options.connection, question, AnswerText::lines);
 }
 
-int exit_code_of(std::span<const RequirementAnswer> answers) {
-  const bool are_met = std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
-    return answer.check.verdict == RequirementVerdict::met;
+int exit_code_of(const Review& review, const std::vector<StatedRequirement>& stated) {
+  const bool are_met = std::ranges::all_of(stated, [&](const StatedRequirement& each) {
+    return answer_to(each, review).check.verdict == RequirementVerdict::met;
   });
   return are_met ? exit_done : exit_not_met;
-}
-
-/// The first rows of the matrix are those that were asked for.
-int exit_code_of(const Review& review, const std::vector<StatedRequirement>& stated) {
-  return exit_code_of(std::span(review.matrix).first(stated.size()));
 }
 
 /// Two texts in one stream would be neither.
@@ -133,9 +127,10 @@ int write_documents(const ReportOptions& options, const Store& store,
   });
 }
 
-ReviewDepth depth_of(const ReportOptions& options) {
+ReviewDepth depth_of(const ReportOptions& options, const std::vector<StatedRequirement>& stated) {
   if (options.has_document()) return ReviewDepth::causes;
-  return options.format == OutputFormat::json ? ReviewDepth::matrix : ReviewDepth::tables;
+  const bool has_answers = options.format == OutputFormat::json || !stated.empty();
+  return has_answers ? ReviewDepth::matrix : ReviewDepth::tables;
 }
 
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
@@ -149,25 +144,19 @@ int print_report(const ReportOptions& options) {
   const std::vector<StatedRequirement> stated = stated_in(options, store.schema());
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   const bool is_json = options.format == OutputFormat::json;
-  const Paint paint = style_of(stdout).paint;
-  if (!is_json && !options.has_document() && !stated.empty()) {
-    require_independent(*campaign, "requirement", stated.front().requirement);
-    const std::vector<RequirementAnswer> answers =
-        check_requirements(store, campaign->objectives(), stated, campaign->error_budget());
-    write_standard_output(answers_text(answers, paint));
-    return exit_code_of(answers);
-  }
-  Review review = read_review(store, *campaign, depth_of(options), stated);
+  Review review = read_review(store, *campaign, depth_of(options, stated), stated);
   review.database = options.database.filename().string();
   if (options.has_document()) {
     const int exit_code = write_documents(options, store, stated, review);
     if (!is_json || exit_code == exit_interrupted) return exit_code;
   }
-  if (!is_json) {
-    write_standard_output(report_text(review, paint));
-    return exit_done;
+  const Paint paint = style_of(stdout).paint;
+  if (is_json) {
+    print_lines(report_json(review, stated));
+  } else {
+    write_standard_output(stated.empty() ? report_text(review, paint)
+                                         : answers_text(review, stated, paint));
   }
-  print_lines(report_json(review, stated));
   return exit_code_of(review, stated);
 }
 

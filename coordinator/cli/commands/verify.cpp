@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "coordinator/archive/publication.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/report/json.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
@@ -44,8 +44,6 @@ CLI::Option* add_fraction(CLI::App& command, CheckedFileOptions& options) {
       ->check(wire::in_range(0.0, 1.0))
       ->default_str(fmt::format("{}", fraction_by_default));
 }
-
-using Json = nlohmann::ordered_json;
 
 Json json_of_check(const Check& check) {
   return {{"name", check.name},

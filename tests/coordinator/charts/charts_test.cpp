@@ -22,8 +22,8 @@ std::vector<Picture> pictures_with(const std::string& text) {
   Chart chart = histogram();
   chart.text.title = chart.text.description = chart.x.label = chart.y.label = text;
   chart.layers = {Bars{.name = text, .edges = {0.0, 1.0}, .heights = {1.0}},
-                  Line{.name = text, .points = {{0.0, 1.0}, {1.0, 2.0}}},
-                  Markers{.name = text, .points = {{1.0, 1.0}}},
+                  Curve{.name = text, .points = {{0.0, 1.0}, {1.0, 2.0}}},
+                  Curve{.name = text, .points = {{1.0, 1.0}}, .look = Shape::triangle},
                   Band{.name = text, .points = {{0.0, 1.0, 2.0}, {1.0, 1.0, 2.0}}},
                   LimitLine{.label = text, .value = 20.0}};
   const ChartText of_chart{.id = "x", .title = text, .description = text};
@@ -113,7 +113,7 @@ Chart curve(std::vector<Point> points, Scale scale) {
   return {.text = {.id = "curve", .title = "", .description = ""},
           .x = {.label = "n", .scale = scale, .from = 0.1, .to = 1000.0},
           .y = {.label = "std", .from = 0.0, .to = 1.0},
-          .layers = {Line{.name = "", .points = std::move(points), .ink = Ink::third}}};
+          .layers = {Curve{.name = "", .points = std::move(points), .ink = Ink::third}}};
 }
 
 // Powers of ten are equally far apart on a logarithmic axis, and its lower end is at the left.

@@ -1,5 +1,8 @@
 #include "coordinator/page/attempts_chart.hpp"
 
+#include <set>
+#include <string>
+
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
@@ -29,22 +32,27 @@ RecentAttempts random_attempts(unsigned seed, double compute_s_max) {
 }
 
 TEST(AttemptLanes, HoldEachAttemptOnceWithoutOverlap) {
+  constexpr double last_s = 2e9;
   for (const double compute_s_max : {0.05, 3.0, 40.0}) {
     const RecentAttempts attempts = random_attempts(1, compute_s_max);
-    std::size_t count = 0;
-    for (const AttemptLane& lane : lanes_of(attempts)) {
+    std::set<std::size_t> runs;
+    std::string worker;
+    for (const TimelineLane& lane : lanes_of(attempts, last_s)) {
+      if (!lane.label.empty()) worker = lane.label;
       double free_until = 1e300;
-      for (const PlacedAttempt& attempt : lane.attempts) {
-        EXPECT_EQ(attempt.computed->worker_key, lane.worker_key);
-        EXPECT_LE(attempt.end_s, free_until);
-        free_until = attempt.begin_s();
-        const auto received = static_cast<double>(attempt.computed->received_unix_s);
-        EXPECT_LE(attempt.end_s, received);
-        EXPECT_GE(attempt.end_s, received - 1.0);
-        ++count;
+      for (const TimelineBar& bar : lane.bars) {
+        const std::size_t run = std::stoul(bar.tooltip.substr(std::string("run ").size()));
+        EXPECT_TRUE(runs.insert(run).second) << run;
+        EXPECT_EQ(attempts.computed.at(run).worker_key, worker == "a" ? 1U : 2U);
+        EXPECT_LE(bar.end, free_until);
+        free_until = bar.begin;
+        const double received =
+            static_cast<double>(attempts.computed[run].received_unix_s) - last_s;
+        EXPECT_LE(bar.end, received);
+        EXPECT_GE(bar.end, received - 1.0);
       }
     }
-    EXPECT_EQ(count, attempts.computed.size());
+    EXPECT_EQ(runs.size(), attempts.computed.size());
   }
 }
 
@@ -55,7 +63,7 @@ TEST(AttemptLanes, AreOneForOneThread) {
     attempts.computed.push_back(computed(static_cast<std::uint64_t>(i), 1, 1.5,
                                          static_cast<std::uint64_t>(1000.0 + 1.5 * i)));
   }
-  EXPECT_EQ(lanes_of(attempts).size(), 1U);
+  EXPECT_EQ(lanes_of(attempts, 0.0).size(), 1U);
 }
 
 TEST(AttemptsChart, SaysHowManyLanesItLeavesOut) {

@@ -45,26 +45,19 @@ CampaignRecord record(const std::filesystem::path& file, std::uint64_t num_done 
   return campaign;
 }
 
-/// A reader whose databases are played; counts how often each is read.
+/// A reader whose databases are played: each reading has one event and five results more. Counts
+/// how often each is read.
 class DetailReaderTest : public ::testing::Test {
  protected:
-  DetailSources sources() {
-    return {.read_events =
-                [this](const CampaignRecord& campaign, const CampaignEvents* before) {
-                  note("events " + campaign.file.string());
-                  auto events = std::make_shared<CampaignEvents>();
-                  events->events = before == nullptr ? decltype(events->events){} : before->events;
-                  events->events.push_back({.id = events->events.size() + 1});
-                  return events;
-                },
-            .read_results =
-                [this](const CampaignRecord& campaign, const CampaignResults* before) {
-                  note("results " + campaign.file.string());
-                  auto results = std::make_shared<CampaignResults>();
-                  results->html = "<p>" + campaign.file.string() + "</p>";
-                  results->num_runs = (before == nullptr ? 0 : before->num_runs) + 5;
-                  return results;
-                }};
+  ReadDetails played() {
+    return [this](const CampaignRecord& campaign, const CampaignDetails* before) {
+      note(campaign.file.string());
+      CampaignDetails details = before == nullptr ? CampaignDetails() : *before;
+      details.events.push_back({.id = details.events.size() + 1});
+      details.html = "<p>" + campaign.file.string() + "</p>";
+      details.num_runs += 5;
+      return details;
+    };
   }
   void note(const std::string& what) {
     const std::lock_guard lock(mutex_);
@@ -79,12 +72,12 @@ class DetailReaderTest : public ::testing::Test {
     const std::lock_guard lock(mutex_);
     return counts_[what];
   }
-  /// Asks until both parts are there.
-  static CampaignDetails whole(DetailReader& reader, const CampaignRecord& campaign) {
+  /// Asks until something was read.
+  static CampaignDetails read(DetailReader& reader, const CampaignRecord& campaign) {
     const auto end = std::chrono::steady_clock::now() + 20s;
     while (std::chrono::steady_clock::now() < end) {
-      CampaignDetails details = reader.details(campaign, std::chrono::steady_clock::now());
-      if (details.events != nullptr && details.results != nullptr) return details;
+      const auto details = reader.details(campaign, std::chrono::steady_clock::now());
+      if (details != nullptr) return *details;
       std::this_thread::yield();
     }
     ADD_FAILURE() << "the details never came";
@@ -98,34 +91,20 @@ class DetailReaderTest : public ::testing::Test {
 };
 
 TEST_F(DetailReaderTest, ReadsACampaignAtWhichSomebodyLooks) {
-  DetailReader reader(sources());
-  const CampaignDetails first = reader.details(record("a.db"), std::chrono::steady_clock::now());
-  EXPECT_EQ(first.events, nullptr);  // It never waits.
-  const CampaignDetails details = whole(reader, record("a.db"));
-  EXPECT_EQ(details.results->html, "<p>a.db</p>");
-  EXPECT_EQ(details.events->events.size(), 1U);
+  DetailReader reader(played());
+  EXPECT_EQ(reader.details(record("a.db"), std::chrono::steady_clock::now()), nullptr);
+  const CampaignDetails details = read(reader, record("a.db"));  // The first never waits.
+  EXPECT_EQ(details.html, "<p>a.db</p>");
+  EXPECT_EQ(details.events.size(), 1U);
 }
 
-TEST_F(DetailReaderTest, ReadsEventsFurtherAndResultsOnlyIfThereAreMore) {
-  DetailReader reader(sources());
-  const CampaignRecord subject = record("a.db", 5);
-  (void)whole(reader, subject);
-  wait_for("events a.db", 2);  // Two seconds later.
-  EXPECT_EQ(count_of("results a.db"), 1);
-  (void)reader.details(record("a.db", 6), std::chrono::steady_clock::now());
-  wait_for("results a.db", 2);
-  EXPECT_GE(whole(reader, subject).events->events.size(), 2U);
-}
-
-// A part of five results at a time.
-TEST_F(DetailReaderTest, ReadsResultsFurtherUntilItHasThoseThatAreFinished) {
-  DetailReader reader(sources());
-  const CampaignRecord subject = record("a.db", 10);
-  (void)whole(reader, subject);
-  wait_for("results a.db", 2);
-  wait_for("events a.db", 3);
-  EXPECT_EQ(count_of("results a.db"), 2);
-  EXPECT_EQ(whole(reader, subject).results->num_runs, 10U);
+TEST_F(DetailReaderTest, ReadsFurtherWhatItHas) {
+  DetailReader reader(played());
+  (void)read(reader, record("a.db"));
+  wait_for("a.db", 3);  // Two and four seconds later.
+  const CampaignDetails details = read(reader, record("a.db"));
+  EXPECT_GE(details.events.size(), 2U);
+  EXPECT_EQ(details.num_runs, 5 * details.events.size());
 }
 
 /// Uses so much time of the processor.
@@ -143,92 +122,82 @@ void work_for(std::chrono::nanoseconds cpu_time) {
 // Another campaign is no reason to read earlier.
 TEST_F(DetailReaderTest, RestsAfterEachReadingWhateverIsNext) {
   constexpr auto cpu_time = 5ms;
-  DetailSources played = sources();
   std::vector<TimePoint> begun, ended;  // Of the reader's thread.
-  played.read_events = [&, read = played.read_events](const CampaignRecord& campaign,
-                                                      const CampaignEvents* before) {
+  const auto slowly = [&, read = played()](const CampaignRecord& campaign,
+                                           const CampaignDetails* before) {
     begun.push_back(std::chrono::steady_clock::now());
     work_for(cpu_time);
     ended.push_back(std::chrono::steady_clock::now());
     return read(campaign, before);
   };
   {
-    DetailReader reader(played);
+    DetailReader reader(slowly);
     for (const std::string name : {"a", "b", "c"}) {
       (void)reader.details(record(name + ".db"), std::chrono::steady_clock::now());
     }
-    for (const std::string name : {"a", "b", "c"}) wait_for("events " + name + ".db", 1);
+    for (const std::string name : {"a", "b", "c"}) wait_for(name + ".db", 1);
   }
   ASSERT_GE(begun.size(), 3U);
   for (std::size_t i = 1; i < begun.size(); ++i) EXPECT_GE(begun[i] - ended[i - 1], 75 * cpu_time);
 }
 
 TEST_F(DetailReaderTest, BeginsAnewWithAnotherFileOfThatName) {
-  DetailReader reader(sources());
-  (void)whole(reader, record("a.db"));
-  EXPECT_EQ(whole(reader, record("b.db", 0, "a")).results->html, "<p>b.db</p>");
+  DetailReader reader(played());
+  (void)read(reader, record("a.db"));
+  EXPECT_EQ(read(reader, record("b.db", 0, "a")).html, "<p>b.db</p>");
 }
 
 TEST_F(DetailReaderTest, BeginsAnewWithAnotherCampaignInThatFile) {
-  DetailReader reader(sources());
-  CampaignRecord first = record("a.db", 5), second = first;
+  DetailReader reader(played());
+  CampaignRecord first = record("a.db"), second = first;
   first.id = {1};
   second.id = {2};
-  (void)whole(reader, first);
-  EXPECT_EQ(reader.details(second, std::chrono::steady_clock::now()).results, nullptr);
-  EXPECT_EQ(whole(reader, second).results->num_runs, 5U);
+  (void)read(reader, first);
+  EXPECT_EQ(reader.details(second, std::chrono::steady_clock::now()), nullptr);
+  EXPECT_EQ(read(reader, second).num_runs, 5U);
 }
 
-// The file is an older copy now, or the number was older than the reading.
-TEST_F(DetailReaderTest, ReadsResultsAgainIfFewerAreFinishedThanItRead) {
-  DetailReader reader(sources());
-  (void)whole(reader, record("a.db", 5));
-  (void)reader.details(record("a.db", 4), std::chrono::steady_clock::now());
-  wait_for("results a.db", 2);
-}
-
-TEST_F(DetailReaderTest, TriesAgainWhatCouldNotBeRead) {
-  DetailSources played = sources();
-  played.read_results = [this](const CampaignRecord&, const CampaignResults* before) {
-    note("results");
-    auto results = std::make_shared<CampaignResults>();
-    if (before == nullptr) results->failure = "not now";
-    return results;
+TEST_F(DetailReaderTest, TriesAgainWhatCouldNotBeReadAndKeepsItsAge) {
+  const auto failing = [this](const CampaignRecord&, const CampaignDetails* before) {
+    note("tried");
+    CampaignDetails details = before == nullptr ? CampaignDetails() : *before;
+    if (before != nullptr) details.failure = "not now";
+    return details;
   };
-  DetailReader reader(played);
-  EXPECT_EQ(whole(reader, record("a.db")).results->failure, "not now");
-  wait_for("results", 2);
+  DetailReader reader(failing);
+  const TimePoint read_at = read(reader, record("a.db")).read_at;
+  wait_for("tried", 3);
+  const CampaignDetails details = read(reader, record("a.db"));
+  EXPECT_EQ(details.failure, "not now");
+  EXPECT_EQ(details.read_at, read_at);
 }
 
 // As if memory were short in its own code.
 TEST_F(DetailReaderTest, GoesOnAfterAnException) {
-  DetailSources played = sources();
-  played.read_events = [this, read = played.read_events](const CampaignRecord& campaign,
-                                                         const CampaignEvents* before) {
+  const auto short_of_memory = [this, read = played()](const CampaignRecord& campaign,
+                                                       const CampaignDetails* before) {
     note("tried");
     if (count_of("tried") == 1) throw std::bad_alloc();
     return read(campaign, before);
   };
-  DetailReader reader(played);
-  EXPECT_EQ(whole(reader, record("a.db")).events->events.size(), 1U);
+  DetailReader reader(short_of_memory);
+  EXPECT_EQ(read(reader, record("a.db")).events.size(), 1U);
 }
 
 TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
-  DetailReader reader(sources());
+  DetailReader reader(played());
   const auto now = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < DetailReader::num_campaigns_max; ++i) {
-    EXPECT_EQ(reader.details(record(fmt::format("c{}.db", i)), now).events, nullptr);
+    EXPECT_EQ(reader.details(record(fmt::format("c{}.db", i)), now), nullptr);
   }
-  const CampaignDetails none = reader.details(record("more.db"), now + 1s);
-  ASSERT_NE(none.events, nullptr);
-  EXPECT_EQ(none.events->failure,
-            "campaigns that are looked at = 64 (must be fewer; try again in 60 s)");
-  EXPECT_EQ(none.results->failure, none.events->failure);
+  const auto none = reader.details(record("more.db"), now + 1s);
+  ASSERT_NE(none, nullptr);
+  EXPECT_EQ(none->failure, "campaigns that are looked at = 64 (must be fewer; try again in 60 s)");
   // Those that were asked for before are still there, read by now or not, and one gives its place
   // when it is not wanted any more.
-  const CampaignDetails kept = reader.details(record("c0.db"), now + 2s);
-  EXPECT_TRUE(kept.results == nullptr || kept.results->failure.empty());
-  EXPECT_EQ(reader.details(record("more.db"), now + 61s).events, nullptr);
+  const auto kept = reader.details(record("c0.db"), now + 2s);
+  EXPECT_TRUE(kept == nullptr || kept->failure.empty());
+  EXPECT_EQ(reader.details(record("more.db"), now + 61s), nullptr);
 }
 
 class DatabaseDetails : public test::StoreTest {
@@ -254,47 +223,54 @@ class DatabaseDetails : public test::StoreTest {
     }
     (void)store.write(entries);
   }
-  [[nodiscard]] std::shared_ptr<const CampaignResults> results_after(
-      std::uint64_t num_finished, const CampaignResults* before) const {
-    return sources_.read_results(record(file(), num_finished), before);
+  /// What a reading further than `before` has when so many runs are finished.
+  [[nodiscard]] CampaignDetails details_after(std::uint64_t num_finished,
+                                              const CampaignDetails* before) const {
+    return read_details(record(file(), num_finished), before);
   }
-  [[nodiscard]] std::vector<std::string> texts_after(const CampaignEvents* before) {
-    events_ = sources_.read_events(record(file()), before);
+  static std::vector<std::string> texts_of(const CampaignDetails& details) {
     std::vector<std::string> texts;
-    for (const StoredEvent& event : events_->events) texts.push_back(event.text);
+    for (const StoredEvent& event : details.events) texts.push_back(event.text);
     return texts;
   }
-
-  const DetailSources sources_ = database_sources();
-  std::shared_ptr<const CampaignEvents> events_;
 };
 
 TEST_F(DatabaseDetails, GoOnAfterWhatWasRead) {
   Store store = made(3);
-  const auto results = results_after(3, nullptr);
-  EXPECT_THAT(texts_after(nullptr), testing::ElementsAre("first", "second"));
+  const CampaignDetails first = details_after(3, nullptr);
+  EXPECT_THAT(texts_of(first), testing::ElementsAre("first", "second"));
   add(store, 3, 5, "third");
-  EXPECT_EQ(results_after(5, results.get())->num_runs, 5U);
-  const auto before = events_;
-  EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second", "third"));
+  const CampaignDetails second = details_after(5, &first);
+  EXPECT_EQ(second.num_runs, 5U);
+  EXPECT_THAT(texts_of(second), testing::ElementsAre("first", "second", "third"));
+}
+
+// Results are read further only if there are others than those that were read.
+TEST_F(DatabaseDetails, KeepTheirResultsWhileThereAreNoOthers) {
+  Store store = made(3);
+  const CampaignDetails first = details_after(3, nullptr);
+  add(store, 3, 4, "third");
+  const CampaignDetails second = details_after(3, &first);
+  EXPECT_EQ(second.reading, first.reading);
+  EXPECT_EQ(second.events.size(), 3U);
 }
 
 TEST_F(DatabaseDetails, AreThoseOfAnOlderCopyThatTookThePlaceOfTheFile) {
   const std::filesystem::path copy = directory() / "copy.db";
-  std::shared_ptr<const CampaignResults> results;
+  CampaignDetails before;
   {
     Store store = made(3);
     store.back_up(copy);
     add(store, 3, 5, "third");
     add(store, 5, 6, "fourth");
-    results = results_after(6, nullptr);
-    (void)texts_after(nullptr);
+    before = details_after(6, nullptr);
     (void)store.rest();
   }
-  const auto before = events_;
+  EXPECT_EQ(before.num_runs, 6U);
   std::filesystem::rename(copy, file());
-  EXPECT_EQ(results_after(3, results.get())->num_runs, 3U);
-  EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second"));
+  const CampaignDetails again = details_after(3, &before);
+  EXPECT_EQ(again.num_runs, 3U);
+  EXPECT_THAT(texts_of(again), testing::ElementsAre("first", "second"));
 }
 
 // Results that were read are newer than the number of those that are finished. Begun anew, they
@@ -302,28 +278,25 @@ TEST_F(DatabaseDetails, AreThoseOfAnOlderCopyThatTookThePlaceOfTheFile) {
 TEST_F(DatabaseDetails, AreKeptIfTheFileHasThem) {
   constexpr std::uint64_t num_results = page_results_a_reading + 100;
   const Store store = made(num_results);
-  const auto part = results_after(num_results, nullptr);
-  const auto results = results_after(num_results, part.get());
-  EXPECT_EQ(results->num_runs, num_results);
-  EXPECT_EQ(results_after(num_results - 1, results.get())->num_runs, num_results);
+  const CampaignDetails part = details_after(num_results, nullptr);
+  const CampaignDetails whole = details_after(num_results, &part);
+  EXPECT_EQ(whole.num_runs, num_results);
+  EXPECT_EQ(details_after(num_results - 1, &whole).num_runs, num_results);
 }
 
 TEST_F(DatabaseDetails, AreThoseOfBeforeIfTheFileCannotBeRead) {
-  std::shared_ptr<const CampaignResults> results;
+  CampaignDetails before;
   {
     Store store = made(3);
-    results = results_after(3, nullptr);
-    (void)texts_after(nullptr);
+    before = details_after(3, nullptr);
     (void)store.rest();
   }
-  const auto before = events_;
   std::filesystem::rename(file(), directory() / "away.db");
-  const auto again = results_after(3, results.get());
-  EXPECT_THAT(again->failure, testing::HasSubstr("(does not exist)"));
-  EXPECT_EQ(again->num_runs, 3U);
-  EXPECT_EQ(again->html, results->html);
-  EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second"));
-  EXPECT_THAT(events_->failure, testing::HasSubstr("(does not exist)"));
+  const CampaignDetails again = details_after(3, &before);
+  EXPECT_THAT(again.failure, testing::HasSubstr("(does not exist)"));
+  EXPECT_EQ(again.num_runs, 3U);
+  EXPECT_EQ(again.html, before.html);
+  EXPECT_THAT(texts_of(again), testing::ElementsAre("first", "second"));
 }
 
 /// A campaign of 2,000 runs whose results come as a test wants them. Errors grow with the run.

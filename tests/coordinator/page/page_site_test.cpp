@@ -14,9 +14,9 @@ class PageSiteTest : public ::testing::Test {
     service.campaigns = {test::campaign_snapshot("a", 42, 100),
                          test::campaign_snapshot(test::hostile_name, 1, 2)};
     service.workers = test::many_workers(120);
-    auto events = std::make_shared<CampaignEvents>();
-    for (std::uint64_t id = 11; id <= 20; ++id) events->events.push_back({.id = id, .kind = "e"});
-    details.events = events;
+    auto read = std::make_shared<CampaignDetails>();
+    for (std::uint64_t id = 11; id <= 20; ++id) read->events.push_back({.id = id, .kind = "e"});
+    details = read;
     turn();
   }
   void turn() {
@@ -51,7 +51,7 @@ class PageSiteTest : public ::testing::Test {
   TimePoint now{1000s};
   SnapshotBoard board{now};
   ServiceSnapshot service;
-  CampaignDetails details;
+  std::shared_ptr<const CampaignDetails> details;
   std::optional<std::string> token;
   std::string asked_for;
 };

@@ -110,12 +110,12 @@ TEST(Fit, IsNoneWhereStandardErrorsHaveNone) {
 TEST(Fit, HasATableThatSaysWhatDoesNotFit) {
   const std::vector<std::vector<double>> runs{{20.1, 6.0, 20.0, 4.0, 2.0, 2.0},
                                               {21.0, 6.0, 19.0, 4.0, 2.0, 2.0}};
-  std::vector<FitStatistic> fit = fit_of(runs);
-  const auto text = [&] { return terminal_text(fit_table(schema_of_two(), fit), {}); };
+  StandardErrorStatistics statistics{.quantities = {}, .fit = fit_of(runs)};
+  const auto text = [&] { return terminal_text(fit_table(schema_of_two(), statistics.fit), {}); };
   EXPECT_THAT(text(), AllOf(ContainsRegex("a_c12 +19.5 +4.00 +4.88 .* does not fit"),
                             ContainsRegex("a_c13 +2.00 +2.00 +1.00 +0 +1.00\n"),
                             HasSubstr("chance that one of 3 ratios")));
-  leave_out_intervals(fit);
+  leave_out_intervals(statistics);
   EXPECT_THAT(text(), AllOf(HasSubstr("4.88"), Not(HasSubstr("fit\n")), Not(HasSubstr("chance"))));
   EXPECT_TRUE(fit_table(schema_of_two(), fit_of({})).rows.empty());
 }

@@ -307,18 +307,18 @@ TEST(RequirementText, TellsBoundsAndHowManyDrawsDecide) {
   const std::string fixed = "Rule         100 draws, a number fixed before the first result\n";
   const Case cases[] = {
       {"a_c12 < 9e-4 for 9% with 95%", 1'000'000, 909'905,
-       "Exceeding    909905 of 1000000 runs;\n             at least 90.94 % and at most 91.04 % of "
-       "all draws, each with 95 %\n"},
+       "Exceeding    909905 of 1000000 runs; at least 90.94 % and at most 91.04 % of all\n"
+       "             draws, each with 95 %\n"},
       {"a_c12 < 9e-4 for 99% with 95%", 100, 1,
        "Draws        663 meet the requirement if no further one exceeds the limit,\n"
        "             none decide if"},
       {"a_c12 < 9e-4 for 99.0031% with 95%", 299, 0,
-       "at least 0 % and at most 0.99691 % of all draws, each with"},
+       "at least 0 % and at most 0.99691 % of all draws,\n"},
       {"a_d11_prime < 9e-4 for 95% with 95%", 59, 0, " below 0.0001, with 95 %\n"},
       {"all objectives for 95% with 90%", 100, 3,
        "Answer       undecided\n" + fixed +
-           "Holding      97 of 100 runs;\n             at least 93.44 % and at most 98.89 % of all "
-           "draws, each with 90 %\nRequired     95 % of all draws\nDraws        "},
+           "Holding      97 of 100 runs; at least 93.44 % and at most 98.89 % of all draws,\n"
+           "             each with 90 %\nRequired     95 % of all draws\nDraws        "},
       {"all objectives for 95% with 90%", 100, 3,
        " meet the requirement if no further one exceeds an objective,\n"},
       {"all objectives for 95% with 90%", 100, 3, " decide if they go on to exceed one as often\n"},
@@ -351,7 +351,8 @@ TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
   store.commit(deliveries);
   const std::vector<std::string> texts{"all objectives for 50% with 50%"};
   const RequirementAnswer answer =
-      check_requirements(store, objectives, numbered_requirements(texts))[0];
+      read_review(store, test::campaign_of(11), ReviewDepth::matrix, numbered_requirements(texts))
+          .matrix[0];
   EXPECT_EQ(answer.check.num_runs, 11U);
   EXPECT_EQ(answer.check.num_exceedances, 4U);
   EXPECT_EQ(answer.check.num_without_estimate, 2U);
@@ -363,8 +364,9 @@ TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
 TEST_F(StoredRequirement, IsOfAFixedSizeUntilTheCampaignIsExtended) {
   const std::vector<std::string> texts{"k2c < 1e9 for 95% with 95%"};
   const auto answer = [&](const Store& store) {
-    return check_requirements(store, MicroscopeCampaign{}.objectives(),
-                              numbered_requirements(texts))[0];
+    return read_review(store, test::campaign_of(64), ReviewDepth::matrix,
+                       numbered_requirements(texts))
+        .matrix[0];
   };
   Store store = Store::create(file(), test::campaign_of(60), "");
   EXPECT_EQ(store.num_runs_fixed(), 60U);

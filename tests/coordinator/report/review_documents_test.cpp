@@ -73,7 +73,7 @@ TEST_F(ReviewHtml, DrawsTheOperatingCharacteristic) {
   const Store store = store_with(100);
   const std::vector<Chart> charts = characteristic_charts(review_of(store, 100));
   ASSERT_EQ(charts.size(), 1U);
-  const auto& line = std::get<Line>(charts[0].layers.at(0));
+  const auto& line = std::get<Curve>(charts[0].layers.at(0));
   EXPECT_EQ(line.points.front().y, 100.0);
   for (const Point& point : line.points) {
     const double p = point.x / 100.0;

@@ -81,11 +81,14 @@ TEST(TerminalTable, CutsTextAndNoNumberWhereTheLineHasNoRoom) {
             "name      runs\n──────────────\na      1234567\n");
 }
 
-TEST(TerminalTable, PutsAWideTextAboveItsRowIfAsked) {
-  Table table = named_runs({{"calibration", "12"}, {"a", "3"}});
-  table.columns[0].has_lines_of_its_own = true;
-  EXPECT_EQ(terminal_text(table),
-            "name    runs\n────────────\ncalibration\n          12\na          3\n");
+TEST(TerminalTable, GoesOnBelowWhereADocumentHasNoRoom) {
+  const Table table = named_runs({{"a calibration/of-it", "12"}, {"b", "3"}});
+  EXPECT_EQ(terminal_text(table, {.line_width_max = 15, .wraps_cells = true}),
+            "name       runs\n───────────────\na            12\ncalibra\ntion/of\n-it\n"
+            "b             3\n");
+  EXPECT_EQ(terminal_text(table, document_style(Paint::no)),
+            "name                  runs\n──────────────────────────\n"
+            "a calibration/of-it     12\nb                        3\n");
 }
 
 TEST(TerminalTable, HasGroupsVerticalLinesAndATotal) {
@@ -179,12 +182,21 @@ TEST(Tone, IsReadableOnBlackAndOnWhite) {
   EXPECT_EQ(colour_of(Tone::heading), 0) << "the terminal's own";
 }
 
-TEST(LineOf, BreaksWhatATerminalHasNoRoomFor) {
-  const std::string first(40, 'a');
-  const std::string second = std::string(37, 'b').append("² ");
-  EXPECT_EQ(line_of(first, second, 4), first + " " + second + "\n");
-  EXPECT_EQ(line_of(first, std::string(40, 'b'), 4),
-            first + "\n    " + std::string(40, 'b') + "\n");
+TEST(Fitted, BreaksLinesThatATerminalHasNoRoomForBelowTheirBeginning) {
+  const std::string short_line = "Label     " + std::string(70, 'a') + "\n";
+  EXPECT_EQ(fitted(short_line), short_line);
+  EXPECT_EQ(fitted("Label     " + std::string(69, 'a') + " b\nnext\n"),
+            "Label     " + std::string(69, 'a') + "\n          b\nnext\n");
+  EXPECT_EQ(fitted("    " + std::string(75, 'a') + " b"),
+            "    " + std::string(75, 'a') + "\n      b\n");
+  EXPECT_EQ(fitted(std::string(90, 'a') + " b"), std::string(90, 'a') + "\n  b\n");
+  EXPECT_EQ(fitted(std::string(90, ' ')), std::string(90, ' ') + "\n");
+}
+
+TEST(SentenceMarkup, ShowsCommandsAsCode) {
+  EXPECT_EQ(sentence_markup("run `a <b>` or `c`: it's"),
+            "run <code>a &lt;b&gt;</code> or <code>c</code>: it&#39;s");
+  EXPECT_EQ(sentence_markup("a `b"), "a `b");
 }
 
 TEST(MeasuredFigure, CarriesIntoTheNextDecade) {
