@@ -68,7 +68,8 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   status.set_num_duplicates(campaign.num_duplicates);
   status.set_num_audited(campaign.num_audited);
   status.set_num_mismatches(campaign.num_mismatches);
-  status.set_rate_hz(served.rate.rate_hz(context_.now()));
+  const bool is_computed = phase_of(id) == Phase::active;
+  status.set_rate_hz(is_computed ? served.rate.rate_hz(context_.now()) : 0.0);
   const std::optional<double> left_s = remaining_s(campaign, status.rate_hz());
   if (left_s) status.set_remaining_s(*left_s);
   status.set_storage_failure(campaign.storage_failure);

@@ -77,8 +77,7 @@ std::string progress_bar(const proto::CampaignStatus& campaign, std::string_view
 }
 
 std::string rate_text(const proto::CampaignStatus& campaign) {
-  const bool is_computed = campaign.phase() == proto::CAMPAIGN_PHASE_ACTIVE;
-  return is_computed && campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
+  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
 }
 
 std::string time_left_text(const proto::CampaignStatus& campaign) {

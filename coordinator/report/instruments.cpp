@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -71,45 +70,31 @@ void RunningInstruments::add_shares(Runs runs, std::size_t i) {
   Quantity& quantity = quantities_[i];
   quantity.beyond.add(
       count_of(runs, [&](const RunResult& run) { return is_beyond(run, i, objectives_[i]); }));
-  if (!quantity.position) return;
-  const auto has_sigma = [](const RunResult& run) {
-    return run.is_completed() && !run.standard_error.empty();
-  };
-  CompensatedSum errors;
-  double count = 0.0;
-  for (const RunResult& run : runs) {
-    if (!has_sigma(run)) continue;
-    have_standard_errors_ = true;
-    errors.add(run.error(i));
-    count += 1.0;
-  }
-  const auto add = [&](GroupedHits& hits, double centre, double factor) {
-    hits.add(count_of(runs, [&](const RunResult& run) {
-      return has_sigma(run) && std::abs((run.error(i) - centre) * factor) <
-                                   normal_95 * run.standard_error[*quantity.position];
-    }));
-  };
-  add(quantity.covered, 0.0, 1.0);
-  // A single run has no distance from the mean of its instrument: its error is infinitely far.
-  const double factor =
-      count > 1.0 ? std::sqrt(count / (count - 1.0)) : std::numeric_limits<double>::infinity();
-  add(quantity.covered_within, errors.value() / count, factor);
 }
 
 void RunningInstruments::add_values(Runs runs, std::size_t i) {
   Quantity& quantity = quantities_[i];
-  const std::optional<std::size_t>& position = quantity.position;
   std::vector<double> errors;
-  CompensatedSum magnitudes;
+  CompensatedSum sum, magnitudes;
   for (const RunResult& run : runs) {
     errors.push_back(run.error(i));
-    magnitudes.add(std::abs(run.error(i)));
-    if (!position || run.standard_error.empty()) continue;
-    const double sigma = run.standard_error[*position];
-    quantity.squared_standard_errors += sigma * sigma;
+    sum.add(errors.back());
+    magnitudes.add(std::abs(errors.back()));
   }
+  const auto count = static_cast<double>(runs.size());
   quantity.errors.add(errors);
-  quantity.magnitudes.add(magnitudes.value() / static_cast<double>(runs.size()));
+  quantity.magnitudes.add(magnitudes.value() / count);
+  if (!quantity.position || runs.front().standard_error.empty()) return;
+  have_standard_errors_ = true;
+  const auto sigma = [&](const RunResult& run) { return run.standard_error[*quantity.position]; };
+  for (const RunResult& run : runs) quantity.squared_standard_errors += sigma(run) * sigma(run);
+  const auto add = [&](GroupedHits& hits, double centre, double factor) {
+    hits.add(count_of(runs, [&](const RunResult& run) {
+      return std::abs((run.error(i) - centre) * factor) < normal_95 * sigma(run);
+    }));
+  };
+  add(quantity.covered, 0.0, 1.0);
+  add(quantity.covered_within, sum.value() / count, std::sqrt(count / (count - 1.0)));
 }
 
 InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {

@@ -34,7 +34,7 @@ InstrumentStatistics with_missing_runs() {
   return running.statistics();
 }
 
-TEST(Instruments, CountARunWithoutAnEstimateAsBeyondAndNotCovered) {
+TEST(Instruments, CountARunWithoutAnEstimateAsBeyondAndSayNothingOfItsStandardErrors) {
   const InstrumentStatistics statistics = with_missing_runs();
   EXPECT_EQ(statistics.num_instruments, 3U);
   EXPECT_EQ(statistics.num_incomplete, 1U);
@@ -47,9 +47,8 @@ TEST(Instruments, CountARunWithoutAnEstimateAsBeyondAndNotCovered) {
   ASSERT_EQ(statistics.quantities.size(), objectives().size());
   for (const InstrumentQuantity& of : statistics.quantities) {
     EXPECT_DOUBLE_EQ(of.beyond.share, 2.0 / 6.0);
-    EXPECT_DOUBLE_EQ(of.standard_errors->covered.share, 4.0 / 6.0);
-    // A single run has no distance from the mean of its instrument.
-    EXPECT_DOUBLE_EQ(of.standard_errors->covered_within.share, 2.0 / 6.0);
+    EXPECT_DOUBLE_EQ(of.standard_errors->covered.share, 1.0);
+    EXPECT_DOUBLE_EQ(of.standard_errors->covered_within.share, 1.0);
   }
 }
 
