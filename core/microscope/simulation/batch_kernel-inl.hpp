@@ -156,28 +156,6 @@ void PROOFMASS_NAME(record_mixed_, PROOFMASS_KERNEL_SET)(std::span<const BatchSe
 }
 #endif
 
-double PROOFMASS_NAME(make_noise_, PROOFMASS_KERNEL_SET)(const BatchSession& session,
-                                                         std::size_t num_samples, NoiseWork work) {
-  Batch sum;
-  for (std::size_t first_lane = 0; first_lane < batch_lanes; first_lane += num_lanes) {
-    auto noise = make_noise(session, first_lane);
-    for (std::size_t k = 0; k < num_samples; ++k) {
-      if (work == NoiseWork::deviates) {
-        sum = sum + noise.next_deviate();
-        continue;
-      }
-      const SampleNoise<Batch>& sample = noise.next();
-      const Vector3<Batch> total = sample.sensor_K[0] + sample.sensor_K[1] + sample.angular_S +
-                                   sample.star_tracker_S + sample.thrust_S + sample.torque_S;
-      sum = sum + total.x + total.y + total.z;
-    }
-  }
-  const Lanes values(sum);
-  double result = 0.0;
-  for (std::size_t lane = 0; lane < num_lanes; ++lane) result += values[lane];
-  return result;
-}
-
 #undef PROOFMASS_NAME
 #undef PROOFMASS_JOIN
 
