@@ -96,9 +96,9 @@ std::vector<double> run_truth(const Scenario& scenario, const ParameterArray& tr
 struct RunPlan::Impl : RunParts {
   using RunParts::RunParts;
 
-  /// @param observer  Null if nobody observes the run.
+  /// @param observer  Empty if nobody observes the run.
   void record_session_of_run(std::size_t i, const Instrument& instrument,
-                             const SampleObserver* observer, const SessionProgress& progress,
+                             const SampleObserver& observer, const SessionProgress& progress,
                              RunRecord& record) const {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
@@ -106,7 +106,7 @@ struct RunPlan::Impl : RunParts {
     const LoopConstants<double> constants = make_loop_constants(instrument, scenario, session);
     SessionNoise session_noise(noise, campaign.seed, record.run, session.name);
     Realism realism(scenario, instrument, constants, i, signals.num_settling());
-    if (observer == nullptr) {
+    if (!observer) {
       LaneGroup<double, SessionNoise, Realism> alone{.constants = constants,
                                                      .noise = session_noise};
       alone.eotvos_parameter = instrument.eotvos_parameter;
@@ -119,7 +119,7 @@ struct RunPlan::Impl : RunParts {
     alone.eotvos_parameter = instrument.eotvos_parameter;
     alone.hardware = std::move(realism);
     const double period_s = scenario.simulation.sample_period_s;
-    const SessionObserver session_observer{.observe = *observer,
+    const SessionObserver session_observer{.observe = observer,
                                            .session = i,
                                            .next = -signals.num_settling(),
                                            .sample_period_s = period_s,
@@ -263,29 +263,16 @@ RunPlan::RunPlan(const MicroscopeCampaign& campaign)
 RunPlan::RunPlan(const MicroscopeCampaign& campaign, const EstimationMethodInfo& method)
     : impl_(std::make_unique<Impl>(campaign, method)) {}
 RunPlan::~RunPlan() = default;
-RunPlan::RunPlan(RunPlan&&) noexcept = default;
-RunPlan& RunPlan::operator=(RunPlan&&) noexcept = default;
 
-int RunPlan::num_orbits() const {
+int RunPlan::num_steps() const {
   int total = 0;
   for (const Session& session : impl_->campaign.scenario.sessions) total += session.num_orbits;
   return total;
 }
 
 RunRecord RunPlan::record(RunIndex run, std::span<const double> table_values,
-                          const std::function<void(int)>& progress) const {
-  return record_alone(run, table_values, nullptr, progress);
-}
-
-RunRecord RunPlan::observe(RunIndex run, std::span<const double> table_values,
-                           const SampleObserver& observer,
-                           const std::function<void(int)>& progress) const {
-  return record_alone(run, table_values, &observer, progress);
-}
-
-RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_values,
-                                const SampleObserver* observer,
-                                const std::function<void(int)>& progress) const {
+                          const std::function<void(int)>& progress,
+                          const SampleObserver& observer) const {
   const Scenario& scenario = impl_->campaign.scenario;
   const AcceptedDraw draw = draw_instrument(impl_->campaign, run, table_values);
   RunRecord recorded = impl_->drawn_record(run, draw);
@@ -307,7 +294,7 @@ RunResult RunPlan::replay(const RunRequest& request, const SampleSink& sink,
     append_recorded_values(sample, values);
     sink({.session = sample.session, .time_s = sample.time_s, .values = values});
   };
-  return estimate(observe(request.run, request.table_values, pass_on, progress));
+  return estimate(record(request.run, request.table_values, progress, pass_on));
 }
 
 const Recording& RunPlan::recording() const { return impl_->recording; }
@@ -324,7 +311,7 @@ std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> reque
   PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunResult> results;
   if (set == InstructionSet::scalar || !impl_->campaign.scenario.has_plain_loops()) {
-    const int num_orbits_a_run = num_orbits();
+    const int num_orbits_a_run = num_steps();
     const auto num_runs = static_cast<int>(requests.size());
     for (int i = 0; i < num_runs; ++i) {
       const RunRequest& request = requests[static_cast<std::size_t>(i)];
