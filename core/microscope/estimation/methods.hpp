@@ -17,12 +17,6 @@ namespace proofmass {
 /// What the sessions of a run left: one entry for each of scenario.sessions, in their order.
 using RunPhasors = std::vector<SessionPhasors>;
 
-/// A number that tells how an estimation went.
-struct Diagnostic {
-  std::string_view name;  ///< With its unit; of a constant string.
-  double value = 0.0;
-};
-
 /// How well a session agrees with what was estimated from all of them.
 struct SessionFit {
   double chi_squared = 0.0;
@@ -36,7 +30,6 @@ struct Estimation {
   ParameterArray standard_errors{};  ///< SI; if the method has_standard_errors.
   std::uint32_t num_rounds = 0;
   bool converged = false;  ///< False if values still moved in the last allowed round.
-  std::vector<Diagnostic> diagnostics{};
   /// Correlations of the estimates; if the method has_standard_errors.
   std::array<ParameterArray, num_parameters> correlations{};
   std::vector<SessionFit> session_fits{};  ///< As many as sessions, or none.

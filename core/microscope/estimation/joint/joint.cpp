@@ -418,14 +418,12 @@ Estimation estimate_joint(const RunPhasors& records, const EstimationInput& inpu
   const JointFit fit(records, input);
   UnknownArray unknowns = fit.start();
   Estimation result;
-  double last_move = 0.0;
   while (!result.converged && result.num_rounds < input.config.num_rounds_max) {
     const Solution solution = solve(fit.of_sessions(unknowns), fit.beside(unknowns));
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       unknowns[i] += fit.unit(i) * solution.step[static_cast<Eigen::Index>(i)];
     }
-    last_move = largest_move(solution);
-    result.converged = last_move <= input.config.convergence;
+    result.converged = largest_move(solution) <= input.config.convergence;
     ++result.num_rounds;
   }
   const std::vector<NormalEquations> sessions = fit.of_sessions(unknowns);
@@ -436,7 +434,6 @@ Estimation estimate_joint(const RunPhasors& records, const EstimationInput& inpu
   }
   std::copy_n(unknowns.begin(), num_parameters, result.values.begin());
   set_errors(at_end.covariance, fit, result);
-  result.diagnostics = {{"last_move", last_move}};
   return result;
 }
 

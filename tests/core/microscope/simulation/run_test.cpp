@@ -46,7 +46,6 @@ Estimation first_phasors(const RunPhasors& records, const EstimationInput& input
   for (std::size_t i = 0; i < num_parameters; ++i) {
     estimation.values[i] = records[i].amplitude[index(Signal::differential_x)][0].real();
   }
-  estimation.diagnostics = {{"sessions", static_cast<double>(records.size())}};
   return estimation;
 }
 
@@ -72,8 +71,6 @@ TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
   EXPECT_EQ(other.phasors[7].amplitude, record.phasors[0].amplitude);
   EXPECT_EQ(other.phasors[3].amplitude, record.phasors[3].amplitude);
   EXPECT_TRUE(result.standard_error.empty());
-  const Estimation estimation = plan.estimation(record);
-  EXPECT_EQ(estimation.diagnostics.at(0).value, 11.0);
   campaign.scenario.estimation.convergence = 0.7;
   EXPECT_EQ(RunPlan(campaign, method).simulate(RunIndex{0}, {}).status, RunStatus::not_converged);
 }
