@@ -41,15 +41,6 @@ Definition MicroscopeCampaign::definition(TableColumns columns) const {
   return definition_of(*this, columns);
 }
 
-std::vector<DefinitionItem> MicroscopeCampaign::items() const { return definition_items(*this); }
-
-std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
-    const Campaign& other) const {
-  const auto* const second = dynamic_cast<const MicroscopeCampaign*>(&other);
-  if (second == nullptr) return {};
-  return compare_definitions(*this, *second);
-}
-
 namespace {
 
 /// With the columns of standard errors whatever the method is, as databases of all campaigns had

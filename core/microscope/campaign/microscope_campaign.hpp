@@ -16,7 +16,7 @@ namespace proofmass {
 
 /// A campaign of MICROSCOPE, which calibrates and may test the equivalence principle: the scenario
 /// that all runs share, and the laws by which the instrument of each run is drawn.
-/// `microscope_model.cpp` defines what derives from other modules.
+/// `microscope_model.cpp` and `definition` define what derives from other modules.
 class MicroscopeCampaign final : public Campaign {
  public:
   MicroscopeCampaign() { name = "hardy2013"; }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -20,26 +19,6 @@ namespace proofmass {
 Scenario::Scenario() : sessions(hardy2013_sessions()) {
   std::ranges::transform(microscope_results().quantities, objectives.begin(), &Quantity::objective);
   std::ranges::transform(test_quantities(), test_objectives.begin(), &Quantity::objective);
-}
-
-namespace {
-
-std::vector<std::string> objective_paths(std::span<const Quantity> quantities) {
-  std::vector<std::string> paths;
-  for (const Quantity& quantity : quantities) paths.push_back("objective." + quantity.column());
-  return paths;
-}
-
-}  // namespace
-
-std::string_view objective_path(std::size_t parameter) {
-  static const std::vector<std::string> paths = objective_paths(microscope_results().quantities);
-  return paths.at(parameter);
-}
-
-std::string_view test_objective_path(std::size_t parameter) {
-  static const std::vector<std::string> paths = objective_paths(test_quantities());
-  return paths.at(parameter);
 }
 
 namespace {

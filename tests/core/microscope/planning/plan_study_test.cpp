@@ -9,6 +9,7 @@
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/parse_campaign.hpp"
 #include "tests/support/runs.hpp"
 #include "tests/test.hpp"
 
@@ -268,8 +269,7 @@ TEST(PlanStudy, WritesTheCampaignThatItsBoundIsOf) {
   const auto study = study_plan(campaign);
   std::vector<int> orbits = study->num_steps();
   orbits[3] = 37;
-  const MicroscopeCampaign written =
-      parse_campaign("written", study->campaign_file(orbits), {}, {});
+  const MicroscopeCampaign written = test::parse_campaign("written", study->campaign_file(orbits));
   EXPECT_EQ(estimation_method(written.scenario.estimation.method).name, "joint");
   EXPECT_EQ(written.num_runs, campaign.num_runs);
   const auto again = study_plan(written);
