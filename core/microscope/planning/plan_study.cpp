@@ -223,33 +223,23 @@ class JointStudy final : public PlanStudy {
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};
     probes_ = probe_records(brief, add_instruments(record.phasors, input));
+    scope_ = {
+        .method = std::string(joint_method.name),
+        .num_steps_min = joint_orbits_min(scenario.orbit.period_s, scenario.estimation.transient_s),
+        .num_steps_max = num_session_orbits_max,
+        .num_instruments = instruments_.size(),
+        .num_probed = probes_.size()};
+    for (const Session& session : whole_.scenario.sessions) {
+      if (is_test(session)) {
+        scope_.num_steps_beside += session.num_orbits;
+        continue;
+      }
+      scope_.sessions.push_back(session.name);
+      scope_.num_steps.push_back(session.num_orbits);
+    }
   }
 
-  [[nodiscard]] std::string method() const override { return std::string(joint_method.name); }
-  [[nodiscard]] std::vector<std::string> session_names() const override {
-    std::vector<std::string> names;
-    for (const Session& session : campaign_.scenario.sessions) names.push_back(session.name);
-    return names;
-  }
-  [[nodiscard]] std::vector<int> num_steps() const override {
-    std::vector<int> orbits;
-    for (const Session& session : campaign_.scenario.sessions) orbits.push_back(session.num_orbits);
-    return orbits;
-  }
-  [[nodiscard]] int num_steps_beside() const override {
-    int orbits = 0;
-    for (const Session& session : whole_.scenario.sessions) {
-      if (is_test(session)) orbits += session.num_orbits;
-    }
-    return orbits;
-  }
-  [[nodiscard]] int num_steps_min() const override {
-    return joint_orbits_min(campaign_.scenario.orbit.period_s,
-                            campaign_.scenario.estimation.transient_s);
-  }
-  [[nodiscard]] int num_steps_max() const override { return num_session_orbits_max; }
-  [[nodiscard]] std::size_t num_instruments() const override { return instruments_.size(); }
-  [[nodiscard]] std::size_t num_probed() const override { return probes_.size(); }
+  [[nodiscard]] const PlanScope& scope() const override { return scope_; }
 
   [[nodiscard]] std::string remedy(std::size_t quantity) const override {
     const std::string_view what = what_determines(static_cast<Parameter>(quantity));
@@ -289,7 +279,7 @@ class JointStudy final : public PlanStudy {
       bound.misses_any += part * miss_chance(objectives, of_instrument).miss;
     }
     // A run that is lost misses everything.
-    const double lost = static_cast<double>(bound.num_lost()) / static_cast<double>(num_probed());
+    const double lost = static_cast<double>(bound.num_lost()) / static_cast<double>(probes_.size());
     for (double& miss : bound.misses) miss += lost * (1.0 - miss);
     bound.misses_any += lost * (1.0 - bound.misses_any);
     if (campaign_.error_budget()) bound.mean_budget = mean_budget(bound.standard_errors);
@@ -435,6 +425,7 @@ class JointStudy final : public PlanStudy {
   std::vector<int> measured_orbits_;  ///< Of each session: what `instruments_` is of.
   std::vector<JointInformation> instruments_;
   std::vector<RunRecord> probes_;  ///< Of the first instruments.
+  PlanScope scope_;
 };
 
 }  // namespace
