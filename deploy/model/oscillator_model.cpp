@@ -19,6 +19,7 @@
 #include <limits>
 
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/law_set.hpp"
 #include "core/campaign/recording.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/entry.hpp"
@@ -85,7 +86,7 @@ class OscillatorCampaign final : public Campaign {
   [[nodiscard]] const Model& model() const override { return built_in_model(); }
   void validate() const override {
     check_identity(*this);
-    check_table_columns(*this, {});
+    check_table_columns({}, *this);
     for (const Field& field : fields) check_field(field.info, oscillator.*field.value);
   }
   [[nodiscard]] std::unique_ptr<Campaign> clone() const override {

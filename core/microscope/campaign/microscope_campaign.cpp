@@ -35,7 +35,7 @@ void check_environment(const MicroscopeCampaign& campaign) {
 
 void MicroscopeCampaign::validate() const {
   validate_without_columns();
-  check_table_columns(*this, table_sources(law_set(dispersions)));
+  check_table_columns(law_set(dispersions), *this);
 }
 
 void MicroscopeCampaign::validate_without_columns() const {
