@@ -28,6 +28,13 @@ inline constexpr Range not_negative{.minimum = 0.0};
 }
 }  // namespace range
 
+/// Spelling of an enumerator, of those that names_of() lists in value order from 1.
+template <typename Choice>
+requires requires(Choice choice) { names_of(choice); }
+[[nodiscard]] std::string_view name_of(Choice choice) {
+  return names_of(choice)[static_cast<std::size_t>(choice) - 1];
+}
+
 /// Name, meaning and rule of one number or choice of a scenario.
 struct FieldInfo {
   std::string_view path;     ///< `estimation.transient_s`: table and key in a campaign file.

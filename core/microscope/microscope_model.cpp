@@ -85,7 +85,7 @@ std::string loops_note(const Scenario& scenario) {
   if (scenario.has_plain_loops()) return {};
   const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
   const auto axis_text = [](const AxisMargins& of) {
-    return fmt::format("{} {}", name_of(of.loop), names_of(of.axis)[index(of.axis)]);
+    return fmt::format("{} {}", name_of(of.loop), name_of(of.axis));
   };
   const auto by_gain = [](const AxisMargins& of) { return of.margins.gain; };
   const auto by_phase = [](const AxisMargins& of) { return of.margins.phase_rad; };

@@ -186,10 +186,8 @@ void check_controllers(const Scenario& scenario) {
           controllers[k].axis != controllers[i].axis) {
         continue;
       }
-      throw ConfigError(
-          path + ".axis",
-          fmt::format("\"{}\"", names_of(controllers[i].axis)[index(controllers[i].axis)]),
-          fmt::format("that axis of the loop has one, controller[{}]", k));
+      throw ConfigError(path + ".axis", fmt::format("\"{}\"", name_of(controllers[i].axis)),
+                        fmt::format("that axis of the loop has one, controller[{}]", k));
     }
   }
 }
@@ -218,7 +216,7 @@ void check_stability(const Scenario& scenario) {
     throw ConfigError(path, fmt::format("{}", value),
                       fmt::format("makes the {} loop of axis {} unstable, even with a perfect "
                                   "instrument",
-                                  name_of(of.loop), names_of(of.axis)[index(of.axis)]));
+                                  name_of(of.loop), name_of(of.axis)));
   }
 }
 
