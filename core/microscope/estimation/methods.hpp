@@ -11,6 +11,7 @@
 #include "core/microscope/instrument/noise_config.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
+#include "core/signal/band_pass.hpp"
 
 namespace proofmass {
 
@@ -50,6 +51,14 @@ struct RecordNeeds {
   /// that the record cannot tell from a line before it is left out.
   std::vector<LineMultiple> neighbours{};
 };
+
+/// The filter behind which a session's further lines are recorded: a low-pass at band_ratio times
+/// the highest of them and of their neighbours, but at half of the Nyquist frequency at most. It
+/// keeps fast noise from leaking into the lines. There is no high-pass: what it would make of an
+/// excitation as the record begins lasts for hours, and no line fits it.
+[[nodiscard]] BandPass further_lines_filter(const RecordNeeds& needs, const Session& session,
+                                            const EstimationConfig& config, double orbit_period_s,
+                                            double sample_period_s);
 
 /// What a method may know beside the records of a run: the scenario, apart from what is simulated
 /// only. References hold during the call.

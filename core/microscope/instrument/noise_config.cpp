@@ -3,8 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "core/signal/noise_shape.hpp"
-
 namespace proofmass {
 
 std::span<const std::string_view> names_of(NoisePreset) {

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "core/microscope/instrument/wire_noise.hpp"
-#include "core/signal/sensor_noise.hpp"
+#include "core/signal/noise_shape.hpp"
 
 namespace proofmass {
 

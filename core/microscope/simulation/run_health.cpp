@@ -120,11 +120,9 @@ LoopLoss loss_by_shift(const ShiftBounds& bounds, const LoopHealth& health,
 }
 
 void take_larger(LoopHealth& largest, const LoopHealth& health) {
-  largest.acceleration_m_s2 = std::max(largest.acceleration_m_s2, health.acceleration_m_s2);
-  largest.attitude_rad = std::max(largest.attitude_rad, health.attitude_rad);
-  largest.residual_m_s2 = std::max(largest.residual_m_s2, health.residual_m_s2);
-  largest.quadratic_noise = std::max(largest.quadratic_noise, health.quadratic_noise);
-  largest.square_noise = std::max(largest.square_noise, health.square_noise);
+  for (const HealthValue& value : health_values()) {
+    largest.*value.member = std::max(largest.*value.member, health.*value.member);
+  }
 }
 
 }  // namespace

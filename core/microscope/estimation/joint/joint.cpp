@@ -18,7 +18,6 @@
 #include "core/error.hpp"
 #include "core/microscope/control/star_tracker.hpp"
 #include "core/microscope/estimation/joint/joint_model.hpp"
-#include "core/microscope/estimation/low_pass.hpp"
 
 namespace proofmass {
 namespace {
@@ -36,16 +35,10 @@ using NuisanceVector = Eigen::Matrix<double, num_nuisances, 1>;
 /// Factors of the drawn quantities in a sum of them.
 using Combination = Eigen::Matrix<double, num_drawn, 1>;
 
-const DrawGroup& group_of(std::string_view name) {
-  const auto group = std::ranges::find(draw_groups(), name, &DrawGroup::name);
-  PROOFMASS_EXPECT(group != draw_groups().end());
-  return *group;
-}
-
 /// first·(the axis of sensor 1) + second·(that of sensor 2).
 Combination of_pair(std::string_view name, Axis axis, double first, double second) {
   Combination factors = Combination::Zero();
-  const auto at = static_cast<Eigen::Index>(group_of(name).first + index(axis));
+  const auto at = static_cast<Eigen::Index>(draw_group(name).first + index(axis));
   factors[at] = first;
   factors[at + 3] = second;
   return factors;
@@ -54,7 +47,7 @@ Combination of_pair(std::string_view name, Axis axis, double first, double secon
 /// Bias of the fused angles about an axis, from those of the heads.
 Combination fused_bias(const StarTracker& tracker, Eigen::Index axis) {
   Combination factors = Combination::Zero();
-  const auto first = static_cast<Eigen::Index>(group_of("star_tracker_bias_rad").first);
+  const auto first = static_cast<Eigen::Index>(draw_group("star_tracker_bias_rad").first);
   for (Eigen::Index i = 0; i < 6; ++i) {
     factors[first + i] = tracker.weight[static_cast<std::size_t>(i / 3)](axis, i % 3);
   }
