@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -119,24 +120,23 @@ Priors make_priors(const EstimationInput& input, const DrawnSums& drawn) {
   for (std::size_t i = num_parameters; i < num_unknowns; ++i) {
     priors.mean[i] = drawn.mean(sums.col(static_cast<Eigen::Index>(i - num_parameters)));
   }
-  // Products of two sums, which are taken for independent.
-  for (const auto& [unknown, axis] :
-       {std::pair{Unknown::scale_y, Axis::y}, std::pair{Unknown::scale_z, Axis::z}}) {
-    const Combination k2d = of_pair("quadratic_factor_s2_m", axis, 0.5, -0.5);
-    const Combination b = of_pair("parasitic_acceleration_m_s2", axis, -0.5, 0.5);
-    const double mean = 2.0 * drawn.mean(k2d) * drawn.mean(b);
+  const auto set = [&](Unknown unknown, double mean, double variance) {
     const auto row = static_cast<Eigen::Index>(index(unknown) - num_parameters);
     priors.mean[index(unknown)] = mean;
-    covariance(row, row) = 4.0 * drawn.mean_square(k2d) * drawn.mean_square(b) - mean * mean;
-  }
-  // Squares of sums, which are taken for normal.
-  for (const auto& [unknown, axis] :
-       {std::pair{Unknown::square_y, Axis::y}, std::pair{Unknown::square_z, Axis::z}}) {
+    covariance(row, row) = variance;
+  };
+  for (const auto& [scale, square, axis] :
+       {std::tuple{Unknown::scale_y, Unknown::square_y, Axis::y},
+        std::tuple{Unknown::scale_z, Unknown::square_z, Axis::z}}) {
+    const Combination k2d = of_pair("quadratic_factor_s2_m", axis, 0.5, -0.5);
     const Combination k2c = of_pair("quadratic_factor_s2_m", axis, 0.5, 0.5);
+    const Combination b = of_pair("parasitic_acceleration_m_s2", axis, -0.5, 0.5);
+    // A product of two sums, which are taken for independent, and a square of one that is taken for
+    // normal.
+    const double product = 2.0 * drawn.mean(k2d) * drawn.mean(b);
+    set(scale, product, 4.0 * drawn.mean_square(k2d) * drawn.mean_square(b) - product * product);
     const double mean = drawn.mean(k2c), variance = drawn.variance(k2c);
-    const auto row = static_cast<Eigen::Index>(index(unknown) - num_parameters);
-    priors.mean[index(unknown)] = mean * mean + variance;
-    covariance(row, row) = 2.0 * variance * (variance + 2.0 * mean * mean);
+    set(square, mean * mean + variance, 2.0 * variance * (variance + 2.0 * mean * mean));
   }
   const NuisanceVector deviation = covariance.diagonal().cwiseSqrt();
   NuisanceMatrix correlations =
@@ -317,12 +317,10 @@ class JointFit {
     }
     equations.matrix.bottomRightCorner<num_nuisances, num_nuisances>() = priors_.information;
     equations.vector.tail<num_nuisances>() = priors_.information * residual;
-    const auto calibration = std::ranges::find_if_not(input_.sessions, is_test);
-    const auto& means =
-        records_[static_cast<std::size_t>(calibration - input_.sessions.begin())].means;
-    const double mean_square_m2_s4 =
-        mean_square_of_pushes(static_cast<std::size_t>(calibration - input_.sessions.begin()));
-    const Dual constant = mean_differential(means, unknowns, mean_square_m2_s4);
+    const auto calibration = static_cast<std::size_t>(
+        std::ranges::find_if_not(input_.sessions, is_test) - input_.sessions.begin());
+    const auto& means = records_[calibration].means;
+    const Dual constant = mean_differential(means, unknowns, mean_square_of_pushes(calibration));
     NormalVector slope;
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_.unit[i];
