@@ -292,17 +292,9 @@ RequirementCheck check_requirement(const Requirement& requirement, const Exceeda
                                    std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
   const VerdictRule rule(requirement.tolerance, num_fixed);
-  Decision decision = rule.decide(static_cast<double>(count.num_exceedances), count.num_runs);
-  RequirementCheck check{.verdict = decision.verdict,
-                         .is_of_fixed_size = decision.is_of_fixed_size,
-                         .num_runs = count.num_runs,
-                         .num_exceedances = count.num_exceedances,
-                         .num_without_estimate = count.num_without_estimate,
-                         .num_allowed = 0,
-                         .bound_order = rule.bound_order(count.num_runs),
-                         .exceedance = decision.exceedance,
-                         .num_runs_at_best = {},
-                         .num_runs_at_this_rate = {}};
+  RequirementCheck check{rule.decide(static_cast<double>(count.num_exceedances), count.num_runs),
+                         count};
+  check.bound_order = rule.bound_order(count.num_runs);
   if (check.bound_order > 0) check.num_allowed = check.bound_order - 1;
   if (check.verdict != RequirementVerdict::undecided) return check;
   check.num_runs_at_best = rule.runs_to_meet(count);
