@@ -12,7 +12,6 @@ struct Range {
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
   bool minimum_open = false;  ///< True if `minimum` itself is not admissible.
-  bool maximum_open = false;
 
   [[nodiscard]] bool contains(double value) const;
   /// For people: `must be in (0, 1]`, `must be > 0`, `must be finite`.
