@@ -48,8 +48,7 @@ namespace {
 ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
   const bool has_tests = scenario.has_tests();
   const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
-  ResultSchema schema =
-      has_tests && !has_errors ? microscope_results() : results_of(estimation_methods());
+  ResultSchema schema = has_tests && !has_errors ? microscope_results() : results_with_errors();
   if (has_tests) {
     schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
                              test_quantities().end());
@@ -115,14 +114,6 @@ std::vector<double> MicroscopeCampaign::objectives() const {
                       scenario.test_objectives.end());
   }
   return objectives;
-}
-
-std::int64_t MicroscopeCampaign::num_rounds_max() const {
-  return scenario.estimation.num_rounds_max;
-}
-
-std::vector<std::size_t> MicroscopeCampaign::table_quantities() const {
-  return table_elements(dispersions);
 }
 
 RunDraw MicroscopeCampaign::draw(RunIndex run) const {
@@ -198,16 +189,6 @@ bool has_session_fits(std::string_view version) {
   const char* const end = version.data() + version.size();
   const auto [stop, error] = std::from_chars(version.data() + name.size(), end, number);
   return error == std::errc() && stop == end && number >= first;
-}
-
-/// What a stored definition says of the results. Where it cannot be read, that of the nominal
-/// campaign: the database of which it is has other faults to report.
-Scenario recorded_scenario(std::string_view definition) {
-  try {
-    return recorded_campaign(definition).scenario;
-  } catch (const Error&) {
-    return hardy2013_campaign().scenario;
-  }
 }
 
 class MicroscopeModel final : public Model {

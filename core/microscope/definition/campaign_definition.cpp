@@ -17,7 +17,6 @@
 #include "core/microscope/environment/physical_environment.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/estimation/methods.hpp"
-#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/model.hpp"
 #include "core/statistics/independence.hpp"
 
@@ -141,11 +140,11 @@ void check_orbit(const OrbitConfig& orbit) {
         "orbit.eccentricity", fmt::format("{}", orbit.eccentricity),
         fmt::format("must be <= {}: estimates are of first order in it", eccentricity_max));
   }
-  const double perigee_m = KeplerOrbit(orbit).semi_latus_rectum_m() / (1.0 + orbit.eccentricity);
-  if (perigee_m >= earth_radius_m) return;
-  throw ConfigError("orbit.period_s", fmt::format("{}", orbit.period_s),
-                    fmt::format("perigee must be above the ground, not {:.0f} km high",
-                                1e-3 * (perigee_m - earth_radius_m)));
+  const double altitude_m = perigee_altitude_m(orbit);
+  if (altitude_m >= 0.0) return;
+  throw ConfigError(
+      "orbit.period_s", fmt::format("{}", orbit.period_s),
+      fmt::format("perigee must be above the ground, not {:.0f} km high", 1e-3 * altitude_m));
 }
 
 }  // namespace
@@ -257,13 +256,16 @@ Definition definition_of(const MicroscopeCampaign& campaign, TableColumns column
   return definition;
 }
 
-MicroscopeCampaign recorded_campaign(std::string_view text) {
-  Document document("definition", text, {});
-  MicroscopeCampaign campaign = read_definition(document);
-  const Scenario& scenario = campaign.scenario;
-  validate_sessions(scenario.sessions, scenario.orbit.period_s,
-                    scenario.simulation.sample_period_s);
-  return campaign;
+Scenario recorded_scenario(std::string_view text) {
+  try {
+    Document document("definition", text, {});
+    Scenario scenario = read_definition(document).scenario;
+    validate_sessions(scenario.sessions, scenario.orbit.period_s,
+                      scenario.simulation.sample_period_s);
+    return scenario;
+  } catch (const Error&) {
+    return hardy2013_campaign().scenario;
+  }
 }
 
 MicroscopeCampaign campaign_of(Definition definition, TableColumns columns,

@@ -40,10 +40,10 @@ void check_joint_campaign(const MicroscopeCampaign& campaign);
 [[nodiscard]] Definition definition_of(const MicroscopeCampaign& campaign,
                                        TableColumns columns = TableColumns::included);
 
-/// The campaign of a stored definition without its data files, as far as its results depend on it:
-/// its sessions are valid, and all else is what can be read.
-/// @throws DefinitionError or ConfigError if its sessions are not.
-[[nodiscard]] MicroscopeCampaign recorded_campaign(std::string_view text);
+/// What a stored definition says of the results: its sessions are valid, and all else is what can
+/// be read. Where they are not, that of the nominal campaign: the database of which it is has other
+/// faults to report.
+[[nodiscard]] Scenario recorded_scenario(std::string_view text);
 
 /// The campaign of a definition that another program sent.
 ///

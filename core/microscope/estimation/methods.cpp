@@ -59,9 +59,8 @@ BandPass further_lines_filter(const RecordNeeds& needs, const Session& session,
   return {no_filter.high_pass, butterworth_low_pass(corner_hz, sample_period_s)};
 }
 
-ResultSchema results_of(std::span<const EstimationMethodInfo> possible) {
+ResultSchema results_with_errors() {
   ResultSchema schema = microscope_results();
-  if (std::ranges::none_of(possible, &EstimationMethodInfo::has_standard_errors)) return schema;
   for (Quantity& quantity : schema.quantities) quantity.has_standard_error = true;
   schema.fit = {{"chi_squared", "", "1"}, {"degrees_of_freedom", "", "1"}};
   schema.fit_tolerance = fit_tolerance;

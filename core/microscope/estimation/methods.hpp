@@ -91,10 +91,9 @@ struct EstimationMethodInfo {
 /// Those that a campaign file can name.
 [[nodiscard]] std::span<const EstimationMethodInfo> estimation_methods();
 
-/// What results are where these methods can be chosen: microscope_results(), with standard errors,
-/// χ² and its degrees of freedom if one of the methods has them. Runs that another one estimates
-/// have none.
-[[nodiscard]] ResultSchema results_of(std::span<const EstimationMethodInfo> methods);
+/// What results are where a method with standard errors may be chosen: microscope_results() with
+/// these, χ² and its degrees of freedom. Runs that another method estimates have none.
+[[nodiscard]] ResultSchema results_with_errors();
 
 /// Whether χ² of a fit is so large that noise of the densities that the weights are made of makes
 /// it so with a chance below 1e-6, though these be wrong by their tolerance.

@@ -96,22 +96,12 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
   EXPECT_EQ(result.status, RunStatus::completed);
   EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3e-9));
   EXPECT_EQ(result.fit, (std::vector<double>{3.75, 4.0, 1.25, 1.5, 2.5, 2.5}));
-  ASSERT_EQ(result.correlations.size(), num_correlations(results_of(std::array{method})));
+  ASSERT_EQ(result.correlations.size(), num_correlations(results_with_errors()));
   EXPECT_EQ(result.correlations[9], 0.123457);  // Of the second with the third.
   campaign.scenario.estimation.convergence = 0.7;
   const RunResult unusable = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(unusable.status, RunStatus::not_finite);
   EXPECT_TRUE(unusable.standard_error.empty());
-
-  const std::array with{*estimation_methods().begin(), method};
-  for (const Quantity& quantity : results_of(with).quantities) {
-    EXPECT_TRUE(quantity.has_standard_error) << quantity.name;
-  }
-  const std::array without{*estimation_methods().begin()};
-  EXPECT_TRUE(results_of(without).fit.empty());
-  for (const Quantity& quantity : results_of(without).quantities) {
-    EXPECT_FALSE(quantity.has_standard_error) << quantity.name;
-  }
 }
 
 // Two sessions of a target, each with noise of its own, give an estimate between those of each.
