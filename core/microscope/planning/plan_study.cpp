@@ -118,10 +118,10 @@ std::vector<RunRecord> probe_records(const MicroscopeCampaign& campaign,
 }
 
 /// What the squares of a record would have been, had it been longer.
-void lengthen(SessionHealth& health, double factor) {
-  health.quadratic_squares *= factor;
-  health.common_squares *= factor;
-  for (double& squares : health.sensor_squares) squares *= factor;
+void lengthen(LoopMonitor<double>& monitor, double factor) {
+  monitor.quadratic.squares *= factor;
+  monitor.common_square.squares *= factor;
+  for (BlockSteps<double>& steps : monitor.sensor_square) steps.squares *= factor;
 }
 
 /// What a run is lost by.
@@ -364,7 +364,7 @@ class JointStudy final : public PlanStudy {
     for (std::size_t k = 0; k < probes_.size(); ++k) {
       HealthRecord record = probes_[k].health;
       for (std::size_t i = 0; i < record.size(); ++i) {
-        lengthen(record[i], static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
+        lengthen(record[i].monitor, static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
       }
       const bool are_usable = std::ranges::all_of(errors[k], is_in_range);
       const HealthFinding finding =

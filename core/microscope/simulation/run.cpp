@@ -139,10 +139,14 @@ struct RunPlan::Impl : RunParts {
     if (!of_windows.empty()) alone.test.window_weights.runs[0] = of_windows.data();
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
-    keep(
-        i,
-        {alone.sums, session_health(alone.loop, alone.monitor), alone.further, alone.test.products},
-        record);
+    keep(i,
+         {alone.sums,
+          {.acceleration_m_s2 = alone.loop.largest_acceleration,
+           .attitude_rad = alone.loop.largest_angle,
+           .monitor = alone.monitor},
+          alone.further,
+          alone.test.products},
+         record);
   }
 
   /// A session of a batch, with all that it is computed from.

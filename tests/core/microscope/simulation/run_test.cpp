@@ -202,12 +202,12 @@ TEST(RunPlan, SaysWhatLostARunAndWhichEstimateIsOff) {
   EXPECT_EQ(loss_with([](SessionHealth& h) { h.attitude_rad = 0.05; }),
             test::loss_of(LossCause::attitude, a_c12));
   EXPECT_EQ(loss_with([](SessionHealth& h) {
-              h.residual = {{{1e-7, 0.0}, {}, {}}};
+              h.monitor.residual = {{{1e-7, 0.0}, {}, {}}};
             }),
             test::loss_of(LossCause::residual, a_c11_delta_x));
-  EXPECT_EQ(loss_with([](SessionHealth& h) { h.quadratic_squares *= 1e7; }),
+  EXPECT_EQ(loss_with([](SessionHealth& h) { h.monitor.quadratic.squares *= 1e7; }),
             test::loss_of(LossCause::quadratic_noise, a_c11_delta_x));
-  EXPECT_EQ(loss_with([](SessionHealth& h) { h.common_squares *= 1e7; }),
+  EXPECT_EQ(loss_with([](SessionHealth& h) { h.monitor.common_square.squares *= 1e7; }),
             test::loss_of(LossCause::square_noise, k2d));
 }
 
