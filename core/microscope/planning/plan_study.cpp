@@ -99,22 +99,16 @@ constexpr EstimationMethodInfo probe_method{
     .estimate = joint_method.estimate,
 };
 
-/// The first runs that have an instrument, with noise.
-std::vector<RunRecord> probe_records(const MicroscopeCampaign& campaign,
+/// The first runs that have an instrument, with noise and the paper's loops.
+std::vector<RunRecord> probe_records(MicroscopeCampaign campaign,
                                      const std::vector<RunIndex>& runs) {
-  const RunPlan plan(campaign, probe_method);
-  const InstructionSet set = best_instruction_set();
+  campaign.scenario.realism.reset();
+  campaign.scenario.controllers.clear();
   std::vector<RunRequest> requests;
-  std::vector<RunRecord> records;
   for (std::size_t i = 0; i < std::min(runs.size(), batch_lanes); ++i) {
-    const std::vector<double> values = campaign.table_values(runs[i]);
-    if (set == InstructionSet::scalar) {
-      records.push_back(plan.record(runs[i], values));
-    } else {
-      requests.push_back({runs[i], values});
-    }
+    requests.push_back({runs[i], campaign.table_values(runs[i])});
   }
-  return set == InstructionSet::scalar ? records : plan.record_batch(requests, set);
+  return RunPlan(campaign, probe_method).record_batch(requests, best_instruction_set());
 }
 
 /// What the squares of a record would have been, had it been longer.

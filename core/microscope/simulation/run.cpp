@@ -59,13 +59,6 @@ bool are_in_range(std::span<const double> values) {
   return std::ranges::all_of(values, is_in_range);
 }
 
-/// What a run yields of its calibration and, if its scenario has one, of its test.
-struct Yield {
-  std::vector<double> values;
-  std::vector<double> standard_errors;  ///< Of the quantities that have one.
-  std::vector<double> correlations;     ///< As in RunResult.
-};
-
 /// Correlations (0, 1), (0, 2) ... of quantities of which `covariance(i, j)` is known.
 template <typename Correlation>
 std::vector<double> pairs(std::size_t num_quantities, const Correlation& correlation) {
@@ -233,22 +226,21 @@ struct RunPlan::Impl : RunParts {
             .sample_period_s = scenario.simulation.sample_period_s};
   }
 
-  [[nodiscard]] Yield yield_of(const RunRecord& record, const Estimation& found) const {
-    Yield yield;
-    yield.values.assign(found.values.begin(), found.values.end());
+  /// Sets the estimates of the calibration and, if the scenario has one, of the test.
+  void set_estimates(const RunRecord& record, const Estimation& found, RunResult& result) const {
+    result.estimate.assign(found.values.begin(), found.values.end());
     if (method.has_standard_errors) {
-      yield.standard_errors.assign(found.standard_errors.begin(), found.standard_errors.end());
+      result.standard_error.assign(found.standard_errors.begin(), found.standard_errors.end());
     }
     TestEstimation test;
     if (campaign.scenario.has_tests()) {
       test = estimate_ep_test(record.phasors, estimation_input(), found);
-      yield.values.insert(yield.values.end(), test.values.begin(), test.values.end());
-      yield.standard_errors.push_back(test.standard_error);
+      result.estimate.insert(result.estimate.end(), test.values.begin(), test.values.end());
+      result.standard_error.push_back(test.standard_error);
     }
-    yield.correlations = pairs(yield.standard_errors.size(), [&](std::size_t i, std::size_t j) {
+    result.correlations = pairs(result.standard_error.size(), [&](std::size_t i, std::size_t j) {
       return j < num_parameters ? found.correlations[i][j] : test.correlations[i];
     });
-    return yield;
   }
 
   /// Whether sessions may be computed side by side: the loops settle for a whole number of noise
@@ -312,20 +304,7 @@ std::unique_ptr<DeviceSimulation> RunPlan::simulation_on(Device& device) const {
 std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> requests,
                                                InstructionSet set,
                                                const std::function<void(int)>& progress) const {
-  PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunResult> results;
-  if (set == InstructionSet::scalar || !impl_->campaign.scenario.has_plain_loops()) {
-    const int num_orbits_a_run = num_steps();
-    const auto num_runs = static_cast<int>(requests.size());
-    for (int i = 0; i < num_runs; ++i) {
-      const RunRequest& request = requests[static_cast<std::size_t>(i)];
-      const auto of_all = [&](int num_orbits_done) {
-        if (progress) progress((i * num_orbits_a_run + num_orbits_done) / num_runs);
-      };
-      results.push_back(simulate(request.run, request.table_values, of_all));
-    }
-    return results;
-  }
   for (const RunRecord& record : record_batch(requests, set, progress)) {
     results.push_back(estimate(record));
   }
@@ -335,7 +314,19 @@ std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> reque
 std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> requests,
                                              InstructionSet set,
                                              const std::function<void(int)>& progress) const {
+  PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunRecord> records;
+  if (set == InstructionSet::scalar || !impl_->campaign.scenario.has_plain_loops()) {
+    const auto num_runs = static_cast<int>(requests.size());
+    for (const auto& [run, table_values] : requests) {
+      const int num_before = static_cast<int>(records.size()) * num_steps();
+      const auto of_all = [&](int num_orbits_done) {
+        if (progress) progress((num_before + num_orbits_done) / num_runs);
+      };
+      records.push_back(record(run, table_values, of_all));
+    }
+    return records;
+  }
   std::vector<Lane> lanes;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const auto& [run, table_values] = requests[i];
@@ -384,15 +375,13 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
                    .session = static_cast<std::uint32_t>(finding.loss.session)};
     return result;
   }
-  const Yield yield = impl_->yield_of(record, found);
-  if (!are_in_range(yield.values) || !are_in_range(yield.standard_errors)) {
-    result.status = RunStatus::not_finite;
-    return result;
+  RunResult without_estimates = result;
+  impl_->set_estimates(record, found, result);
+  if (!are_in_range(result.estimate) || !are_in_range(result.standard_error)) {
+    without_estimates.status = RunStatus::not_finite;
+    return without_estimates;
   }
   result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
-  result.estimate = yield.values;
-  result.standard_error = yield.standard_errors;
-  result.correlations = yield.correlations;
   if (has_errors) {
     result.fit = {0.0, 0.0};
     for (const SessionFit& session : found.session_fits) {

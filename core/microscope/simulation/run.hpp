@@ -68,7 +68,7 @@ class RunPlan final : public Plan {
                                  const std::function<void(int)>& progress = {},
                                  const SampleObserver& observer = {}) const;
 
-  /// record() for several runs at once; arguments as for simulate_batch(), `set` not `scalar`.
+  /// record() for several runs at once; arguments as for simulate_batch().
   [[nodiscard]] std::vector<RunRecord> record_batch(
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const;
