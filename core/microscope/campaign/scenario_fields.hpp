@@ -42,7 +42,7 @@ TableFields(std::string, Visitor&) -> TableFields<Visitor>;
 template <typename AxisConfig, typename Visitor>
 void visit_harmonic(AxisConfig& axis, const std::string& name, const std::string& unit,
                     Visitor& visit) {
-  const TableFields field("environment." + name, visit);
+  const TableFields field{"environment." + name, visit};
   field("mean" + unit, "Constant part.", axis.mean);
   field("orbital" + unit, "Amplitude at f_orb.", axis.orbital, range::not_negative);
   field("orbital_phase_rad", "Phase at f_orb; cosine from perigee.", axis.orbital_phase_rad);
@@ -52,7 +52,7 @@ void visit_harmonic(AxisConfig& axis, const std::string& name, const std::string
 
 template <typename Config, typename Visitor>
 void visit_environment(Config& environment, Visitor& visit) {
-  const TableFields field("environment", visit);
+  const TableFields field{"environment", visit};
   field("kind", "\"harmonic\" (below) or \"file\" (environment.file).", environment.kind);
   field("scale", "Multiplies every external acceleration; 0 is off.", environment.scale,
         range::not_negative);
@@ -67,7 +67,7 @@ void visit_environment(Config& environment, Visitor& visit) {
 template <typename Noise, typename Visitor>
 void visit_sensor_noise(Noise& noise, const std::string& name, const std::string& unit,
                         Visitor& visit) {
-  const TableFields field("noise." + name, visit);
+  const TableFields field{"noise." + name, visit};
   field("white_asd" + unit, "White level, unit/√Hz, one-sided.", noise.white_asd, range::positive);
   field("pink_corner_hz", "1/f part equals the white one here.", noise.pink_corner_hz,
         range::between(0.0, 0.1));
@@ -81,7 +81,7 @@ void visit_sensor_noise(Noise& noise, const std::string& name, const std::string
 
 template <typename Config, typename Visitor>
 void visit_noise(Config& noise, Visitor& visit) {
-  const TableFields field("noise", visit);
+  const TableFields field{"noise", visit};
   field("preset",
         "\"design_2013\", \"flight_suref\", \"wire_suref\" or \"wire_suep\"; sets what follows.",
         noise.preset);
@@ -99,7 +99,7 @@ void visit_noise(Config& noise, Visitor& visit) {
         noise.torque_asd_rad_s2, range::not_negative);
   field.of_sensors("factor", "Multiplies the linear noise of sensor #.", noise.linear_factor,
                    range::between(1e-3, 1e3));
-  const TableFields of_wire("noise.wire", visit);
+  const TableFields of_wire{"noise.wire", visit};
   of_wire("damping_n_m", "k/Q along X; 0 for no such noise.", noise.wire.damping_n_m,
           range::not_negative);
   of_wire("temperature_k", "Of the wires.", noise.wire.temperature_k, range::positive);
@@ -111,7 +111,7 @@ void visit_noise(Config& noise, Visitor& visit) {
 template <typename Config, typename Visitor>
 void visit_control(Config& scenario, Visitor& visit) {
   auto& linear = scenario.drag_free;
-  const TableFields field("drag_free", visit);
+  const TableFields field{"drag_free", visit};
   field("bandwidth_hz", "Crossover of the linear loop.", linear.bandwidth_hz,
         range::between(1e-3, 0.2));
   field("integral_hz", "Corner of its integral.", linear.integral_hz, range::between(0.0, 0.05));
@@ -126,7 +126,7 @@ void visit_control(Config& scenario, Visitor& visit) {
   field("bias_compensation_error_z_m_s2", "Error of the subtracted bias, Z.",
         linear.bias_compensation_error_z_m_s2);
   auto& attitude = scenario.attitude;
-  const TableFields of_attitude("attitude", visit);
+  const TableFields of_attitude{"attitude", visit};
   of_attitude("bandwidth_hz", "Natural frequency of the attitude loop.", attitude.bandwidth_hz,
               range::between(1e-3, 0.1));
   of_attitude("damping", "Its damping ratio.", attitude.damping, range::between(0.3, 2.0));
@@ -138,7 +138,7 @@ void visit_control(Config& scenario, Visitor& visit) {
 
 template <typename Config, typename Visitor>
 void visit_sensor(Config& sensor, Visitor& visit) {
-  const TableFields field("sensor", visit);
+  const TableFields field{"sensor", visit};
   field("range_m_s2", "Largest acceleration that a sensor reports.", sensor.range_m_s2,
         range::positive);
   for (std::size_t axis = 0; axis < sensor.position_m.size(); ++axis) {
@@ -151,7 +151,7 @@ void visit_sensor(Config& sensor, Visitor& visit) {
 
 template <typename Config, typename Visitor>
 void visit_gaps(Config& gaps, Visitor& visit) {
-  const TableFields field("gaps", visit);
+  const TableFields field{"gaps", visit};
   const Range rate = range::between(0.0, 1.0), depth = rate, duration = range::between(1.0, 1e5);
   field("glitch_rate_hz", "Mean rate of glitches in tests; 0 for none.", gaps.glitch_rate_hz, rate);
   field("glitch_duration_s", "Data discarded from a glitch on.", gaps.glitch_duration_s, duration);
@@ -170,7 +170,7 @@ void visit_gaps(Config& gaps, Visitor& visit) {
 
 template <typename Config, typename Visitor>
 void visit_realism(Config& realism, Visitor& visit) {
-  const TableFields field("realism", visit);
+  const TableFields field{"realism", visit};
   const Range size = range::not_negative;
   field("star_tracker_orbital_error_rad", "At f_orb, about each axis of S.",
         realism.star_tracker_orbital_error_rad, size);
@@ -205,7 +205,7 @@ void visit_realism(Config& realism, Visitor& visit) {
 
 template <typename Config, typename Visitor>
 void visit_estimation(Config& estimation, Visitor& visit) {
-  const TableFields field("estimation", visit);
+  const TableFields field{"estimation", visit};
   field("method", "\"hardy2013\": one parameter a session, iterated; \"joint\": all at once.",
         estimation.method);
   field("correction", "\"hardy2013\" (the paper's), \"first_order\" or \"second_order\".",
@@ -222,13 +222,13 @@ void visit_estimation(Config& estimation, Visitor& visit) {
 template <typename Config, typename Visitor>
 void visit_tables(Config& scenario, Visitor& visit) {
   auto& acceptance = scenario.acceptance;
-  const TableFields of_acceptance("acceptance", visit);
+  const TableFields of_acceptance{"acceptance", visit};
   of_acceptance("a_d11_max", "Bound of |a_d11|.", acceptance.a_d11_max, range::positive);
   of_acceptance("a_d1j_max_rad", "Bound of |a_d12| and |a_d13|.", acceptance.a_d1j_max_rad,
                 range::positive);
   of_acceptance("a_c1j_max_rad", "Bound of |a_c12| and |a_c13|.", acceptance.a_c1j_max_rad,
                 range::positive);
-  const TableFields of_objective("objective", visit);
+  const TableFields of_objective{"objective", visit};
   const auto visit_objective = [&](const Quantity& quantity, auto& objective) {
     of_objective(quantity.column(), "Largest acceptable |error|.", objective, range::positive);
   };
@@ -239,7 +239,7 @@ void visit_tables(Config& scenario, Visitor& visit) {
     visit_objective(test_quantities()[i], scenario.test_objectives[i]);
   }
   auto& budget = scenario.budget;
-  const TableFields of_budget("budget", visit);
+  const TableFields of_budget{"budget", visit};
   of_budget("test_spin_rate_rad_s", "2π f_spin of the test, about Y; 0 is inertial.",
             budget.test_spin_rate_rad_s, range::between(-0.05, 0.05));
   of_budget("t_xy_s2", "T_xy at the test frequency.", budget.t_xy_s2, range::positive);
@@ -259,12 +259,12 @@ void visit_tables(Config& scenario, Visitor& visit) {
 
 template <typename Config, typename Visitor>
 void for_each_field(Config& scenario, Visitor&& visit) {
-  const detail::TableFields of_orbit("orbit", visit);
+  const detail::TableFields of_orbit{"orbit", visit};
   of_orbit("period_s", "Orbital period.", scenario.orbit.period_s,
            range::between(5000.0, 100000.0));
   of_orbit("eccentricity", "Perigee is on +X; files: at most 0.1, first order.",
            scenario.orbit.eccentricity, range::between(0.0, 0.5));
-  const detail::TableFields of_simulation("simulation", visit);
+  const detail::TableFields of_simulation{"simulation", visit};
   of_simulation("sample_period_s", "Rate of instrument and control.",
                 scenario.simulation.sample_period_s, range::between(0.05, 1.0));
   of_simulation("settling_s", "Loops run this long before a record begins.",
