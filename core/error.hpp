@@ -30,6 +30,14 @@ class InvalidArgument : public Error {
   using Error::Error;
 };
 
+/// What simulates runs, outside this process, has crashed, hangs, or yields what no simulation
+/// does. Nothing is known of the runs. A worker gives them back so: each has as many attempts as if
+/// the worker had crashed, which goes on with its other runs.
+class SimulationCrash : public Error {
+ public:
+  using Error::Error;
+};
+
 namespace detail {
 [[noreturn]] void expectation_failed(const char* condition, const char* file, int line);
 }  // namespace detail

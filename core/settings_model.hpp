@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/law_set.hpp"
 #include "core/campaign/recording.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/entry.hpp"
@@ -65,7 +66,7 @@ class SettingsCampaign final : public Campaign {
   [[nodiscard]] const Model& model() const override { return built_in_model(); }
   void validate() const override {
     check_identity(*this);
-    check_table_columns(*this, {});
+    check_table_columns({}, *this);
     for (const auto& info : Settings::infos()) check_field(info.field, settings.*info.value);
     settings.check();
   }

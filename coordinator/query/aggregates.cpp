@@ -38,14 +38,10 @@ std::optional<double> stdev(const AggregateColumns& columns) {
   return moments(columns.x).standard_deviation;
 }
 
-std::optional<double> skewness(const AggregateColumns& columns) {
-  if (columns.x.size() < 3 || !varies(columns.x)) return std::nullopt;
-  return moments(columns.x).skewness;
-}
-
-std::optional<double> kurtosis(const AggregateColumns& columns) {
-  if (columns.x.size() < 4 || !varies(columns.x)) return std::nullopt;
-  return moments(columns.x).excess_kurtosis;
+template <double Moments::*shape, std::size_t num_min>
+std::optional<double> shape_of(const AggregateColumns& columns) {
+  if (columns.x.size() < num_min || !varies(columns.x)) return std::nullopt;
+  return moments(columns.x).*shape;
 }
 
 // As percentile(), but for values whose difference is no finite double too.
@@ -72,20 +68,11 @@ std::optional<double> median(const AggregateColumns& columns) {
 }
 
 // SQL has y first: regr_slope(y, x).
-std::optional<RegressionLine> line_of(const AggregateColumns& columns) {
-  return fit_line(columns.y, columns.x);
-}
-
-std::optional<double> slope(const AggregateColumns& columns) {
-  const std::optional<RegressionLine> line = line_of(columns);
+template <double RegressionLine::*number>
+std::optional<double> of_line(const AggregateColumns& columns) {
+  const std::optional<RegressionLine> line = fit_line(columns.y, columns.x);
   if (!line) return std::nullopt;
-  return line->slope;
-}
-
-std::optional<double> intercept(const AggregateColumns& columns) {
-  const std::optional<RegressionLine> line = line_of(columns);
-  if (!line) return std::nullopt;
-  return line->intercept;
+  return (*line).*number;
 }
 
 std::optional<double> linear(const AggregateColumns& columns) {
@@ -154,15 +141,17 @@ std::span<const Aggregate> aggregates() {
   static constexpr std::array<std::string_view, 2> response_first{"y", "x"};
   static constexpr std::array<Aggregate, 11> all{{
       {"stdev", one_column, 1, ScalePowers{.x = 1}, stdev},
-      {"skewness", one_column, 1, ScalePowers{}, skewness},
-      {"kurtosis", one_column, 1, ScalePowers{}, kurtosis},
+      {"skewness", one_column, 1, ScalePowers{}, shape_of<&Moments::skewness, 3>},
+      {"kurtosis", one_column, 1, ScalePowers{}, shape_of<&Moments::excess_kurtosis, 4>},
       {"median", one_column, 1, {}, median},
       {"percentile", with_percent, 1, {}, percentile_of},
       {"correlation", two_columns, 2, ScalePowers{}, linear},
       {"corr", response_first, 2, ScalePowers{}, linear},
       {"rank_correlation", two_columns, 2, {}, rank},
-      {"regr_slope", response_first, 2, ScalePowers{.x = 1, .y = -1}, slope},
-      {"regr_intercept", response_first, 2, ScalePowers{.x = 1}, intercept},
+      {"regr_slope", response_first, 2, ScalePowers{.x = 1, .y = -1},
+       of_line<&RegressionLine::slope>},
+      {"regr_intercept", response_first, 2, ScalePowers{.x = 1},
+       of_line<&RegressionLine::intercept>},
       {"wilks_upper", with_tolerance, 1, {}, tolerance_bound},
   }};
   return all;

@@ -33,32 +33,6 @@ enum DrawColumn : int {
   draw_campaign_column
 };
 
-/// What the runs of a campaign draw, computed again when asked for.
-class DrawnCampaign {
- public:
-  explicit DrawnCampaign(std::shared_ptr<const Campaign> campaign)
-      : campaign_(std::move(campaign)) {}
-
-  [[nodiscard]] std::span<const DrawnQuantity> drawn() const { return campaign_->model().drawn(); }
-  [[nodiscard]] std::string_view campaign_name() const { return campaign_->name; }
-  [[nodiscard]] std::uint64_t num_runs() const { return campaign_->num_runs; }
-
-  /// The values of the run's accepted draw, those its simulation begins with; empty if all draws
-  /// were rejected. The reference holds until the next call.
-  /// @pre The run is one of the campaign's.
-  [[nodiscard]] const std::vector<double>& values_of(RunIndex run) {
-    if (last_run_ == run) return last_values_;
-    last_values_ = campaign_->draw(run).values;
-    last_run_ = run;
-    return last_values_;
-  }
-
- private:
-  std::shared_ptr<const Campaign> campaign_;
-  std::optional<RunIndex> last_run_;  ///< A join asks for the quantities of a run one by one.
-  std::vector<double> last_values_;
-};
-
 /// The rows of draw() that a statement wants: at least those, as SQLite looks at each row again.
 struct DrawScan {
   std::uint64_t first_run = 0;
@@ -75,7 +49,6 @@ struct DrawCursor : sqlite3_vtab_cursor {
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw";
   static constexpr int argument_column = draw_campaign_column;
-  using Made = DrawnCampaign;
 
   static void choose_plan(sqlite3_index_info& plan);
   void begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value** arguments);
@@ -85,12 +58,15 @@ struct DrawCursor : sqlite3_vtab_cursor {
   void give_column(sqlite3_context* context, int number) const;
 
   void go_to_run(std::uint64_t index);
+  [[nodiscard]] std::span<const DrawnQuantity> drawn() const { return campaign->model().drawn(); }
 
-  std::shared_ptr<DrawnCampaign> runs;
+  std::shared_ptr<const Campaign> campaign;
   DrawScan scan;
   std::uint64_t run = 0;
   std::size_t quantity = 0;
-  std::vector<double> values;  // Of the run; empty if all draws were rejected.
+  /// Of the run whose values follow: a join asks for the quantities of a run one by one.
+  std::optional<RunIndex> last_run;
+  std::vector<double> values;  ///< Those its simulation begins with; empty without a draw.
 };
 
 /// What a plan may hand to the scan, in the order of its arguments; bit i of the plan's number says
@@ -183,23 +159,23 @@ void narrow(DrawScan& scan, const Offer& offer, std::span<const DrawnQuantity> d
 void DrawCursor::go_to_run(std::uint64_t index) {
   run = index;
   quantity = scan.quantity.value_or(0);
-  if (run < scan.end_run) values = runs->values_of(RunIndex{run});
+  if (run >= scan.end_run || last_run == RunIndex{run}) return;
+  values = campaign->draw(RunIndex{run}).values;
+  last_run = RunIndex{run};
 }
 
 // Without an argument, the main database is meant.
 void DrawCursor::begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value** arguments) {
   const bool is_named = (plan & campaign_bit) != 0;
-  runs = table.databases.current(table.connection,
-                                 is_named ? database_of(table.connection, arguments[0]) : "main",
-                                 [](std::shared_ptr<const Campaign> campaign) {
-                                   return std::make_shared<DrawnCampaign>(std::move(campaign));
-                                 });
-  scan = {.first_run = 0, .end_run = runs->num_runs(), .quantity = {}};
+  const auto meant = table.campaigns.current(
+      table.connection, is_named ? database_of(table.connection, arguments[0]) : "main");
+  if (std::exchange(campaign, meant) != meant) last_run.reset();
+  scan = {.first_run = 0, .end_run = campaign->num_runs, .quantity = {}};
   for (std::size_t i = 0; i < offers.size(); ++i) {
     if ((plan & (1 << i)) == 0) continue;
     sqlite3_value* value = *arguments++;
     if (offers[i].column != draw_campaign_column) {
-      narrow(scan, offers[i], runs->drawn(), value);
+      narrow(scan, offers[i], drawn(), value);
     }
   }
   go_to_run(scan.first_run);
@@ -207,11 +183,11 @@ void DrawCursor::begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value*
 
 void DrawCursor::next() {
   ++quantity;
-  if (scan.quantity || quantity == runs->drawn().size()) go_to_run(run + 1);
+  if (scan.quantity || quantity == drawn().size()) go_to_run(run + 1);
 }
 
 std::int64_t DrawCursor::row() const {
-  return static_cast<std::int64_t>(run * runs->drawn().size() + quantity);
+  return static_cast<std::int64_t>(run * drawn().size() + quantity);
 }
 
 void set_text(sqlite3_context* context, std::string_view text) {
@@ -223,23 +199,18 @@ void DrawCursor::give_column(sqlite3_context* context, int number) const {
     case run_index_column:
       return sqlite3_result_int64(context, static_cast<sqlite3_int64>(run));
     case quantity_column:
-      return set_text(context, runs->drawn()[quantity].name);
+      return set_text(context, drawn()[quantity].name);
     case unit_column:
-      return set_text(context, runs->drawn()[quantity].unit);
+      return set_text(context, drawn()[quantity].unit);
     case draw_value_column:
       if (!values.empty()) sqlite3_result_double(context, values[quantity]);
       return;
     default:
-      set_text(context, runs->campaign_name());
+      set_text(context, campaign->name);
   }
 }
 
 enum EntryColumn : int { key_column, entry_value_column, entry_campaign_column };
-
-struct Definition {
-  std::string campaign;
-  std::vector<DefinitionItem> items;
-};
 
 struct DefinitionCursor : sqlite3_vtab_cursor {
   static constexpr const char* name = "definition_entry";
@@ -250,16 +221,16 @@ struct DefinitionCursor : sqlite3_vtab_cursor {
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.definition_entry USING proofmass_definition";
   static constexpr int argument_column = entry_campaign_column;
-  using Made = Definition;
 
   static void choose_plan(sqlite3_index_info& plan);
   void begin(VirtualTable<DefinitionCursor>& table, int plan, sqlite3_value** arguments);
   void next() { ++position; }
-  [[nodiscard]] bool is_at_end() const { return position >= definition->items.size(); }
+  [[nodiscard]] bool is_at_end() const { return position >= items.size(); }
   [[nodiscard]] std::int64_t row() const { return static_cast<std::int64_t>(position); }
   void give_column(sqlite3_context* context, int number) const;
 
-  std::shared_ptr<Definition> definition;
+  std::shared_ptr<const Campaign> campaign;
+  std::vector<DefinitionItem> items;  ///< Of the campaign.
   std::size_t position = 0;
 };
 
@@ -278,11 +249,8 @@ void DefinitionCursor::choose_plan(sqlite3_index_info& plan) {
 void DefinitionCursor::begin(VirtualTable<DefinitionCursor>& table, int plan,
                              sqlite3_value** arguments) {
   const std::string database = plan == 0 ? "main" : database_of(table.connection, arguments[0]);
-  definition = table.databases.current(
-      table.connection, database, [](const std::shared_ptr<const Campaign>& campaign) {
-        return std::make_shared<Definition>(
-            Definition{.campaign = campaign->name, .items = campaign->items()});
-      });
+  const auto meant = table.campaigns.current(table.connection, database);
+  if (std::exchange(campaign, meant) != meant) items = campaign->items();
   position = 0;
 }
 
@@ -296,7 +264,7 @@ struct SetValue {
 };
 
 void DefinitionCursor::give_column(sqlite3_context* context, int number) const {
-  const DefinitionItem& item = definition->items[position];
+  const DefinitionItem& item = items[position];
   const SetValue set{context};
   switch (number) {
     case key_column:
@@ -304,7 +272,7 @@ void DefinitionCursor::give_column(sqlite3_context* context, int number) const {
     case entry_value_column:
       return std::visit(set, item.value);
     default:
-      set(definition->campaign);
+      set(campaign->name);
   }
 }
 

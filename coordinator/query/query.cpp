@@ -235,7 +235,7 @@ void Reader::fail(int code, const std::string& sql) const {
   const char* text = sqlite3_errmsg(connection());
   switch (code & 0xff) {
     case SQLITE_INTERRUPT:
-      throw TimeLimitError(time_limit_text(limits_));
+      throw Error(time_limit_text(limits_));
     case SQLITE_NOMEM:
       throw Error(memory_limit_text(limits_));
     case SQLITE_FULL:  // Nothing else is written.

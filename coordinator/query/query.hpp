@@ -21,12 +21,6 @@ class QueryError : public InvalidArgument {
   using InvalidArgument::InvalidArgument;
 };
 
-/// A query took too long; reads `timeout = 60 (...)`.
-class TimeLimitError : public Error {
- public:
-  using Error::Error;
-};
-
 /// Another campaign database, whose tables a query finds under `name.`.
 struct AttachedFile {
   std::string name;  ///< Checked by check_attached_name().
@@ -64,7 +58,7 @@ struct QueryLimits {
   std::function<bool()> is_interrupted = [] { return false; };
 };
 
-/// What a TimeLimitError says.
+/// What is said of a query that took too long: `timeout = 60 (...)`.
 [[nodiscard]] std::string time_limit_text(const QueryLimits& limits);
 /// What is said of a query that needs more memory: `memory = 8192 MiB (the query needs more; ...)`.
 [[nodiscard]] std::string memory_limit_text(const QueryLimits& limits);
@@ -80,8 +74,8 @@ inline constexpr std::size_t sql_size_max = 1'000'000;
 /// @param writer  Has got part of the rows if an exception comes after begin().
 /// The limits are looked at between steps of the query; see run_bounded_query() for calls that
 /// do not end.
-/// @throws QueryError, TimeLimitError; StoreError if the file cannot be read; Error if memory is
-///         lacking; and what the writer throws.
+/// @throws QueryError; StoreError if the file cannot be read; Error if time or memory is lacking;
+///         and what the writer throws.
 [[nodiscard]] QueryEnd run_query(const QueryFiles& files, const std::string& sql,
                                  const QueryLimits& limits, RowWriter& writer);
 

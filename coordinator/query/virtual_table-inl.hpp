@@ -67,28 +67,25 @@ struct DatabaseState {
 /// @throws Error if the database cannot be read.
 [[nodiscard]] DatabaseState state_of(sqlite3* connection, const std::string& database);
 
-/// Something that is made of the campaign of a database, for each database that was asked for. It
-/// is made when it is first needed and when the database has changed since.
-template <typename Made>
-class MadeOfDatabases {
+/// The campaigns of the databases that were asked for. Each is read when it is first needed and
+/// when its database has changed since.
+class CampaignsOfDatabases {
  public:
-  /// @param make  Makes a shared pointer of a Campaign.
-  template <typename Make>
-  [[nodiscard]] std::shared_ptr<Made> current(sqlite3* connection, const std::string& database,
-                                              const Make& make) {
+  /// Cursors own it too: each stays with what it began with.
+  [[nodiscard]] std::shared_ptr<const Campaign> current(sqlite3* connection,
+                                                        const std::string& database) {
     const DatabaseState state = state_of(connection, database);
     Known& known = databases_[database];
-    if (!known.made || !(known.state == state)) {
-      known.made = make(read_campaign_of(connection, database));
-      known.state = state;
+    if (!known.campaign || !(known.state == state)) {
+      known = {.state = state, .campaign = read_campaign_of(connection, database)};
     }
-    return known.made;
+    return known.campaign;
   }
 
  private:
   struct Known {
-    DatabaseState state;         // When it was made.
-    std::shared_ptr<Made> made;  // Cursors own it too: each stays with what it began with.
+    DatabaseState state;  // When it was read.
+    std::shared_ptr<const Campaign> campaign;
   };
   std::map<std::string, Known> databases_;
 };
@@ -100,7 +97,6 @@ class MadeOfDatabases {
 ///     module       its name for SQLite
 ///     declaration  the SQL of its columns
 ///     creation     the SQL that makes it, in the temporary database of a connection
-///     Made         what is made of the campaign of a database
 ///
 ///     static void choose_plan(sqlite3_index_info& plan)
 ///     void begin(VirtualTable<Cursor>& table, int plan, sqlite3_value** values)
@@ -111,7 +107,7 @@ class MadeOfDatabases {
 template <typename Cursor>
 struct VirtualTable : sqlite3_vtab {
   sqlite3* connection = nullptr;
-  MadeOfDatabases<typename Cursor::Made> databases;
+  CampaignsOfDatabases campaigns;
 
   /// Makes the table known to a connection.
   /// @returns SQLite's result code.

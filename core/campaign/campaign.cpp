@@ -11,25 +11,6 @@
 #include "core/error.hpp"
 
 namespace proofmass {
-namespace {
-
-void check_table_column(const std::vector<double>& column, const TableSource& source,
-                        std::uint64_t num_runs) {
-  const std::string field = source.path + ".column";
-  const std::string value = fmt::format("\"{}\"", source.column);
-  if (column.size() < num_runs) {
-    throw ConfigError(
-        field, value,
-        fmt::format("has values for {} runs, {} are needed", column.size(), num_runs));
-  }
-  const auto bad = std::ranges::find_if_not(column, [](double x) { return std::isfinite(x); });
-  if (bad != column.end()) {
-    throw ConfigError(field, value, fmt::format("row {} must be finite", bad - column.begin() + 1));
-  }
-}
-
-}  // namespace
-
 std::unique_ptr<DeviceSimulation> Plan::simulation_on(Device& /*device*/) const {
   PROOFMASS_EXPECT(runs_on_devices());
   return nullptr;
@@ -54,16 +35,6 @@ void check_identity(const Campaign& campaign) {
       shared < 1 || shared > realisations_max) {
     throw ConfigError("campaign.realisations", fmt::format("{}", shared),
                       fmt::format("must be in [1, {}]", realisations_max));
-  }
-}
-
-void check_table_columns(const Campaign& campaign, std::span<const TableSource> sources) {
-  if (campaign.table_columns.size() != sources.size()) {
-    throw ConfigError("dispersion", fmt::format("{} columns", campaign.table_columns.size()),
-                      fmt::format("laws of kind table are {}", sources.size()));
-  }
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    check_table_column(campaign.table_columns[i], sources[i], campaign.num_runs);
   }
 }
 

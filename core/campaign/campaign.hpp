@@ -226,15 +226,4 @@ inline constexpr std::uint64_t realisations_max = 4096;
 /// @throws ConfigError naming the field, its value and the rule.
 void check_identity(const Campaign& campaign);
 
-/// Where a quantity's values come from.
-struct TableSource {
-  std::string path;    ///< Of its law in a campaign file: `dispersion.offcentring_m.x`.
-  std::string column;  ///< Heading of its column.
-};
-
-/// Checks that `table_columns` has a column for each of these quantities, with a finite value for
-/// each run.
-/// @throws ConfigError naming the quantity and the rule.
-void check_table_columns(const Campaign& campaign, std::span<const TableSource> sources);
-
 }  // namespace proofmass

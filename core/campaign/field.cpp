@@ -10,19 +10,17 @@ namespace proofmass {
 
 bool Range::contains(double value) const {
   const bool above = minimum_open ? value > minimum : value >= minimum;
-  const bool below = maximum_open ? value < maximum : value <= maximum;
-  return std::isfinite(value) && above && below;
+  return std::isfinite(value) && above && value <= maximum;
 }
 
 std::string Range::rule() const {
   const bool has_minimum = std::isfinite(minimum);
   const bool has_maximum = std::isfinite(maximum);
   if (has_minimum && has_maximum) {
-    return fmt::format("must be in {}{}, {}{}", minimum_open ? '(' : '[', minimum, maximum,
-                       maximum_open ? ')' : ']');
+    return fmt::format("must be in {}{}, {}]", minimum_open ? '(' : '[', minimum, maximum);
   }
   if (has_minimum) return fmt::format("must be {} {}", minimum_open ? ">" : ">=", minimum);
-  if (has_maximum) return fmt::format("must be {} {}", maximum_open ? "<" : "<=", maximum);
+  if (has_maximum) return fmt::format("must be <= {}", maximum);
   return "must be finite";
 }
 

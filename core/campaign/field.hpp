@@ -12,7 +12,6 @@ struct Range {
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
   bool minimum_open = false;  ///< True if `minimum` itself is not admissible.
-  bool maximum_open = false;
 
   [[nodiscard]] bool contains(double value) const;
   /// For people: `must be in (0, 1]`, `must be > 0`, `must be finite`.
@@ -27,6 +26,13 @@ inline constexpr Range not_negative{.minimum = 0.0};
   return {.minimum = minimum, .maximum = maximum};
 }
 }  // namespace range
+
+/// Spelling of an enumerator, of those that names_of() lists in value order from 1.
+template <typename Choice>
+requires requires(Choice choice) { names_of(choice); }
+[[nodiscard]] std::string_view name_of(Choice choice) {
+  return names_of(choice)[static_cast<std::size_t>(choice) - 1];
+}
 
 /// Name, meaning and rule of one number or choice of a scenario.
 struct FieldInfo {

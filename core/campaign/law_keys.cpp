@@ -55,6 +55,4 @@ LawField field_of(Dispersion& law, std::string_view key) {
   return &law.with;
 }
 
-std::string_view name_of(Law law) { return names_of(law)[static_cast<std::size_t>(law) - 1]; }
-
 }  // namespace proofmass

@@ -20,7 +20,4 @@ using LawField =
 /// The field of one of keys_of() any law.
 [[nodiscard]] LawField field_of(Dispersion& law, std::string_view key);
 
-/// `uniform`.
-[[nodiscard]] std::string_view name_of(Law law);
-
 }  // namespace proofmass

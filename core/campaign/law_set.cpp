@@ -33,12 +33,27 @@ std::vector<std::size_t> table_elements(std::span<const Dispersion> laws) {
   return elements;
 }
 
-std::vector<TableSource> table_sources(const LawSet& set) {
-  std::vector<TableSource> sources;
-  for (const std::size_t i : table_elements(set.laws)) {
-    sources.push_back({.path = set.path_of(i), .column = set.laws[i].column});
+void check_table_columns(const LawSet& set, const Campaign& campaign) {
+  const std::vector<std::size_t> elements = table_elements(set.laws);
+  if (campaign.table_columns.size() != elements.size()) {
+    throw ConfigError("dispersion", fmt::format("{} columns", campaign.table_columns.size()),
+                      fmt::format("laws of kind table are {}", elements.size()));
   }
-  return sources;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    const std::vector<double>& column = campaign.table_columns[i];
+    const auto refuse = [&](const std::string& rule) {
+      throw ConfigError(set.path_of(elements[i]) + ".column",
+                        fmt::format("\"{}\"", set.laws[elements[i]].column), rule);
+    };
+    if (column.size() < campaign.num_runs) {
+      refuse(
+          fmt::format("has values for {} runs, {} are needed", column.size(), campaign.num_runs));
+    }
+    const auto bad = std::ranges::find_if_not(column, [](double x) { return std::isfinite(x); });
+    if (bad != column.end()) {
+      refuse(fmt::format("row {} must be finite", bad - column.begin() + 1));
+    }
+  }
 }
 
 namespace {

@@ -30,8 +30,10 @@ struct LawSet {
 /// Indices of the quantities with law `table`, ascending.
 [[nodiscard]] std::vector<std::size_t> table_elements(std::span<const Dispersion> laws);
 
-/// Where the values of the `table` quantities come from, for check_table_columns().
-[[nodiscard]] std::vector<TableSource> table_sources(const LawSet& set);
+/// Checks that the campaign has a column for each `table` quantity, with a finite value for each
+/// run. Without laws it has none.
+/// @throws ConfigError naming the quantity and the rule.
+void check_table_columns(const LawSet& set, const Campaign& campaign);
 
 /// The values of a run's draw number `draw` (from 0), before any acceptance rule: a pure function
 /// of its arguments. Draw 0 is in the strata of the design, whose dimension of a quantity is its

@@ -45,32 +45,32 @@ enum class PlanGoal : std::uint8_t {
   budget = 2,      ///< The mean budget.
 };
 
+/// What a study is about.
+struct PlanScope {
+  std::string method;  ///< Of estimation, that the bound is of, whatever that of the campaign is.
+  std::vector<std::string> sessions{};  ///< Their names.
+  std::vector<int> num_steps{};         ///< Of each session in the campaign.
+  /// Of a run in sessions that the study is not about: it leaves them as they are.
+  int num_steps_beside = 0;
+  int num_steps_min = 1;  ///< That a session may have.
+  int num_steps_max = 0;
+  std::size_t num_instruments = 0;  ///< Drawn, that a bound is the mean over.
+  std::size_t num_probed = 0;       ///< Runs whose loops were simulated, with their noise.
+};
+
 /// What the sessions of a campaign's runs find out together, whatever their lengths are.
 class PlanStudy {
  public:
   virtual ~PlanStudy() = default;
 
-  /// Estimation method that the bound is of, whatever that of the campaign is.
-  [[nodiscard]] virtual std::string method() const = 0;
-  [[nodiscard]] virtual std::vector<std::string> session_names() const = 0;
-  /// Steps of each session in the campaign.
-  [[nodiscard]] virtual std::vector<int> num_steps() const = 0;
-  /// Steps of a run in sessions that the study is not about: it leaves them as they are.
-  [[nodiscard]] virtual int num_steps_beside() const { return 0; }
-  /// Least and most steps that a session may have.
-  [[nodiscard]] virtual int num_steps_min() const { return 1; }
-  [[nodiscard]] virtual int num_steps_max() const = 0;
-  /// Drawn instruments that a bound is the mean over.
-  [[nodiscard]] virtual std::size_t num_instruments() const = 0;
-  /// Runs whose loops were simulated, with their noise.
-  [[nodiscard]] virtual std::size_t num_probed() const = 0;
+  [[nodiscard]] virtual const PlanScope& scope() const = 0;
 
   /// What makes the standard error of a quantity smaller, as a noun: `longer sessions`.
   [[nodiscard]] virtual std::string remedy(std::size_t quantity) const = 0;
 
   /// What alone keeps the standard error of a quantity above its objective if the same sessions
   /// were endless, as a noun; empty if nothing does.
-  [[nodiscard]] virtual std::string limit(std::size_t /*quantity*/) const { return {}; }
+  [[nodiscard]] virtual std::string limit(std::size_t quantity) const = 0;
 
   /// The bound if the sessions had these lengths.
   /// @param num_steps  Of each session, ≥ 1.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <string_view>
 
 #include "core/error.hpp"
@@ -41,20 +42,9 @@ std::vector<std::string_view> quantity_names(const ResultSchema& schema) {
 }
 
 std::string_view name_of(RunStatus status) {
-  switch (status) {
-    case RunStatus::completed:
-      return "completed";
-    case RunStatus::not_converged:
-      return "not_converged";
-    case RunStatus::not_finite:
-      return "not_finite";
-    case RunStatus::no_draw:
-      return "no_draw";
-    case RunStatus::lost:
-      return "lost";
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
+  static constexpr std::array<std::string_view, 5> names{"completed", "not_converged", "not_finite",
+                                                         "no_draw", "lost"};
+  return names.at(static_cast<std::size_t>(status) - 1);
 }
 
 std::vector<std::string> broken_count_rules(const RunResult& result, std::uint32_t num_draws_max,

@@ -17,10 +17,6 @@ std::span<const std::string_view> names_of(DesignKind) {
   return names;
 }
 
-std::string_view name_of(DesignKind kind) {
-  return names_of(kind)[static_cast<std::size_t>(kind) - 1];
-}
-
 void SamplingDesign::validate(std::uint64_t num_runs) const {
   if (kind == DesignKind::random) return;
   if (points < 2 || points > design_points_max) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "core/campaign/field.hpp"
 #include "core/random/stream.hpp"
 #include "core/runs.hpp"
 
@@ -18,7 +19,6 @@ enum class DesignKind : std::uint8_t {
 };
 
 [[nodiscard]] std::span<const std::string_view> names_of(DesignKind);
-[[nodiscard]] std::string_view name_of(DesignKind kind);
 
 /// Most points of a replicate, 2^sobol_bits.
 inline constexpr std::uint64_t design_points_max = 1024;

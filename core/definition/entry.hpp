@@ -9,6 +9,7 @@
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/definition.hpp"
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/field.hpp"
 
 namespace proofmass::detail {
 
@@ -29,8 +30,7 @@ struct Entry {
 /// An enumerator by its spelling.
 template <typename Choice>
 [[nodiscard]] Entry choice_entry(std::string_view path, Choice choice, std::string comment = {}) {
-  return text_entry(path, names_of(choice)[static_cast<std::size_t>(choice) - 1],
-                    std::move(comment));
+  return text_entry(path, name_of(choice), std::move(comment));
 }
 
 /// @param item_text  The text of an item.

@@ -41,15 +41,6 @@ Definition MicroscopeCampaign::definition(TableColumns columns) const {
   return definition_of(*this, columns);
 }
 
-std::vector<DefinitionItem> MicroscopeCampaign::items() const { return definition_items(*this); }
-
-std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
-    const Campaign& other) const {
-  const auto* const second = dynamic_cast<const MicroscopeCampaign*>(&other);
-  if (second == nullptr) return {};
-  return compare_definitions(*this, *second);
-}
-
 namespace {
 
 /// With the columns of standard errors whatever the method is, as databases of all campaigns had
@@ -57,8 +48,7 @@ namespace {
 ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
   const bool has_tests = scenario.has_tests();
   const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
-  ResultSchema schema =
-      has_tests && !has_errors ? microscope_results() : results_of(estimation_methods());
+  ResultSchema schema = has_tests && !has_errors ? microscope_results() : results_with_errors();
   if (has_tests) {
     schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
                              test_quantities().end());
@@ -94,7 +84,7 @@ std::string loops_note(const Scenario& scenario) {
   if (scenario.has_plain_loops()) return {};
   const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
   const auto axis_text = [](const AxisMargins& of) {
-    return fmt::format("{} {}", name_of(of.loop), names_of(of.axis)[index(of.axis)]);
+    return fmt::format("{} {}", name_of(of.loop), name_of(of.axis));
   };
   const auto by_gain = [](const AxisMargins& of) { return of.margins.gain; };
   const auto by_phase = [](const AxisMargins& of) { return of.margins.phase_rad; };
@@ -124,14 +114,6 @@ std::vector<double> MicroscopeCampaign::objectives() const {
                       scenario.test_objectives.end());
   }
   return objectives;
-}
-
-std::int64_t MicroscopeCampaign::num_rounds_max() const {
-  return scenario.estimation.num_rounds_max;
-}
-
-std::vector<std::size_t> MicroscopeCampaign::table_quantities() const {
-  return table_elements(dispersions);
 }
 
 RunDraw MicroscopeCampaign::draw(RunIndex run) const {
@@ -207,16 +189,6 @@ bool has_session_fits(std::string_view version) {
   const char* const end = version.data() + version.size();
   const auto [stop, error] = std::from_chars(version.data() + name.size(), end, number);
   return error == std::errc() && stop == end && number >= first;
-}
-
-/// What a stored definition says of the results. Where it cannot be read, that of the nominal
-/// campaign: the database of which it is has other faults to report.
-Scenario recorded_scenario(std::string_view definition) {
-  try {
-    return recorded_campaign(definition).scenario;
-  } catch (const Error&) {
-    return hardy2013_campaign().scenario;
-  }
 }
 
 class MicroscopeModel final : public Model {

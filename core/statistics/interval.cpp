@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <ranges>
 #include <vector>
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
 #include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
-#include "core/statistics/detail/bisection.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 
@@ -18,9 +18,11 @@ namespace {
 
 /// Largest r ≥ 1 with P(x₍r₎ ≤ percentile) = P(Bin(n, level) ≥ r) ≥ confidence; 0 if there is none.
 std::size_t lower_rank(std::size_t n, double level, double confidence) {
-  return detail::last_that_holds(0, n + 1, [&](std::uint64_t r) {
+  const auto ranks = std::views::iota(std::size_t{1}, n + 1);
+  const auto is_bound = [&](std::size_t r) {
     return binomial_at_least(static_cast<double>(r), static_cast<double>(n), level) >= confidence;
-  });
+  };
+  return static_cast<std::size_t>(std::ranges::partition_point(ranks, is_bound) - ranks.begin());
 }
 
 /// @param tail        Left beyond each end.

@@ -4,17 +4,24 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <ranges>
 #include <vector>
 
 #include "core/error.hpp"
 #include "core/runs.hpp"
-#include "core/statistics/detail/bisection.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass {
 namespace {
+
+/// How many of [first, end) hold, which stand in front of those that do not.
+template <typename Holds>
+std::uint64_t num_in_front(std::uint64_t first, std::uint64_t end, const Holds& holds) {
+  const auto numbers = std::views::iota(first, end);
+  return static_cast<std::uint64_t>(std::ranges::partition_point(numbers, holds) - numbers.begin());
+}
 
 // With probability P(Bin(n, coverage) ≤ n − order) at least `order` values lie above the
 // percentile, so that the value of this order is a bound.
@@ -33,8 +40,8 @@ void Tolerance::validate() const {
 
 std::uint64_t wilks_order(const Tolerance& tolerance, std::uint64_t num_runs) {
   tolerance.validate();
-  return detail::last_that_holds(
-      0, num_runs + 1, [&](std::uint64_t order) { return is_bound(tolerance, num_runs, order); });
+  const auto holds = [&](std::uint64_t order) { return is_bound(tolerance, num_runs, order); };
+  return num_in_front(1, num_runs + 1, holds);
 }
 
 std::optional<double> wilks_upper(std::span<const double> values, const Tolerance& tolerance,
@@ -106,14 +113,6 @@ Interval sequential_bounds(double num_hits, double num_runs, double confidence) 
 
 namespace {
 
-/// The largest count in [0, num_runs] for which `holds`, plus one; 0 if it never does. What holds
-/// for a count holds for all smaller ones.
-template <typename Holds>
-std::uint64_t end_of_counts(std::uint64_t num_runs, const Holds& holds) {
-  return detail::last_that_holds(
-      0, num_runs + 2, [&](std::uint64_t end) { return holds(static_cast<double>(end - 1)); });
-}
-
 /// The verdicts of decide() about one tolerance.
 class VerdictRule {
  public:
@@ -127,7 +126,7 @@ class VerdictRule {
     if (order > 0) {
       met_confidence_ += binomial_at_most(static_cast<double>(order - 1), n, allowed_rate_);
     }
-    const std::uint64_t first_not_met = end_of_counts(*num_fixed, [&](double k) {
+    const std::uint64_t first_not_met = num_in_front(0, *num_fixed + 1, [&](double k) {
       return !tolerance.is_shown(binomial_at_least(k, n, allowed_rate_));
     });
     if (first_not_met <= *num_fixed) {
@@ -162,7 +161,7 @@ class VerdictRule {
   /// One more than the exceedances with which so many runs meet it; 0 if none do.
   [[nodiscard]] std::uint64_t bound_order(std::uint64_t num_runs) const {
     if (is_fixed(num_runs)) return wilks_order(tolerance_, num_runs);
-    return end_of_counts(num_runs, [&](double k) { return shows_less(k, num_runs); });
+    return num_in_front(0, num_runs + 1, [&](double k) { return shows_less(k, num_runs); });
   }
 
   /// The fewest runs that meet it with so many exceedances among them.
@@ -186,8 +185,8 @@ class VerdictRule {
       enough = std::min(std::max(2 * enough, std::uint64_t{1}), num_runs_max);
       if (enough == too_few) return std::nullopt;
     } while (!shows_less(k, enough));
-    return detail::last_that_holds(enough, too_few,
-                                   [&](std::uint64_t num_runs) { return shows_less(k, num_runs); });
+    const auto is_short = [&](std::uint64_t num_runs) { return !shows_less(k, num_runs); };
+    return too_few + 1 + num_in_front(too_few + 1, enough, is_short);
   }
 
   [[nodiscard]] RequirementVerdict fixed_verdict(double k, double n) const {
@@ -244,8 +243,8 @@ std::optional<std::uint64_t> runs_to_decide(const VerdictRule& rule,
     enough *= 2;
     if (runs_with(too_few + 1, check) > num_runs_max) return std::nullopt;
   } while (!decides(enough));
-  const std::uint64_t num_runs =
-      runs_with(detail::last_that_holds(enough, too_few, decides), check);
+  enough = too_few + 1 + num_in_front(too_few + 1, enough, std::not_fn(decides));
+  const std::uint64_t num_runs = runs_with(enough, check);
   return num_runs <= num_runs_max ? std::optional(num_runs) : std::nullopt;
 }
 
@@ -293,17 +292,9 @@ RequirementCheck check_requirement(const Requirement& requirement, const Exceeda
                                    std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
   const VerdictRule rule(requirement.tolerance, num_fixed);
-  Decision decision = rule.decide(static_cast<double>(count.num_exceedances), count.num_runs);
-  RequirementCheck check{.verdict = decision.verdict,
-                         .is_of_fixed_size = decision.is_of_fixed_size,
-                         .num_runs = count.num_runs,
-                         .num_exceedances = count.num_exceedances,
-                         .num_without_estimate = count.num_without_estimate,
-                         .num_allowed = 0,
-                         .bound_order = rule.bound_order(count.num_runs),
-                         .exceedance = decision.exceedance,
-                         .num_runs_at_best = {},
-                         .num_runs_at_this_rate = {}};
+  RequirementCheck check{rule.decide(static_cast<double>(count.num_exceedances), count.num_runs),
+                         count};
+  check.bound_order = rule.bound_order(count.num_runs);
   if (check.bound_order > 0) check.num_allowed = check.bound_order - 1;
   if (check.verdict != RequirementVerdict::undecided) return check;
   check.num_runs_at_best = rule.runs_to_meet(count);

@@ -109,25 +109,28 @@ enum class RequirementVerdict {
   undecided,  ///< More draws are needed to tell.
 };
 
-struct RequirementCheck {
+struct Decision {
   RequirementVerdict verdict = RequirementVerdict::undecided;
-  bool is_of_fixed_size = false;           ///< By the binomial law, else sequential; see decide().
-  std::uint64_t num_runs = 0;              ///< Of ExceedanceCount.
-  std::uint64_t num_exceedances = 0;       ///< Of ExceedanceCount.
-  std::uint64_t num_without_estimate = 0;  ///< Of ExceedanceCount.
-  std::uint64_t num_allowed = 0;           ///< Exceedances with which so many runs would meet it.
+  bool is_of_fixed_size = false;  ///< By the binomial law, else sequential; see decide().
+  /// Of the probability of an exceedance, each bound one-sided: the requirement is met if `upper`
+  /// is 1 − coverage or less, and not met if `lower` is 1 − coverage or more. Empty without runs.
+  std::optional<Interval> exceedance;
+};
+
+/// A decision about so many runs, with what it takes to get one.
+struct RequirementCheck : Decision, ExceedanceCount {
+  std::uint64_t num_allowed = 0;  ///< Exceedances with which so many runs would meet it.
   /// Order, from the largest error, of the one below which at least `coverage` of all errors are
   /// with this confidence; 0 if runs are too few. The requirement is met if and only if that error
   /// is below the limit.
   std::uint64_t bound_order = 0;
-  std::optional<Interval> exceedance;  ///< As in Decision. Empty without runs.
   /// If undecided: all runs it takes until the requirement is met if none of the further ones
   /// exceeds, the plan of those who go on. Empty above num_runs_max.
-  std::optional<std::uint64_t> num_runs_at_best;
+  std::optional<std::uint64_t> num_runs_at_best{};
   /// If undecided: all runs it takes to decide, either way, if errors go on to exceed as often as
   /// they did, one in num_runs/num_exceedances; the last of them exceeds. Empty if that is just as
   /// often as allowed, or would take more than num_runs_max.
-  std::optional<std::uint64_t> num_runs_at_this_rate;
+  std::optional<std::uint64_t> num_runs_at_this_rate{};
 };
 
 /// The verdict of decide(), with what it takes to get one.
@@ -135,14 +138,6 @@ struct RequirementCheck {
 [[nodiscard]] RequirementCheck check_requirement(const Requirement& requirement,
                                                  const ExceedanceCount& count,
                                                  std::optional<std::uint64_t> num_fixed);
-
-struct Decision {
-  RequirementVerdict verdict = RequirementVerdict::undecided;
-  bool is_of_fixed_size = false;
-  /// Of the probability of an exceedance, each bound one-sided: the requirement is met if `upper`
-  /// is 1 − coverage or less, and not met if `lower` is 1 − coverage or more. Empty without runs.
-  std::optional<Interval> exceedance;
-};
 
 /// A verdict that may be asked for after any number of runs and again after more: if the
 /// requirement does not hold, "met" is ever answered with probability 1 − confidence at most (the

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/campaign/expression.hpp"
+#include "core/campaign/law_set.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/entry.hpp"
@@ -116,7 +117,7 @@ void DescribedCampaign::read(Document& document) {
 
 void DescribedCampaign::validate() const {
   validate_without_columns();
-  check_table_columns(*this, table_sources(law_set()));
+  check_table_columns(law_set(), *this);
 }
 
 void DescribedCampaign::validate_without_columns() const {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "core/campaign/recording.hpp"
-#include "core/campaign/simulation_crash.hpp"
 #include "core/definition/definition_text.hpp"
+#include "core/error.hpp"
 #include "core/random/stream.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/program_process.hpp"

@@ -119,7 +119,7 @@ BENCHMARK(reference_digest_of_the_model)->Unit(benchmark::kMillisecond);
 
 void plan_of_a_campaign(benchmark::State& state) {
   const MicroscopeCampaign campaign;
-  for (auto _ : state) benchmark::DoNotOptimize(RunPlan(campaign).num_orbits());
+  for (auto _ : state) benchmark::DoNotOptimize(RunPlan(campaign).num_steps());
 }
 BENCHMARK(plan_of_a_campaign)->Unit(benchmark::kMillisecond);
 

@@ -15,6 +15,7 @@
 #include "tests/fuzz/file_world.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/parse_campaign.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::test {
@@ -105,7 +106,7 @@ TEST_F(MutatedTexts, WithExtremeNumbersAreDefinitionsThatCanBeSimulatedOrRefused
                                     static_cast<std::size_t>(match->length(1)), value);
       SCOPED_TRACE(match->str() + " becomes " + value);
       try {
-        const MicroscopeCampaign campaign = parse_campaign("stored definition", changed, {}, {});
+        const MicroscopeCampaign campaign = test::parse_campaign("stored definition", changed);
         const RunPlan plan(campaign);
         (void)plan.simulate_batch(std::array{RunRequest{}}, best_instruction_set());
         ++num_simulated;

@@ -7,7 +7,6 @@
 #include <exception>
 #include <utility>
 
-#include "core/campaign/simulation_crash.hpp"
 #include "core/error.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/conversions.hpp"

@@ -86,10 +86,11 @@ std::string losses_text(const PlanBound& bound, std::size_t num_probed) {
 void add_losses(const Planned& plan, Table& table) {
   const std::vector<PlanLoss>& losses = plan.bound.losses;
   if (losses.empty()) {
-    table.notes.push_back(fmt::format("none of {} probed runs is lost", plan.study.num_probed()));
+    table.notes.push_back(
+        fmt::format("none of {} probed runs is lost", plan.study.scope().num_probed));
     return;
   }
-  table.remarks.push_back({losses_text(plan.bound, plan.study.num_probed()), Tone::bad});
+  table.remarks.push_back({losses_text(plan.bound, plan.study.scope().num_probed), Tone::bad});
   for (const PlanLoss& loss : losses) {
     table.notes.push_back(fmt::format("lost, {}: {}; {}", loss.num_runs, loss.cause, loss.detail));
   }
@@ -128,7 +129,7 @@ Table bound_table(const Planned& plan) {
   }
   table.remarks.push_back(
       {fmt::format("all objectives hold in {} % of the runs, if estimated by the method {}",
-                   percent_text(plan.bound.misses_any), plan.study.method())});
+                   percent_text(plan.bound.misses_any), plan.study.scope().method)});
   if (plan.bound.mean_budget) {
     table.remarks.push_back(
         {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});
@@ -137,7 +138,7 @@ Table bound_table(const Planned& plan) {
       "σ: standard error of estimates by the method {}, mean of {} instruments; errors are taken "
       "to be normal, and the chance that all objectives hold is the product of the single ones; "
       "correlated errors can only raise it",
-      plan.study.method(), plan.study.num_instruments()));
+      plan.study.scope().method, plan.study.scope().num_instruments));
   add_undetermined(plan, table);
   add_losses(plan, table);
   if (!plan.note.empty()) table.notes.push_back(plan.note);
@@ -148,15 +149,15 @@ Table session_table(const Planned& plan) {
   Table table{.columns = {{.title = "session", .is_text = true},
                           {.title = std::string(built_in_model().step_name())}},
               .has_total = true};
-  const std::vector<std::string> sessions = plan.study.session_names();
+  const std::vector<std::string>& sessions = plan.study.scope().sessions;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     table.rows.push_back({sessions[i], fmt::to_string(plan.num_steps[i])});
   }
   table.rows.push_back({"all", fmt::to_string(plan.num_steps_in_all())});
-  if (plan.study.num_steps_beside() > 0) {
+  if (plan.study.scope().num_steps_beside > 0) {
     table.notes.push_back(
         fmt::format("{} {} of sessions that calibrate nothing are left as they are",
-                    plan.study.num_steps_beside(), built_in_model().step_name()));
+                    plan.study.scope().num_steps_beside, built_in_model().step_name()));
   }
   return table;
 }
@@ -169,12 +170,12 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
     return;
   }
   Json json{{"file", options.file.string()},
-            {"method", plan.study.method()},
+            {"method", plan.study.scope().method},
             {"note", plan.note},
             {"num_steps", plan.num_steps_in_all()},
             {"step_name", built_in_model().step_name()},
-            {"num_instruments", plan.study.num_instruments()},
-            {"num_probed", plan.study.num_probed()},
+            {"num_instruments", plan.study.scope().num_instruments},
+            {"num_probed", plan.study.scope().num_probed},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", plan.bound.mean_budget},
             {"losses", Json::array()},
@@ -194,7 +195,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
                                   {"standard_error", plan.bound.standard_errors[i]},
                                   {"misses", plan.bound.misses[i]}});
   }
-  const std::vector<std::string> sessions = plan.study.session_names();
+  const std::vector<std::string>& sessions = plan.study.scope().sessions;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     json["sessions"].push_back({{"session", sessions[i]}, {"num_steps", plan.num_steps[i]}});
   }
@@ -213,11 +214,11 @@ std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& 
 
 /// What is to be allocated. @throws UsageError if it cannot be, or no allocation is better.
 AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) {
-  const std::vector<int> of_file = study.num_steps();
+  const std::vector<int>& of_file = study.scope().num_steps;
   const int in_all = options.num_steps.value_or(std::accumulate(of_file.begin(), of_file.end(), 0));
   const AllocationRule rule{.num_steps = in_all,
-                            .minimum = std::max(options.minimum, study.num_steps_min()),
-                            .maximum = study.num_steps_max()};
+                            .minimum = std::max(options.minimum, study.scope().num_steps_min),
+                            .maximum = study.scope().num_steps_max};
   const auto refuse = [&](std::string_view limit, std::size_t number, std::string_view each) {
     throw UsageError(fmt::format("--{} = {} (must be {} or {}, {} for each of {} sessions)",
                                  built_in_model().step_name(), in_all, number, limit, each,
@@ -239,10 +240,10 @@ AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) 
   if (options.goal == "budget" && !bound.mean_budget) {
     throw UsageError("--for = budget (the campaign has no budget of errors)");
   }
-  if (bound.num_lost() == study.num_probed()) {
-    throw UsageError(fmt::format("{}: {} ({}); remove what loses them before time is allocated",
-                                 options.file.string(), losses_text(bound, study.num_probed()),
-                                 bound.losses.front().detail));
+  if (bound.num_lost() == study.scope().num_probed) {
+    throw UsageError(fmt::format(
+        "{}: {} ({}); remove what loses them before time is allocated", options.file.string(),
+        losses_text(bound, study.scope().num_probed), bound.losses.front().detail));
   }
   return rule;
 }
@@ -260,7 +261,7 @@ struct Allocated {
 
 Allocated allocated(const PlanOptions& options, const PlanStudy& study) {
   const AllocationRule rule = checked_rule(options, study);
-  const std::size_t num_sessions = study.num_steps().size();
+  const std::size_t num_sessions = study.scope().num_steps.size();
   const PlanGoal goal = options.goal == "budget" ? PlanGoal::budget : PlanGoal::objectives;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   if (takes_escapes(stderr)) {
@@ -299,7 +300,7 @@ int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStu
   print_plan(options, plan);
   if (options.format == OutputFormat::text) {
     print_lines(fmt::format("wrote {}\n", options.new_file.string()));
-    print_changed_method(campaign, plan.study.method());
+    print_changed_method(campaign, plan.study.scope().method);
   }
   if (!best.is_interrupted) return exit_code_of(plan);
   wire::say("proofmass: interrupted; this is the best allocation found so far\n");
@@ -311,7 +312,7 @@ int plan_campaign(const PlanOptions& options) {
   if (!options.new_file.empty()) check_new_file("--optimise", options.new_file);
   const std::unique_ptr<const PlanStudy> study = study_of(options, *campaign);
   if (!options.new_file.empty()) return optimise(options, *campaign, *study);
-  const Planned plan = planned(*campaign, *study, study->num_steps());
+  const Planned plan = planned(*campaign, *study, study->scope().num_steps);
   print_plan(options, plan);
   return exit_code_of(plan);
 }

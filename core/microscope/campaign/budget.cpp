@@ -65,8 +65,8 @@ class Sizes {
 
   /// Of half the sum, or the difference, of both sensors' about an axis.
   [[nodiscard]] double of_pair(std::string_view group, std::size_t axis) const {
-    const auto found = std::ranges::find(draw_groups(), group, &DrawGroup::name);
-    return 0.5 * (sizes_[found->first + axis] + sizes_[found->first + 3 + axis]);
+    const std::size_t first = draw_group(group).first;
+    return 0.5 * (sizes_[first + axis] + sizes_[first + 3 + axis]);
   }
   /// Of η ± θ: element 1j of [M], about the axis that is neither X nor j.
   [[nodiscard]] double off_diagonal(std::size_t axis) const {

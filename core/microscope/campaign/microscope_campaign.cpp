@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "core/error.hpp"
-#include "core/microscope/instrument/magnitude.hpp"
 #include "core/microscope/results/results.hpp"
 
 namespace proofmass {
@@ -35,7 +33,7 @@ void check_environment(const MicroscopeCampaign& campaign) {
 
 void MicroscopeCampaign::validate() const {
   validate_without_columns();
-  check_table_columns(*this, table_sources(law_set(dispersions)));
+  check_table_columns(law_set(dispersions), *this);
 }
 
 void MicroscopeCampaign::validate_without_columns() const {
@@ -55,25 +53,9 @@ Interpretation MicroscopeCampaign::interpretation() const {
 
 MicroscopeCampaign hardy2013_campaign() {
   MicroscopeCampaign campaign;
-  campaign.name = "hardy2013";
-  campaign.seed = 1;
-  campaign.num_runs = 100;
   campaign.scenario.estimation.correction = Correction::hardy2013;
   return campaign;
 }
-
-namespace {
-
-/// Whether expressions gave numbers of a sensible size; a quotient or a root may give none.
-bool are_in_range(const DispersionSet& dispersions, const DrawnValues& values) {
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    if (dispersions[i].law != Law::derived) continue;
-    if (!(std::fabs(values[i]) <= drawn_magnitude_max(i))) return false;
-  }
-  return true;
-}
-
-}  // namespace
 
 double common_offset_x(const Scenario& scenario, const Instrument& instrument) {
   const double error_m_s2 = scenario.drag_free.bias_compensation_error_x_m_s2;
@@ -96,7 +78,7 @@ AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,
     draw.values = draw_values(campaign.dispersions, campaign.seed, of_instrument, draw.num_draws,
                               table_values, campaign.design);
     ++draw.num_draws;
-    if (!are_in_range(campaign.dispersions, draw.values)) continue;
+    if (!is_drawn_in_range(campaign.dispersions, draw.values)) continue;
     const Instrument instrument = make_instrument(draw.values);
     if (is_accepted(instrument, campaign.scenario.acceptance)) {
       draw.instrument = instrument;

@@ -16,7 +16,7 @@ namespace proofmass {
 
 /// A campaign of MICROSCOPE, which calibrates and may test the equivalence principle: the scenario
 /// that all runs share, and the laws by which the instrument of each run is drawn.
-/// `microscope_model.cpp` defines what derives from other modules.
+/// `microscope_model.cpp` and `definition` define what derives from other modules.
 class MicroscopeCampaign final : public Campaign {
  public:
   MicroscopeCampaign() { name = "hardy2013"; }
@@ -44,8 +44,12 @@ class MicroscopeCampaign final : public Campaign {
       const Campaign& other) const override;
   [[nodiscard]] ResultSchema results() const override;
   [[nodiscard]] std::vector<double> objectives() const override;
-  [[nodiscard]] std::int64_t num_rounds_max() const override;
-  [[nodiscard]] std::vector<std::size_t> table_quantities() const override;
+  [[nodiscard]] std::int64_t num_rounds_max() const override {
+    return scenario.estimation.num_rounds_max;
+  }
+  [[nodiscard]] std::vector<std::size_t> table_quantities() const override {
+    return table_elements(dispersions);
+  }
   [[nodiscard]] RunDraw draw(RunIndex run) const override;
   [[nodiscard]] std::uint64_t num_realisations() const override { return realisations; }
   [[nodiscard]] SamplingDesign sampling_design() const override { return design; }

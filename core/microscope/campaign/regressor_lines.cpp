@@ -241,12 +241,18 @@ double fit_duration_s(const Scenario& scenario, const Session& session) {
   return session.num_orbits * scenario.orbit.period_s - scenario.estimation.transient_s;
 }
 
+namespace {
+
+/// Standard error that the sensors' noise, not scaled, gives a session's target where the
+/// regressor's line has this amplitude, in units of the target.
 double line_sigma(const Scenario& scenario, const Session& session, double frequency_hz,
                   double amplitude) {
   const double density = differential_x_psd(scenario.noise, frequency_hz);
   return std::abs(target_info(session.target).scale) *
          std::sqrt(density / fit_duration_s(scenario, session)) / amplitude;
 }
+
+}  // namespace
 
 void check_regressors(const Scenario& scenario) {
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {

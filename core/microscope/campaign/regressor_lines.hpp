@@ -40,11 +40,6 @@ using SpectralLines = std::vector<SpectralLine>;
 /// variance S/duration.
 [[nodiscard]] double fit_duration_s(const Scenario& scenario, const Session& session);
 
-/// Standard error that the sensors' noise, not scaled, gives a session's target where the
-/// regressor's line at `frequency_hz` has this amplitude, in units of the target.
-[[nodiscard]] double line_sigma(const Scenario& scenario, const Session& session,
-                                double frequency_hz, double amplitude);
-
 /// For campaign files; a stored campaign can be read whatever its lines are.
 /// @throws ConfigError naming the first of the sessions' fit lines whose regressor is so small that
 /// noise makes more of the estimate than construction admits.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -20,26 +19,6 @@ namespace proofmass {
 Scenario::Scenario() : sessions(hardy2013_sessions()) {
   std::ranges::transform(microscope_results().quantities, objectives.begin(), &Quantity::objective);
   std::ranges::transform(test_quantities(), test_objectives.begin(), &Quantity::objective);
-}
-
-namespace {
-
-std::vector<std::string> objective_paths(std::span<const Quantity> quantities) {
-  std::vector<std::string> paths;
-  for (const Quantity& quantity : quantities) paths.push_back("objective." + quantity.column());
-  return paths;
-}
-
-}  // namespace
-
-std::string_view objective_path(std::size_t parameter) {
-  static const std::vector<std::string> paths = objective_paths(microscope_results().quantities);
-  return paths.at(parameter);
-}
-
-std::string_view test_objective_path(std::size_t parameter) {
-  static const std::vector<std::string> paths = objective_paths(test_quantities());
-  return paths.at(parameter);
 }
 
 namespace {
@@ -207,10 +186,8 @@ void check_controllers(const Scenario& scenario) {
           controllers[k].axis != controllers[i].axis) {
         continue;
       }
-      throw ConfigError(
-          path + ".axis",
-          fmt::format("\"{}\"", names_of(controllers[i].axis)[index(controllers[i].axis)]),
-          fmt::format("that axis of the loop has one, controller[{}]", k));
+      throw ConfigError(path + ".axis", fmt::format("\"{}\"", name_of(controllers[i].axis)),
+                        fmt::format("that axis of the loop has one, controller[{}]", k));
     }
   }
 }
@@ -240,7 +217,7 @@ void check_stability(const Scenario& scenario) {
     throw ConfigError(path, fmt::format("{}", value),
                       fmt::format("{} the {} loop of axis {}{}, even with a perfect instrument",
                                   is_open ? "does not close" : "makes", name_of(of.loop),
-                                  names_of(of.axis)[index(of.axis)], is_open ? "" : " unstable"));
+                                  name_of(of.axis), is_open ? "" : " unstable"));
   }
 }
 

@@ -61,14 +61,9 @@ struct Scenario {
 /// Calls visit(FieldInfo, value) for every number and choice of the scenario except its sessions,
 /// in file order; for those of a test only if the scenario has_tests(), for those of its realism
 /// only if it has that. `Config` is Scenario or const Scenario; the value is a (const) reference to
-/// double, std::int64_t or one of the enumerations above.
+/// double, std::int64_t or one of the enumerations above. The FieldInfo lives during the call.
 template <typename Config, typename Visitor>
 void for_each_field(Config& scenario, Visitor&& visit);
-
-/// `objective.a_c12_rad`: table and key of a parameter's objective in a campaign file.
-[[nodiscard]] std::string_view objective_path(std::size_t parameter);
-/// Of a test parameter's: `objective.eotvos_parameter`.
-[[nodiscard]] std::string_view test_objective_path(std::size_t parameter);
 
 }  // namespace proofmass
 

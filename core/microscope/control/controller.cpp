@@ -78,10 +78,6 @@ std::span<const std::string_view> names_of(ControlLoop) {
   return names;
 }
 
-std::string_view name_of(ControlLoop loop) {
-  return names_of(loop)[static_cast<std::size_t>(loop) - 1];
-}
-
 void ControllerConfig::validate(const std::string& path, double sample_period_s) const {
   if (gain == 0.0) throw ConfigError(path + ".gain", "0", "must close the loop");
   if (poles_rad_s.size() > controller_order_max || zeros_rad_s.size() > poles_rad_s.size()) {

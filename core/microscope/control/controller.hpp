@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/campaign/field.hpp"
 #include "core/math/complex.hpp"
 #include "core/microscope/session/session.hpp"
 #include "core/signal/band_pass.hpp"
@@ -19,7 +20,6 @@ enum class ControlLoop : std::uint8_t {
   attitude = 2,   ///< From θ̂, rad, to the angular acceleration −C θ̂, rad/s².
 };
 [[nodiscard]] std::span<const std::string_view> names_of(ControlLoop);
-[[nodiscard]] std::string_view name_of(ControlLoop loop);
 
 inline constexpr std::size_t controller_order_max = 8;
 

@@ -17,17 +17,11 @@
 #include "core/microscope/environment/physical_environment.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/estimation/methods.hpp"
-#include "core/microscope/instrument/magnitude.hpp"
-#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/model.hpp"
 #include "core/statistics/independence.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr std::array<std::string_view, 7> environment_headings{
-    "time_s",           "linear_x_m_s2",    "linear_y_m_s2",   "linear_z_m_s2",
-    "angular_x_rad_s2", "angular_y_rad_s2", "angular_z_rad_s2"};
 
 // Row i of an environment table stands in line i + 1, below the headings.
 DefinitionError located_in_table(const ConfigError& error, const std::string& name) {
@@ -48,18 +42,17 @@ void read_environment(MicroscopeCampaign& campaign, DataFiles& files) {
                                                  campaign.scenario.orbit.period_s);
 }
 
-void check_environment_headings(CsvReader& reader) {
+void check_environment_headings(CsvReader& reader, const std::vector<std::string_view>& headings) {
   const bool has_line = reader.next_row();
-  const auto [own, expected] = std::ranges::mismatch(reader.cells(), environment_headings);
-  if (own == reader.cells().end() && expected == environment_headings.end()) return;
+  const auto [own, expected] = std::ranges::mismatch(reader.cells(), headings);
+  if (own == reader.cells().end() && expected == headings.end()) return;
   std::string text;
   if (has_line) {
     text = fmt::format(
-        "column {} is {}; ", expected - environment_headings.begin() + 1,
+        "column {} is {}; ", expected - headings.begin() + 1,
         own == reader.cells().end() ? "missing" : fmt::format("\"{}\"", own->substr(0, 40)));
   }
-  reader.refuse(
-      fmt::format("{}the first line must be {}", text, fmt::join(environment_headings, ",")));
+  reader.refuse(fmt::format("{}the first line must be {}", text, fmt::join(headings, ",")));
 }
 
 /// Values that a drawn quantity may have in a file.
@@ -147,11 +140,11 @@ void check_orbit(const OrbitConfig& orbit) {
         "orbit.eccentricity", fmt::format("{}", orbit.eccentricity),
         fmt::format("must be <= {}: estimates are of first order in it", eccentricity_max));
   }
-  const double perigee_m = KeplerOrbit(orbit).semi_latus_rectum_m() / (1.0 + orbit.eccentricity);
-  if (perigee_m >= earth_radius_m) return;
-  throw ConfigError("orbit.period_s", fmt::format("{}", orbit.period_s),
-                    fmt::format("perigee must be above the ground, not {:.0f} km high",
-                                1e-3 * (perigee_m - earth_radius_m)));
+  const double altitude_m = perigee_altitude_m(orbit);
+  if (altitude_m >= 0.0) return;
+  throw ConfigError(
+      "orbit.period_s", fmt::format("{}", orbit.period_s),
+      fmt::format("perigee must be above the ground, not {:.0f} km high", 1e-3 * altitude_m));
 }
 
 /// a_d11' holds what the constant accelerations of its own session make of the quadratic factors.
@@ -178,14 +171,15 @@ void check_tests(const std::vector<Session>& sessions) {
 EnvironmentTable parse_environment(std::string_view text, const std::string& name,
                                    double orbit_period_s) {
   CsvReader reader(text, name);
-  check_environment_headings(reader);
+  const std::vector<std::string_view> headings = environment_table_schema().columns;
+  check_environment_headings(reader, headings);
   EnvironmentTable table;
   while (reader.next_row()) {
     if (table.size() == environment_rows_max) {
       reader.refuse(fmt::format("more than {} rows", environment_rows_max));
     }
-    reader.expect_cells(environment_headings.size());
-    const auto number = [&](std::size_t i) { return reader.number(i, environment_headings[i]); };
+    reader.expect_cells(headings.size());
+    const auto number = [&](std::size_t i) { return reader.number(i, headings[i]); };
     table.push_back({.time_s = number(0),
                      .linear_m_s2 = {number(1), number(2), number(3)},
                      .angular_rad_s2 = {number(4), number(5), number(6)}});
@@ -238,28 +232,6 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
 
 namespace {
 
-void validate(const MicroscopeCampaign& campaign, TableColumns columns, const Document& document) {
-  try {
-    if (columns == TableColumns::included) return campaign.validate();
-    campaign.validate_without_columns();
-  } catch (const ConfigError& error) {
-    throw document.located(error);
-  }
-}
-
-MicroscopeCampaign parsed_campaign(const std::string& name, std::string_view text,
-                                   EnvironmentTable environment_table,
-                                   std::vector<std::vector<double>> table_columns,
-                                   TableColumns columns) {
-  Document document(name, text, {});
-  MicroscopeCampaign campaign = read_definition(document);
-  document.check();
-  campaign.environment_table = std::move(environment_table);
-  campaign.table_columns = std::move(table_columns);
-  validate(campaign, columns, document);
-  return campaign;
-}
-
 /// Without the limits of health that definitions had up to the model hardy2013-3. Results under
 /// them are stored and can be read; no run is computed under them any more.
 std::string without_former_limits(std::string text) {
@@ -294,13 +266,6 @@ void require_same_text(std::string_view source, std::string_view text, std::stri
 
 }  // namespace
 
-MicroscopeCampaign parse_campaign(const std::string& name, std::string_view text,
-                                  EnvironmentTable environment_table,
-                                  std::vector<std::vector<double>> table_columns) {
-  return parsed_campaign(name, text, std::move(environment_table), std::move(table_columns),
-                         TableColumns::included);
-}
-
 Definition definition_of(const MicroscopeCampaign& campaign, TableColumns columns) {
   const Model& model = campaign.model();
   Definition definition{.text = canonical_definition(campaign),
@@ -311,22 +276,33 @@ Definition definition_of(const MicroscopeCampaign& campaign, TableColumns column
   return definition;
 }
 
-MicroscopeCampaign recorded_campaign(std::string_view text) {
-  Document document("definition", text, {});
-  MicroscopeCampaign campaign = read_definition(document);
-  const Scenario& scenario = campaign.scenario;
-  validate_sessions(scenario.sessions, scenario.orbit.period_s,
-                    scenario.simulation.sample_period_s);
-  return campaign;
+Scenario recorded_scenario(std::string_view text) {
+  try {
+    Document document("definition", text, {});
+    Scenario scenario = read_definition(document).scenario;
+    validate_sessions(scenario.sessions, scenario.orbit.period_s,
+                      scenario.simulation.sample_period_s);
+    return scenario;
+  } catch (const Error&) {
+    return hardy2013_campaign().scenario;
+  }
 }
 
 MicroscopeCampaign campaign_of(Definition definition, TableColumns columns,
                                std::string_view source) {
   check_columns(definition, columns);
+  EnvironmentTable environment_table = environment_of(definition.tables);
   const std::string text = without_former_limits(std::move(definition.text));
-  MicroscopeCampaign campaign =
-      parsed_campaign(std::string(source), text, environment_of(definition.tables),
-                      std::move(definition.table_columns), columns);
+  Document document(std::string(source), text, {});
+  MicroscopeCampaign campaign = read_definition(document);
+  document.check();
+  campaign.environment_table = std::move(environment_table);
+  campaign.table_columns = std::move(definition.table_columns);
+  try {
+    columns == TableColumns::included ? campaign.validate() : campaign.validate_without_columns();
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
   require_same_text(source, text, canonical_definition(campaign));
   return campaign;
 }

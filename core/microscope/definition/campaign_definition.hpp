@@ -36,25 +36,14 @@ class Document;
 /// @throws ConfigError naming the session.
 void check_joint_campaign(const MicroscopeCampaign& campaign);
 
-/// The campaign of a text and of data that have been read before; opens no file.
-///
-/// @param name               For messages: where the text is from.
-/// @param text               TOML; what it leaves out keeps its nominal value.
-/// @param environment_table  Rows of the environment file; empty if harmonic.
-/// @param table_columns      As in MicroscopeCampaign::table_columns.
-/// @throws DefinitionError if the text or the data are not those of a valid campaign.
-[[nodiscard]] MicroscopeCampaign parse_campaign(const std::string& name, std::string_view text,
-                                                EnvironmentTable environment_table,
-                                                std::vector<std::vector<double>> table_columns);
-
 /// The definition of a valid campaign.
 [[nodiscard]] Definition definition_of(const MicroscopeCampaign& campaign,
                                        TableColumns columns = TableColumns::included);
 
-/// The campaign of a stored definition without its data files, as far as its results depend on it:
-/// its sessions are valid, and all else is what can be read.
-/// @throws DefinitionError or ConfigError if its sessions are not.
-[[nodiscard]] MicroscopeCampaign recorded_campaign(std::string_view text);
+/// What a stored definition says of the results: its sessions are valid, and all else is what can
+/// be read. Where they are not, that of the nominal campaign: the database of which it is has other
+/// faults to report.
+[[nodiscard]] Scenario recorded_scenario(std::string_view text);
 
 /// The campaign of a definition that another program sent.
 ///
@@ -71,14 +60,5 @@ void check_joint_campaign(const MicroscopeCampaign& campaign);
 
 /// A campaign as TOML for people: each field with its meaning and rule, dispersions by group.
 [[nodiscard]] std::string commented_campaign(const MicroscopeCampaign& campaign);
-
-/// Every key of a campaign with its value, in the order of canonical_definition(). The rows of data
-/// files are not in it.
-[[nodiscard]] std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign);
-
-/// Everything but the number of runs that two campaigns do not share, in the order of a campaign
-/// file. The name of a data file whose values are the same is no difference.
-[[nodiscard]] std::vector<DefinitionDifference> compare_definitions(
-    const MicroscopeCampaign& first, const MicroscopeCampaign& second);
 
 }  // namespace proofmass

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/definition_entries.hpp"
 
 namespace proofmass {
@@ -24,10 +24,8 @@ class Comparison {
 
   std::vector<DefinitionDifference> run() {
     compare_sampling();
-    const bool have_tests = first_.scenario.has_tests() && second_.scenario.has_tests();
     const bool is_any_realistic = first_.scenario.realism || second_.scenario.realism;
-    compare_entries("", fields_of(first_, have_tests, is_any_realistic),
-                    fields_of(second_, have_tests, is_any_realistic));
+    compare_entries("", fields_of(first_, is_any_realistic), fields_of(second_, is_any_realistic));
     compare_sessions();
     compare_controllers();
     compare_environment();
@@ -53,9 +51,7 @@ class Comparison {
   }
 
   // More runs extend a campaign; the values of data files are compared, not their names.
-  // What one of them alone can have is left to the comparison of sessions.
-  static std::vector<Entry> fields_of(MicroscopeCampaign campaign, bool with_tests,
-                                      bool with_realism) {
+  static std::vector<Entry> fields_of(MicroscopeCampaign campaign, bool with_realism) {
     if (with_realism && !campaign.scenario.realism) campaign.scenario.realism.emplace();
     std::vector<Entry> entries = detail::scenario_entries(campaign);
     std::erase_if(entries, [](const Entry& entry) {
@@ -64,15 +60,6 @@ class Comparison {
           "environment.file"};
       return std::ranges::find(left_out, entry.path) != left_out.end();
     });
-    for (std::size_t i = 0; !with_tests && i < num_test_objectives; ++i) {
-      std::erase_if(entries,
-                    [&](const Entry& entry) { return entry.path == test_objective_path(i); });
-    }
-    if (!with_tests) {
-      std::erase_if(entries, [](const Entry& entry) {
-        return entry.path.starts_with("gaps.") || entry.path == "drag_free.resonator_damping";
-      });
-    }
     for (Entry& entry : entries) {
       constexpr std::string_view table = "campaign.";
       if (entry.path.starts_with(table)) entry.path.erase(0, table.size());
@@ -80,21 +67,22 @@ class Comparison {
     return entries;
   }
 
+  /// Only campaigns that test have some of the fields: what one alone has is left to the comparison
+  /// of sessions.
   void compare_entries(const std::string& prefix, const std::vector<Entry>& first,
                        const std::vector<Entry>& second) {
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      if (first[i].text != second[i].text) {
-        differ(prefix + first[i].path, first[i].text, second[i].text);
-      }
+    for (const Entry& entry : first) {
+      const auto same = std::ranges::find(second, entry.path, &Entry::path);
+      if (same == second.end() || same->text == entry.text) continue;
+      differ(prefix + entry.path, entry.text, same->text);
     }
   }
 
-  static std::string excitations_text(const Session& session) {
-    std::string text;
-    for (const Excitation& excitation : session.excitations) {
-      text += (text.empty() ? "" : ", ") + detail::excitation_text(excitation);
-    }
-    return "[" + text + "]";
+  static std::vector<Entry> entries_of(const Session& session) {
+    std::vector<Entry> entries = detail::session_entries(session);
+    entries.push_back(
+        detail::list_entry("excitations", session.excitations, detail::excitation_text));
+    return entries;
   }
 
   static std::string names_text(const std::vector<Session>& sessions) {
@@ -115,11 +103,7 @@ class Comparison {
       const bool is_same = first[i].name == second[i].name;
       const std::string prefix =
           is_same ? fmt::format("session.{}.", first[i].name) : fmt::format("session[{}].", i);
-      compare_entries(prefix, detail::session_entries(first[i]),
-                      detail::session_entries(second[i]));
-      if (first[i].excitations != second[i].excitations) {
-        differ(prefix + "excitations", excitations_text(first[i]), excitations_text(second[i]));
-      }
+      compare_entries(prefix, entries_of(first[i]), entries_of(second[i]));
     }
   }
 
@@ -174,9 +158,11 @@ class Comparison {
 
 }  // namespace
 
-std::vector<DefinitionDifference> compare_definitions(const MicroscopeCampaign& first,
-                                                      const MicroscopeCampaign& second) {
-  return Comparison(first, second).run();
+std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
+    const Campaign& other) const {
+  const auto* const second = dynamic_cast<const MicroscopeCampaign*>(&other);
+  if (second == nullptr) return {};
+  return Comparison(*this, *second).run();
 }
 
 }  // namespace proofmass

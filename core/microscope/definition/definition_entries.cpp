@@ -10,7 +10,6 @@
 
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
-#include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/session/session.hpp"
 
 namespace proofmass::detail {
@@ -131,10 +130,10 @@ void append(std::vector<DefinitionItem>& items, const std::string& prefix,
 
 }  // namespace
 
-std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign) {
+std::vector<DefinitionItem> MicroscopeCampaign::items() const {
   std::vector<DefinitionItem> items;
-  append(items, "", detail::scenario_entries(campaign));
-  const std::vector<Session>& sessions = campaign.scenario.sessions;
+  append(items, "", detail::scenario_entries(*this));
+  const std::vector<Session>& sessions = scenario.sessions;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     append(items, fmt::format("session[{}].", i), detail::session_entries(sessions[i]));
     for (std::size_t j = 0; j < sessions[i].excitations.size(); ++j) {
@@ -142,15 +141,15 @@ std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign)
              detail::excitation_entries(sessions[i].excitations[j]));
     }
   }
-  const std::vector<ControllerConfig>& controllers = campaign.scenario.controllers;
+  const std::vector<ControllerConfig>& controllers = scenario.controllers;
   for (std::size_t i = 0; i < controllers.size(); ++i) {
     append(items, fmt::format("controller[{}].", i), detail::controller_entries(controllers[i]));
   }
   for (const DrawGroup& group : draw_groups()) {
-    if (detail::is_left_out(campaign, group)) continue;
+    if (detail::is_left_out(*this, group)) continue;
     for (std::size_t i = group.first; i < group.first + group.count; ++i) {
       append(items, fmt::format("dispersion.{}.", drawn_names()[i]),
-             detail::law_entries(campaign.dispersions[i]));
+             detail::law_entries(dispersions[i]));
     }
   }
   return items;

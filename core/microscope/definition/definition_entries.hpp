@@ -16,10 +16,10 @@ namespace proofmass::detail {
 /// All keys of one session but its excitations.
 [[nodiscard]] std::vector<Entry> session_entries(const Session& session);
 
-/// All keys of one excitation.
 /// `loop` to `delay_samples`.
 [[nodiscard]] std::vector<Entry> controller_entries(const ControllerConfig& controller);
 
+/// All keys of one excitation.
 [[nodiscard]] std::vector<Entry> excitation_entries(const Excitation& excitation);
 
 /// `{ kind = "drag_free", axis = "x", ... }`.

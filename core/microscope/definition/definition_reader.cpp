@@ -120,12 +120,12 @@ void read_lines(Document& document, const std::string& path, std::vector<LineMul
 void read_amplitude(Document& document, const std::string& path, Excitation& excitation) {
   const std::string key(amplitude_key(excitation.kind));
   read_needed(document, path + "." + key, excitation.amplitude);
-  const std::string kind(names_of(excitation.kind)[static_cast<std::size_t>(excitation.kind) - 1]);
   for (const ExcitationKind other : excitation_kinds) {
     if (other == excitation.kind) continue;
     const std::string other_path = fmt::format("{}.{}", path, amplitude_key(other));
     if (document.find(other_path) == nullptr) continue;
-    document.refuse(other_path, fmt::format("not a key of kind {}, which has {}", kind, key));
+    document.refuse(other_path, fmt::format("not a key of kind {}, which has {}",
+                                            name_of(excitation.kind), key));
   }
 }
 

@@ -76,8 +76,7 @@ EnvironmentSpan span_of(const Scenario& scenario, const std::string& name) {
 }
 
 void check_perigee(const OrbitConfig& orbit) {
-  const double perigee_m = KeplerOrbit(orbit).semi_latus_rectum_m() / (1.0 + orbit.eccentricity);
-  const double altitude_m = perigee_m - earth_radius_m;
+  const double altitude_m = perigee_altitude_m(orbit);
   if (altitude_m >= lowest_perigee_m) return;
   throw ConfigError("orbit.eccentricity", fmt::format("{}", orbit.eccentricity),
                     fmt::format("perigee must be at least {:.0f} km high, not {:.0f} km",

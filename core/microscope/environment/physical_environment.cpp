@@ -18,6 +18,10 @@ double area_along(const SatelliteBox& box, const Vector3<double>& v_F) {
 
 }  // namespace
 
+double perigee_altitude_m(const OrbitConfig& orbit) {
+  return KeplerOrbit(orbit).semi_latus_rectum_m() / (1.0 + orbit.eccentricity) - earth_radius_m;
+}
+
 Vector3<double> orbital_velocity(const KeplerOrbit& orbit, const OrbitPoint& point) {
   const double e = orbit.eccentricity();
   const double square = 1.0 - e * e;

@@ -56,6 +56,9 @@ struct EnvironmentPhysics {
 
 inline constexpr double earth_radius_m = 6378137.0;  ///< R, equatorial [WGS84].
 
+/// Height of the perigee above that radius.
+[[nodiscard]] double perigee_altitude_m(const OrbitConfig& orbit);
+
 /// v_I, m/s: n p (1 − e²)^(−3/2) (−sin ν, 0, e + cos ν).
 [[nodiscard]] Vector3<double> orbital_velocity(const KeplerOrbit& orbit, const OrbitPoint& point);
 

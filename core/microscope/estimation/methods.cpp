@@ -46,9 +46,21 @@ const EstimationMethodInfo& estimation_method(EstimationMethod method) {
 
 std::span<const EstimationMethodInfo> estimation_methods() { return methods; }
 
-ResultSchema results_of(std::span<const EstimationMethodInfo> possible) {
+BandPass further_lines_filter(const RecordNeeds& needs, const Session& session,
+                              const EstimationConfig& config, double orbit_period_s,
+                              double sample_period_s) {
+  double highest_hz = 0.0;
+  const auto add = [&](const LineMultiple& line) {
+    highest_hz = std::max(highest_hz, line_frequency_hz(session, line, orbit_period_s));
+  };
+  for (const WantedLine& wanted : needs.lines) add(wanted.line);
+  for (const LineMultiple& neighbour : needs.neighbours) add(neighbour);
+  const double corner_hz = std::min(config.band_ratio * highest_hz, 0.25 / sample_period_s);
+  return {no_filter.high_pass, butterworth_low_pass(corner_hz, sample_period_s)};
+}
+
+ResultSchema results_with_errors() {
   ResultSchema schema = microscope_results();
-  if (std::ranges::none_of(possible, &EstimationMethodInfo::has_standard_errors)) return schema;
   for (Quantity& quantity : schema.quantities) quantity.has_standard_error = true;
   schema.fit = {{"chi_squared", "", "1"}, {"degrees_of_freedom", "", "1"}};
   schema.fit_tolerance = fit_tolerance;

@@ -11,17 +11,12 @@
 #include "core/microscope/instrument/noise_config.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
+#include "core/signal/band_pass.hpp"
 
 namespace proofmass {
 
 /// What the sessions of a run left: one entry for each of scenario.sessions, in their order.
 using RunPhasors = std::vector<SessionPhasors>;
-
-/// A number that tells how an estimation went.
-struct Diagnostic {
-  std::string_view name;  ///< With its unit; of a constant string.
-  double value = 0.0;
-};
 
 /// How well a session agrees with what was estimated from all of them.
 struct SessionFit {
@@ -36,7 +31,6 @@ struct Estimation {
   ParameterArray standard_errors{};  ///< SI; if the method has_standard_errors.
   std::uint32_t num_rounds = 0;
   bool converged = false;  ///< False if values still moved in the last allowed round.
-  std::vector<Diagnostic> diagnostics{};
   /// Correlations of the estimates; if the method has_standard_errors.
   std::array<ParameterArray, num_parameters> correlations{};
   std::vector<SessionFit> session_fits{};  ///< As many as sessions, or none.
@@ -57,6 +51,14 @@ struct RecordNeeds {
   /// that the record cannot tell from a line before it is left out.
   std::vector<LineMultiple> neighbours{};
 };
+
+/// The filter behind which a session's further lines are recorded: a low-pass at band_ratio times
+/// the highest of them and of their neighbours, but at half of the Nyquist frequency at most. It
+/// keeps fast noise from leaking into the lines. There is no high-pass: what it would make of an
+/// excitation as the record begins lasts for hours, and no line fits it.
+[[nodiscard]] BandPass further_lines_filter(const RecordNeeds& needs, const Session& session,
+                                            const EstimationConfig& config, double orbit_period_s,
+                                            double sample_period_s);
 
 /// What a method may know beside the records of a run: the scenario, apart from what is simulated
 /// only. References hold during the call.
@@ -89,10 +91,9 @@ struct EstimationMethodInfo {
 /// Those that a campaign file can name.
 [[nodiscard]] std::span<const EstimationMethodInfo> estimation_methods();
 
-/// What results are where these methods can be chosen: microscope_results(), with standard errors,
-/// χ² and its degrees of freedom if one of the methods has them. Runs that another one estimates
-/// have none.
-[[nodiscard]] ResultSchema results_of(std::span<const EstimationMethodInfo> methods);
+/// What results are where a method with standard errors may be chosen: microscope_results() with
+/// these, χ² and its degrees of freedom. Runs that another method estimates have none.
+[[nodiscard]] ResultSchema results_with_errors();
 
 /// Whether χ² of a fit is so large that noise of the densities that the weights are made of makes
 /// it so with a chance below 1e-6, though these be wrong by their tolerance.

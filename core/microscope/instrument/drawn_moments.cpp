@@ -6,8 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/microscope/instrument/magnitude.hpp"
-
 namespace proofmass {
 namespace {
 
@@ -21,12 +19,7 @@ DrawnMoments sampled_moments(const DispersionSet& known, std::uint64_t num_draws
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(num_values);
   for (std::uint64_t i = 0; i < num_draws; ++i) {
     const DrawnValues values = draw_values(known, key, RunIndex{i}, 0, {});
-    const auto is_in_range = [&](std::size_t k) {
-      return known[k].law != Law::derived || std::fabs(values[k]) <= drawn_magnitude_max(k);
-    };
-    bool are_in_range = true;
-    for (std::size_t k = 0; k < num_drawn; ++k) are_in_range = are_in_range && is_in_range(k);
-    if (!are_in_range) continue;
+    if (!is_drawn_in_range(known, values)) continue;
     samples.emplace_back(Eigen::Map<const Eigen::VectorXd>(values.data(), num_values));
     mean += samples.back();
   }

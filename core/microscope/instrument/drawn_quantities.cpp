@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/microscope/instrument/magnitude.hpp"
 
 namespace proofmass {
 namespace {
@@ -67,6 +67,12 @@ const std::array<DrawGroup, num_draw_groups>& draw_groups() {
   return groups;
 }
 
+const DrawGroup& draw_group(std::string_view name) {
+  const auto group = std::ranges::find(draw_groups(), name, &DrawGroup::name);
+  PROOFMASS_EXPECT(group != draw_groups().end());
+  return *group;
+}
+
 const std::array<std::string, num_drawn>& drawn_names() {
   static const std::array<std::string, num_drawn> names = make_drawn_names();
   return names;
@@ -103,6 +109,14 @@ std::string_view drawn_unit(std::size_t quantity) {
 double drawn_magnitude_max(std::size_t quantity) {
   const auto after = std::ranges::upper_bound(draw_groups(), quantity, {}, &DrawGroup::first);
   return 1000.0 * std::prev(after)->bound;
+}
+
+bool is_drawn_in_range(const DispersionSet& dispersions, const DrawnValues& values) {
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    if (dispersions[i].law != Law::derived) continue;
+    if (!(std::fabs(values[i]) <= drawn_magnitude_max(i))) return false;
+  }
+  return true;
 }
 
 DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed, RunIndex run,

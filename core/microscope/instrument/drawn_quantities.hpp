@@ -33,6 +33,10 @@ inline constexpr std::size_t index_of_eotvos_parameter = num_drawn - 1;
 /// The groups in file order; together they cover all drawn quantities once.
 [[nodiscard]] const std::array<DrawGroup, num_draw_groups>& draw_groups();
 
+/// The group of that name.
+/// @pre There is one.
+[[nodiscard]] const DrawGroup& draw_group(std::string_view name);
+
 /// Names of all drawn quantities: `scale_factor_error.sensor_1_x`. The name is that of the random
 /// stream, so it must never change.
 [[nodiscard]] const std::array<std::string, num_drawn>& drawn_names();
@@ -57,5 +61,16 @@ using DispersionSet = std::array<Dispersion, num_drawn>;
 /// Unit of a drawn quantity, for people: `rad`, `m`, `s²/m`, `m/s²`, `rad/s²` or `1`.
 /// @param quantity  Index into drawn_names().
 [[nodiscard]] std::string_view drawn_unit(std::size_t quantity);
+
+/// Largest magnitude that a drawn quantity may have, in its unit: 1,000 times the bound of its
+/// nominal law, far beyond any instrument and wide enough for any experiment with the model. An
+/// offcentring of 5 m is a slip of the pen.
+///
+/// @param quantity  Its place in drawn_names().
+[[nodiscard]] double drawn_magnitude_max(std::size_t quantity);
+
+/// Whether expressions gave numbers of such magnitudes; a quotient or a root may give none. A draw
+/// that is not in range is taken again.
+[[nodiscard]] bool is_drawn_in_range(const DispersionSet& dispersions, const DrawnValues& values);
 
 }  // namespace proofmass

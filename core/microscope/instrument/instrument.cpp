@@ -13,18 +13,12 @@ namespace {
 /// Reads the values of a group one after the other.
 class GroupReader {
  public:
-  GroupReader(const DrawnValues& values, std::string_view group) : values_(values) {
-    for (const DrawGroup& candidate : draw_groups()) {
-      if (candidate.name != group) continue;
-      next_ = candidate.first;
-      end_ = candidate.first + candidate.count;
-    }
-    PROOFMASS_EXPECT(end_ > 0);
-  }
+  GroupReader(const DrawnValues& values, std::string_view name)
+      : values_(values), group_(draw_group(name)) {}
 
   double scalar() {
-    PROOFMASS_EXPECT(next_ < end_);
-    return values_[next_++];
+    PROOFMASS_EXPECT(num_read_ < group_.count);
+    return values_[group_.first + num_read_++];
   }
   Eigen::Vector3d vector() {
     const double x = scalar();
@@ -35,8 +29,8 @@ class GroupReader {
 
  private:
   const DrawnValues& values_;
-  std::size_t next_ = 0;
-  std::size_t end_ = 0;
+  const DrawGroup& group_;
+  std::size_t num_read_ = 0;
 };
 
 }  // namespace

@@ -2,8 +2,7 @@
 
 #include <array>
 #include <cmath>
-
-#include "core/signal/noise_shape.hpp"
+#include <numbers>
 
 namespace proofmass {
 
@@ -44,6 +43,23 @@ SensorNoise linear_yz_of(const NoiseConfig& noise, std::size_t sensor) {
   of.rise_asd *= noise.linear_factor[sensor];
   return of;
 }
+
+namespace {
+
+/// Density times frequency of the noise along X that the wire of a sensor makes, (m/s²)². By the
+/// fluctuation-dissipation theorem for structural damping, one-sided and for each sensor,
+///
+///     S(f) = factor² 4 k_B T (k/Q)/(2π f m²)      (m/s²)²/Hz
+///
+/// @param sensor  0 or 1.
+double wire_noise_level(const WireConfig& wire, std::size_t sensor) {
+  constexpr double boltzmann_j_k = 1.380649e-23;
+  const double amplitude = wire.factor[sensor] / wire.mass_kg[sensor];
+  return amplitude * amplitude * 4.0 * boltzmann_j_k * wire.temperature_k * wire.damping_n_m /
+         (2.0 * std::numbers::pi);
+}
+
+}  // namespace
 
 SensorNoise linear_x_of(const NoiseConfig& noise, std::size_t sensor) {
   SensorNoise of = noise.linear_x;

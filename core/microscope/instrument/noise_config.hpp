@@ -6,8 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "core/microscope/instrument/wire_noise.hpp"
-#include "core/signal/sensor_noise.hpp"
+#include "core/signal/noise_shape.hpp"
 
 namespace proofmass {
 
@@ -22,6 +21,17 @@ enum class NoisePreset : std::uint8_t {
 
 /// Spelling of an enumerator in campaign files; the list of all of them, in value order from 1.
 [[nodiscard]] std::span<const std::string_view> names_of(NoisePreset);
+
+/// Damping of the gold wire that keeps each test mass at a potential: `[noise.wire]` of a campaign
+/// file. Without damping there is none of its noise.
+struct WireConfig {
+  double damping_n_m = 0.0;  ///< k/Q along X: stiffness over quality factor.
+  double temperature_k = 293.0;
+  std::array<double, 2> mass_kg{0.401533, 1.359813};  ///< Test mass of each sensor; SUREF's.
+  /// Multiplies the amplitude in each sensor. The law is disputed ([Nobili2024]), and what flew
+  /// differs from it by factors up to 2.5.
+  std::array<double, 2> factor{1.0, 1.0};
+};
 
 /// Noise of the sensors, of the star tracker and of the actuators: `[noise]` of a campaign file.
 /// All densities are one-sided amplitude densities.

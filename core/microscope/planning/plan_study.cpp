@@ -99,29 +99,23 @@ constexpr EstimationMethodInfo probe_method{
     .estimate = joint_method.estimate,
 };
 
-/// The first runs that have an instrument, with noise.
-std::vector<RunRecord> probe_records(const MicroscopeCampaign& campaign,
+/// The first runs that have an instrument, with noise and the paper's loops.
+std::vector<RunRecord> probe_records(MicroscopeCampaign campaign,
                                      const std::vector<RunIndex>& runs) {
-  const RunPlan plan(campaign, probe_method);
-  const InstructionSet set = best_instruction_set();
+  campaign.scenario.realism.reset();
+  campaign.scenario.controllers.clear();
   std::vector<RunRequest> requests;
-  std::vector<RunRecord> records;
   for (std::size_t i = 0; i < std::min(runs.size(), batch_lanes); ++i) {
-    const std::vector<double> values = campaign.table_values(runs[i]);
-    if (set == InstructionSet::scalar) {
-      records.push_back(plan.record(runs[i], values));
-    } else {
-      requests.push_back({runs[i], values});
-    }
+    requests.push_back({runs[i], campaign.table_values(runs[i])});
   }
-  return set == InstructionSet::scalar ? records : plan.record_batch(requests, set);
+  return RunPlan(campaign, probe_method).record_batch(requests, best_instruction_set());
 }
 
 /// What the squares of a record would have been, had it been longer.
-void lengthen(SessionHealth& health, double factor) {
-  health.quadratic_squares *= factor;
-  health.common_squares *= factor;
-  for (double& squares : health.sensor_squares) squares *= factor;
+void lengthen(LoopMonitor<double>& monitor, double factor) {
+  monitor.quadratic.squares *= factor;
+  monitor.common_square.squares *= factor;
+  for (BlockSteps<double>& steps : monitor.sensor_square) steps.squares *= factor;
 }
 
 /// What a run is lost by.
@@ -223,33 +217,23 @@ class JointStudy final : public PlanStudy {
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};
     probes_ = probe_records(brief, add_instruments(record.phasors, input));
+    scope_ = {
+        .method = std::string(joint_method.name),
+        .num_steps_min = joint_orbits_min(scenario.orbit.period_s, scenario.estimation.transient_s),
+        .num_steps_max = num_session_orbits_max,
+        .num_instruments = instruments_.size(),
+        .num_probed = probes_.size()};
+    for (const Session& session : whole_.scenario.sessions) {
+      if (is_test(session)) {
+        scope_.num_steps_beside += session.num_orbits;
+        continue;
+      }
+      scope_.sessions.push_back(session.name);
+      scope_.num_steps.push_back(session.num_orbits);
+    }
   }
 
-  [[nodiscard]] std::string method() const override { return std::string(joint_method.name); }
-  [[nodiscard]] std::vector<std::string> session_names() const override {
-    std::vector<std::string> names;
-    for (const Session& session : campaign_.scenario.sessions) names.push_back(session.name);
-    return names;
-  }
-  [[nodiscard]] std::vector<int> num_steps() const override {
-    std::vector<int> orbits;
-    for (const Session& session : campaign_.scenario.sessions) orbits.push_back(session.num_orbits);
-    return orbits;
-  }
-  [[nodiscard]] int num_steps_beside() const override {
-    int orbits = 0;
-    for (const Session& session : whole_.scenario.sessions) {
-      if (is_test(session)) orbits += session.num_orbits;
-    }
-    return orbits;
-  }
-  [[nodiscard]] int num_steps_min() const override {
-    return joint_orbits_min(campaign_.scenario.orbit.period_s,
-                            campaign_.scenario.estimation.transient_s);
-  }
-  [[nodiscard]] int num_steps_max() const override { return num_session_orbits_max; }
-  [[nodiscard]] std::size_t num_instruments() const override { return instruments_.size(); }
-  [[nodiscard]] std::size_t num_probed() const override { return probes_.size(); }
+  [[nodiscard]] const PlanScope& scope() const override { return scope_; }
 
   [[nodiscard]] std::string remedy(std::size_t quantity) const override {
     const std::string_view what = what_determines(static_cast<Parameter>(quantity));
@@ -289,7 +273,7 @@ class JointStudy final : public PlanStudy {
       bound.misses_any += part * miss_chance(objectives, of_instrument).miss;
     }
     // A run that is lost misses everything.
-    const double lost = static_cast<double>(bound.num_lost()) / static_cast<double>(num_probed());
+    const double lost = static_cast<double>(bound.num_lost()) / static_cast<double>(probes_.size());
     for (double& miss : bound.misses) miss += lost * (1.0 - miss);
     bound.misses_any += lost * (1.0 - bound.misses_any);
     if (campaign_.error_budget()) bound.mean_budget = mean_budget(bound.standard_errors);
@@ -374,7 +358,7 @@ class JointStudy final : public PlanStudy {
     for (std::size_t k = 0; k < probes_.size(); ++k) {
       HealthRecord record = probes_[k].health;
       for (std::size_t i = 0; i < record.size(); ++i) {
-        lengthen(record[i], static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
+        lengthen(record[i].monitor, static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
       }
       const bool are_usable = std::ranges::all_of(errors[k], is_in_range);
       const HealthFinding finding =
@@ -435,6 +419,7 @@ class JointStudy final : public PlanStudy {
   std::vector<int> measured_orbits_;  ///< Of each session: what `instruments_` is of.
   std::vector<JointInformation> instruments_;
   std::vector<RunRecord> probes_;  ///< Of the first instruments.
+  PlanScope scope_;
 };
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "core/microscope/results/health.hpp"
 
-#include "core/error.hpp"
-
 namespace proofmass {
 
 const std::array<HealthValue, num_health_values>& health_values() {
@@ -28,22 +26,9 @@ const std::array<HealthQuantity, 2>& margin_quantities() {
 }
 
 std::string_view name_of(LossCause cause) {
-  switch (cause) {
-    case LossCause::none:
-      return "none";
-    case LossCause::saturation:
-      return "saturation";
-    case LossCause::attitude:
-      return "attitude";
-    case LossCause::residual:
-      return "residual";
-    case LossCause::quadratic_noise:
-      return "quadratic_noise";
-    case LossCause::square_noise:
-      return "square_noise";
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
+  static constexpr std::array<std::string_view, num_loss_causes + 1> names{
+      "none", "saturation", "attitude", "residual", "quadratic_noise", "square_noise"};
+  return names.at(static_cast<std::size_t>(cause));
 }
 
 }  // namespace proofmass

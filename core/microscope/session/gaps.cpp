@@ -18,40 +18,25 @@ constexpr int num_orbits_max = 1000;
 // Mean number of losses that touch a window. exp(−2), a seventh of the windows, are left.
 constexpr double touches_max = 2.0;
 
-/// The blocks of one record.
-class Record {
- public:
-  Record(std::size_t num_blocks, double sample_period_s)
-      : lost_(num_blocks), block_s_(static_cast<double>(test_block_size) * sample_period_s) {}
-
-  [[nodiscard]] double duration_s() const { return static_cast<double>(lost_.size()) * block_s_; }
-
-  void lose(double begin_s, double end_s) {
-    const auto first = static_cast<std::size_t>(std::max(begin_s / block_s_, 0.0));
-    for (std::size_t i = first; i < lost_.size() && static_cast<double>(i) * block_s_ < end_s; ++i)
-      lost_[i] = true;
-  }
-
-  [[nodiscard]] const std::vector<bool>& lost() const { return lost_; }
-
- private:
-  std::vector<bool> lost_;
-  double block_s_;
-};
-
 /// Loses what follows each event of a Poisson process: events at the highest rate, of which one at
 /// t is kept with the probability rate_hz(t)/highest_hz. They begin early enough to reach into the
 /// record.
+///
+/// @param lost  Blocks of the record, each of block_s.
 template <typename Rate>
 void lose_after_events(const RandomStream& stream, double highest_hz, const Rate& rate_hz,
-                       double duration_s, Record& record) {
+                       double duration_s, double block_s, std::vector<bool>& lost) {
   if (highest_hz == 0.0) return;
   double time_s = -duration_s;
   for (std::uint32_t i = 0;; i += 2) {
     time_s -= logarithm(uniform(stream.block(i))) / highest_hz;
-    if (time_s >= record.duration_s()) return;
-    const bool is_kept = uniform(stream.block(i + 1)) * highest_hz < rate_hz(time_s);
-    if (is_kept) record.lose(time_s, time_s + duration_s);
+    if (time_s >= static_cast<double>(lost.size()) * block_s) return;
+    if (uniform(stream.block(i + 1)) * highest_hz >= rate_hz(time_s)) continue;
+    auto block = static_cast<std::size_t>(std::max(time_s / block_s, 0.0));
+    for (; block < lost.size() && static_cast<double>(block) * block_s < time_s + duration_s;
+         ++block) {
+      lost[block] = true;
+    }
   }
 }
 
@@ -85,7 +70,8 @@ void GapsConfig::validate(const std::vector<Session>& sessions, double sample_pe
 std::vector<bool> lost_blocks(const GapsConfig& gaps, const Session& session, std::uint64_t seed,
                               RunIndex run, std::size_t num_blocks, double orbit_period_s,
                               double sample_period_s) {
-  Record record(num_blocks, sample_period_s);
+  std::vector<bool> lost(num_blocks);
+  const double block_s = static_cast<double>(test_block_size) * sample_period_s;
   const auto stream = [&](std::string_view name) {
     return RandomStream(seed, run, stream_id(fmt::format("session/{}/{}", session.name, name)));
   };
@@ -102,11 +88,11 @@ std::vector<bool> lost_blocks(const GapsConfig& gaps, const Session& session, st
   };
   const double depth = gaps.orbital.depth + gaps.spin.depth + gaps.test.depth;
   lose_after_events(stream("glitches"), gaps.glitch_rate_hz * (1.0 + depth), glitch_rate_hz,
-                    gaps.glitch_duration_s, record);
+                    gaps.glitch_duration_s, block_s, lost);
   lose_after_events(
       stream("telemetry"), gaps.telemetry_rate_hz, [&](double) { return gaps.telemetry_rate_hz; },
-      gaps.telemetry_duration_s, record);
-  return record.lost();
+      gaps.telemetry_duration_s, block_s, lost);
+  return lost;
 }
 
 }  // namespace proofmass

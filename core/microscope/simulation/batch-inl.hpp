@@ -108,27 +108,5 @@ HWY_INLINE Batch limit_where_above(const Batch& a, double limit) {
   });
 }
 
-HWY_INLINE Batch load(const double (&values)[num_lanes]) {
-  Batch batch;
-  for (std::size_t i = 0; i < num_vectors; ++i) {
-    batch.part[i] = hn::Load(Doubles(), values + i * width);
-  }
-  return batch;
-}
-
-/// A batch, lane by lane.
-class Lanes {
- public:
-  HWY_INLINE explicit Lanes(const Batch& batch) {
-    for (std::size_t i = 0; i < num_vectors; ++i) {
-      hn::Store(batch.part[i], Doubles(), values_ + i * width);
-    }
-  }
-  HWY_INLINE double operator[](std::size_t lane) const { return values_[lane]; }
-
- private:
-  alignas(64) double values_[num_lanes];
-};
-
 }  // namespace
 }  // namespace proofmass

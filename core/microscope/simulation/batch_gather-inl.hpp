@@ -1,9 +1,11 @@
 #pragma once
 
-// What the lanes of a kernel begin with; see batch_kernel-inl.hpp.
+// Numbers of the lanes of a kernel, in and out; see batch_kernel-inl.hpp.
 
 #include <cstddef>
+#include <cstring>
 #include <span>
+#include <type_traits>
 
 #include "core/microscope/simulation/batch-inl.hpp"
 #include "core/microscope/simulation/loop.hpp"
@@ -11,52 +13,52 @@
 namespace proofmass {
 namespace {
 
-/// Gathers one number of each lane.
-template <typename Get>
-HWY_INLINE Batch gather(const Get& get) {
-  alignas(64) double values[num_lanes];
-  for (std::size_t lane = 0; lane < num_lanes; ++lane) values[lane] = get(lane);
-  return load(values);
+// Types over Batch consist of the numbers of the same type over double, in the same order.
+
+template <typename OfBatch, typename OfDouble>
+constexpr bool are_alike = std::is_trivially_copyable_v<OfDouble> &&
+                           sizeof(OfBatch) / sizeof(Batch) == sizeof(OfDouble) / sizeof(double);
+
+/// Sets a lane's first `count` numbers.
+template <typename OfBatch, typename OfDouble>
+HWY_INLINE void put_lane(OfBatch& group, const OfDouble& one, std::size_t lane,
+                         std::size_t count = sizeof(OfDouble) / sizeof(double)) {
+  static_assert(are_alike<OfBatch, OfDouble>);
+  auto* const to = reinterpret_cast<std::byte*>(&group) + lane * sizeof(double);
+  const auto* const from = reinterpret_cast<const std::byte*>(&one);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::memcpy(to + i * sizeof(Batch), from + i * sizeof(double), sizeof(double));
+  }
 }
 
-template <typename Get>
-HWY_INLINE Vector3<Batch> gather_vector(const Get& get) {
-  return {gather([&](std::size_t lane) { return get(lane).x; }),
-          gather([&](std::size_t lane) { return get(lane).y; }),
-          gather([&](std::size_t lane) { return get(lane).z; })};
-}
-
-template <typename Get>
-HWY_INLINE Matrix3<Batch> gather_matrix(const Get& get) {
-  return {{{gather_vector([&](std::size_t lane) { return get(lane).row[0]; }),
-            gather_vector([&](std::size_t lane) { return get(lane).row[1]; }),
-            gather_vector([&](std::size_t lane) { return get(lane).row[2]; })}}};
+/// The numbers of a lane.
+template <typename OfDouble, typename OfBatch>
+HWY_INLINE OfDouble lane_of(const OfBatch& group, std::size_t lane) {
+  static_assert(are_alike<OfBatch, OfDouble>);
+  OfDouble one;
+  auto* const to = reinterpret_cast<std::byte*>(&one);
+  const auto* const from = reinterpret_cast<const std::byte*>(&group) + lane * sizeof(double);
+  for (std::size_t i = 0; i < sizeof(OfDouble) / sizeof(double); ++i) {
+    std::memcpy(to + i * sizeof(double), from + i * sizeof(Batch), sizeof(double));
+  }
+  return one;
 }
 
 using ConstantsOfLanes = std::span<const LoopConstants<double>, num_lanes>;
 
-HWY_INLINE SensorModel<Batch> gather_sensor(ConstantsOfLanes constants, std::size_t k) {
-  const auto sensor = [&](std::size_t lane) -> const SensorModel<double>& {
-    return constants[lane].sensors[k];
-  };
-  return {gather_vector([&](std::size_t lane) { return sensor(lane).rest_position_S_m; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).motion_direction_S; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).second_direction_S; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).parasitic_K_m_s2; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).offset_K_m_s2; }),
-          gather_matrix([&](std::size_t lane) { return sensor(lane).sensitivity_KS; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).quadratic_s2_m; })};
-}
-
 HWY_INLINE LoopConstants<Batch> gather_constants(ConstantsOfLanes of) {
-  return {{gather_sensor(of, 0), gather_sensor(of, 1)},
-          {gather([&](std::size_t lane) { return of[lane].drag_free_weight[0]; }),
-           gather([&](std::size_t lane) { return of[lane].drag_free_weight[1]; })},
-          gather_vector([&](std::size_t lane) { return of[lane].subtracted_bias_S_m_s2; }),
-          gather_matrix([&](std::size_t lane) { return of[lane].thrust_matrix; }),
-          gather_vector([&](std::size_t lane) { return of[lane].angular_bias_S_rad_s2; }),
-          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_S_rad; }),
-          of[0].sensor_range_m_s2};
+  LoopConstants<Batch> gathered;
+  for (std::size_t lane = 0; lane < num_lanes; ++lane) {
+    const LoopConstants<double>& one = of[lane];
+    put_lane(gathered.sensors, one.sensors, lane);
+    put_lane(gathered.drag_free_weight, one.drag_free_weight, lane);
+    put_lane(gathered.subtracted_bias_S_m_s2, one.subtracted_bias_S_m_s2, lane);
+    put_lane(gathered.thrust_matrix, one.thrust_matrix, lane);
+    put_lane(gathered.angular_bias_S_rad_s2, one.angular_bias_S_rad_s2, lane);
+    put_lane(gathered.star_tracker_bias_S_rad, one.star_tracker_bias_S_rad, lane);
+  }
+  gathered.sensor_range_m_s2 = of[0].sensor_range_m_s2;
+  return gathered;
 }
 
 }  // namespace

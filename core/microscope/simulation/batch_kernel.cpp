@@ -13,11 +13,6 @@ BatchKernel batch_kernel(InstructionSet set, std::size_t /*num_runs*/) {
   return record_batch_neon;
 }
 
-BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
-  PROOFMASS_EXPECT(set == InstructionSet::neon);
-  return make_noise_neon;
-}
-
 #else
 
 MixedKernel mixed_kernel(InstructionSet set, std::size_t num_runs) {
@@ -33,13 +28,6 @@ BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs) {
     return num_runs <= 4 ? record_batch_avx2_narrow : record_batch_avx2;
   }
   return num_runs <= 8 ? record_batch_avx512_narrow : record_batch_avx512;
-}
-
-BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
-  PROOFMASS_EXPECT(set != InstructionSet::scalar);
-  if (set == InstructionSet::sse4) return make_noise_sse4;
-  if (set == InstructionSet::avx2) return make_noise_avx2;
-  return make_noise_avx512;
 }
 
 #endif

@@ -79,23 +79,4 @@ void record_mixed_avx512_narrow(std::span<const BatchSession> sessions,
 /// @pre set is not `scalar`; 1 ≤ num_runs ≤ batch_lanes.
 [[nodiscard]] BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs);
 
-/// What to make of a batch's noise, for measuring: its deviates alone, or all of it.
-enum class NoiseWork : std::uint8_t { deviates, shaped };
-
-/// Makes the noise of `num_samples` samples of a batch and nothing else. Of the session it uses
-/// noise, streams, seed, runs and noise_states.
-/// @returns A number that depends on all of it, so that none of the work can be left out.
-using BatchNoiseKernel = double (*)(const BatchSession& session, std::size_t num_samples,
-                                    NoiseWork work);
-double make_noise_sse4(const BatchSession& session, std::size_t num_samples, NoiseWork work);
-double make_noise_avx2(const BatchSession& session, std::size_t num_samples, NoiseWork work);
-double make_noise_avx512(const BatchSession& session, std::size_t num_samples, NoiseWork work);
-double make_noise_neon(const BatchSession& session, std::size_t num_samples, NoiseWork work);
-double make_noise_avx2_narrow(const BatchSession& session, std::size_t num_samples, NoiseWork work);
-double make_noise_avx512_narrow(const BatchSession& session, std::size_t num_samples,
-                                NoiseWork work);
-
-/// @pre set is not `scalar`.
-[[nodiscard]] BatchNoiseKernel batch_noise_kernel(InstructionSet set);
-
 }  // namespace proofmass

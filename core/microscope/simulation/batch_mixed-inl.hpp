@@ -8,10 +8,8 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <span>
-#include <type_traits>
 
 #include "core/microscope/simulation/batch-inl.hpp"
 #include "core/microscope/simulation/batch_gather-inl.hpp"
@@ -21,37 +19,6 @@
 
 namespace proofmass {
 namespace {
-
-// Types over Batch consist of the numbers of the same type over double, in the same order.
-
-template <typename OfBatch, typename OfDouble>
-constexpr bool are_alike = std::is_trivially_copyable_v<OfDouble> &&
-                           sizeof(OfBatch) / sizeof(Batch) == sizeof(OfDouble) / sizeof(double);
-
-/// Sets a lane's first `count` numbers.
-template <typename OfBatch, typename OfDouble>
-HWY_INLINE void put_lane(OfBatch& group, const OfDouble& one, std::size_t lane,
-                         std::size_t count = sizeof(OfDouble) / sizeof(double)) {
-  static_assert(are_alike<OfBatch, OfDouble>);
-  auto* const to = reinterpret_cast<std::byte*>(&group) + lane * sizeof(double);
-  const auto* const from = reinterpret_cast<const std::byte*>(&one);
-  for (std::size_t i = 0; i < count; ++i) {
-    std::memcpy(to + i * sizeof(Batch), from + i * sizeof(double), sizeof(double));
-  }
-}
-
-/// The numbers of a lane.
-template <typename OfDouble, typename OfBatch>
-HWY_INLINE OfDouble lane_of(const OfBatch& group, std::size_t lane) {
-  static_assert(are_alike<OfBatch, OfDouble>);
-  OfDouble one;
-  auto* const to = reinterpret_cast<std::byte*>(&one);
-  const auto* const from = reinterpret_cast<const std::byte*>(&group) + lane * sizeof(double);
-  for (std::size_t i = 0; i < sizeof(OfDouble) / sizeof(double); ++i) {
-    std::memcpy(to + i * sizeof(double), from + i * sizeof(Batch), sizeof(double));
-  }
-  return one;
-}
 
 /// Streams and blocks of lanes that are in different sessions.
 class LaneStreams {
@@ -363,7 +330,7 @@ class MixedLanes {
       outcome.health.acceleration_m_s2 = lane_of<double>(loop_.largest_acceleration, lane);
       outcome.health.attitude_rad = lane_of<double>(loop_.largest_angle, lane);
       if (seat.session->setup.residual_reader == nullptr) continue;
-      set_monitored(lane_of<LoopMonitor<double>>(monitor_, lane), outcome.health);
+      outcome.health.monitor = lane_of<LoopMonitor<double>>(monitor_, lane);
     }
     seat.session = nullptr;
     ++num_ended_;

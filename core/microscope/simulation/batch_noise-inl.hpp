@@ -219,12 +219,6 @@ class BatchNoise {
   HWY_INLINE Streams& streams() { return streams_; }
   HWY_INLINE NoiseStates<Batch>& states() { return states_; }
 
-  /// Makes a sample's deviates for all channels and returns that of the first.
-  HWY_INLINE Batch next_deviate() {
-    if (next_in_block_ == samples_per_noise_block) make_deviates();
-    return deviate(0, next_in_block_++);
-  }
-
  private:
   HWY_INLINE static BatchPhilox philox_of(const BatchSession& session, std::size_t first_lane) {
     alignas(64) std::uint64_t low[num_lanes];

@@ -8,6 +8,7 @@
 
 #include "core/math/elementary.hpp"
 #include "core/microscope/simulation/batch-inl.hpp"
+#include "core/microscope/simulation/batch_gather-inl.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 
 namespace proofmass {
@@ -59,34 +60,17 @@ class BatchSignals {
 
  private:
   HWY_NOINLINE void refill() {
-    alignas(64) double values[num_lanes];
-    for (std::size_t i = 0; i < num_lanes; ++i) values[i] = signals_.time_s(i);
-    const std::optional<SamplePhasesOf<Batch>> phases = signals_.phases_at(load(values));
+    Batch times;
+    for (std::size_t i = 0; i < num_lanes; ++i) put_lane(times, signals_.time_s(i), i);
+    const std::optional<SamplePhasesOf<Batch>> phases = signals_.phases_at(times);
     if (phases) {
-      scatter(*phases);
+      std::array<SamplePhases, num_lanes> of_samples;
+      for (std::size_t i = 0; i < num_lanes; ++i) of_samples[i] = lane_of<SamplePhases>(*phases, i);
+      signals_.next(of_samples, samples_);
     } else {
       for (SharedSample& sample : samples_) sample = signals_.next();
     }
     next_ = 0;
-  }
-
-  HWY_INLINE void scatter(const SamplePhasesOf<Batch>& phases) {
-    const Lanes x(phases.orbit.radial_I_x), z(phases.orbit.radial_I_z),
-        gradient(phases.orbit.gradient_s2), mean_sine(phases.orbit.mean_anomaly.sine),
-        mean_cosine(phases.orbit.mean_anomaly.cosine), reference_sine(phases.reference.sine),
-        reference_cosine(phases.reference.cosine);
-    std::array<SamplePhases, num_lanes> of_samples;
-    for (std::size_t i = 0; i < num_lanes; ++i) {
-      of_samples[i].orbit = {x[i], z[i], gradient[i], {mean_sine[i], mean_cosine[i]}};
-      of_samples[i].reference = {reference_sine[i], reference_cosine[i]};
-    }
-    for (std::size_t e = 0; e < signals_.num_excitations(); ++e) {
-      const Lanes sine(phases.excitation[e].sine), cosine(phases.excitation[e].cosine);
-      for (std::size_t i = 0; i < num_lanes; ++i) {
-        of_samples[i].excitation[e] = {sine[i], cosine[i]};
-      }
-    }
-    signals_.next(of_samples, samples_);
   }
 
   SessionSignals& signals_;

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <utility>
 
-#include "core/microscope/estimation/low_pass.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 
 namespace proofmass {

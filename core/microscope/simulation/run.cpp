@@ -59,13 +59,6 @@ bool are_in_range(std::span<const double> values) {
   return std::ranges::all_of(values, is_in_range);
 }
 
-/// What a run yields of its calibration and, if its scenario has one, of its test.
-struct Yield {
-  std::vector<double> values;
-  std::vector<double> standard_errors;  ///< Of the quantities that have one.
-  std::vector<double> correlations;     ///< As in RunResult.
-};
-
 /// Correlations (0, 1), (0, 2) ... of quantities of which `covariance(i, j)` is known.
 template <typename Correlation>
 std::vector<double> pairs(std::size_t num_quantities, const Correlation& correlation) {
@@ -96,9 +89,9 @@ std::vector<double> run_truth(const Scenario& scenario, const ParameterArray& tr
 struct RunPlan::Impl : RunParts {
   using RunParts::RunParts;
 
-  /// @param observer  Null if nobody observes the run.
+  /// @param observer  Empty if nobody observes the run.
   void record_session_of_run(std::size_t i, const Instrument& instrument,
-                             const SampleObserver* observer, const SessionProgress& progress,
+                             const SampleObserver& observer, const SessionProgress& progress,
                              RunRecord& record) const {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
@@ -106,7 +99,7 @@ struct RunPlan::Impl : RunParts {
     const LoopConstants<double> constants = make_loop_constants(instrument, scenario, session);
     SessionNoise session_noise(noise, campaign.seed, record.run, session.name);
     Realism realism(scenario, instrument, constants, i, signals.num_settling());
-    if (observer == nullptr) {
+    if (!observer) {
       LaneGroup<double, SessionNoise, Realism> alone{.constants = constants,
                                                      .noise = session_noise};
       alone.eotvos_parameter = instrument.eotvos_parameter;
@@ -119,7 +112,7 @@ struct RunPlan::Impl : RunParts {
     alone.eotvos_parameter = instrument.eotvos_parameter;
     alone.hardware = std::move(realism);
     const double period_s = scenario.simulation.sample_period_s;
-    const SessionObserver session_observer{.observe = *observer,
+    const SessionObserver session_observer{.observe = observer,
                                            .session = i,
                                            .next = -signals.num_settling(),
                                            .sample_period_s = period_s,
@@ -139,10 +132,14 @@ struct RunPlan::Impl : RunParts {
     if (!of_windows.empty()) alone.test.window_weights.runs[0] = of_windows.data();
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
-    keep(
-        i,
-        {alone.sums, session_health(alone.loop, alone.monitor), alone.further, alone.test.products},
-        record);
+    keep(i,
+         {alone.sums,
+          {.acceleration_m_s2 = alone.loop.largest_acceleration,
+           .attitude_rad = alone.loop.largest_angle,
+           .monitor = alone.monitor},
+          alone.further,
+          alone.test.products},
+         record);
   }
 
   /// A session of a batch, with all that it is computed from.
@@ -229,22 +226,21 @@ struct RunPlan::Impl : RunParts {
             .sample_period_s = scenario.simulation.sample_period_s};
   }
 
-  [[nodiscard]] Yield yield_of(const RunRecord& record, const Estimation& found) const {
-    Yield yield;
-    yield.values.assign(found.values.begin(), found.values.end());
+  /// Sets the estimates of the calibration and, if the scenario has one, of the test.
+  void set_estimates(const RunRecord& record, const Estimation& found, RunResult& result) const {
+    result.estimate.assign(found.values.begin(), found.values.end());
     if (method.has_standard_errors) {
-      yield.standard_errors.assign(found.standard_errors.begin(), found.standard_errors.end());
+      result.standard_error.assign(found.standard_errors.begin(), found.standard_errors.end());
     }
     TestEstimation test;
     if (campaign.scenario.has_tests()) {
       test = estimate_ep_test(record.phasors, estimation_input(), found);
-      yield.values.insert(yield.values.end(), test.values.begin(), test.values.end());
-      yield.standard_errors.push_back(test.standard_error);
+      result.estimate.insert(result.estimate.end(), test.values.begin(), test.values.end());
+      result.standard_error.push_back(test.standard_error);
     }
-    yield.correlations = pairs(yield.standard_errors.size(), [&](std::size_t i, std::size_t j) {
+    result.correlations = pairs(result.standard_error.size(), [&](std::size_t i, std::size_t j) {
       return j < num_parameters ? found.correlations[i][j] : test.correlations[i];
     });
-    return yield;
   }
 
   /// Whether sessions may be computed side by side: the loops settle for a whole number of noise
@@ -263,29 +259,16 @@ RunPlan::RunPlan(const MicroscopeCampaign& campaign)
 RunPlan::RunPlan(const MicroscopeCampaign& campaign, const EstimationMethodInfo& method)
     : impl_(std::make_unique<Impl>(campaign, method)) {}
 RunPlan::~RunPlan() = default;
-RunPlan::RunPlan(RunPlan&&) noexcept = default;
-RunPlan& RunPlan::operator=(RunPlan&&) noexcept = default;
 
-int RunPlan::num_orbits() const {
+int RunPlan::num_steps() const {
   int total = 0;
   for (const Session& session : impl_->campaign.scenario.sessions) total += session.num_orbits;
   return total;
 }
 
 RunRecord RunPlan::record(RunIndex run, std::span<const double> table_values,
-                          const std::function<void(int)>& progress) const {
-  return record_alone(run, table_values, nullptr, progress);
-}
-
-RunRecord RunPlan::observe(RunIndex run, std::span<const double> table_values,
-                           const SampleObserver& observer,
-                           const std::function<void(int)>& progress) const {
-  return record_alone(run, table_values, &observer, progress);
-}
-
-RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_values,
-                                const SampleObserver* observer,
-                                const std::function<void(int)>& progress) const {
+                          const std::function<void(int)>& progress,
+                          const SampleObserver& observer) const {
   const Scenario& scenario = impl_->campaign.scenario;
   const AcceptedDraw draw = draw_instrument(impl_->campaign, run, table_values);
   RunRecord recorded = impl_->drawn_record(run, draw);
@@ -307,7 +290,7 @@ RunResult RunPlan::replay(const RunRequest& request, const SampleSink& sink,
     append_recorded_values(sample, values);
     sink({.session = sample.session, .time_s = sample.time_s, .values = values});
   };
-  return estimate(observe(request.run, request.table_values, pass_on, progress));
+  return estimate(record(request.run, request.table_values, progress, pass_on));
 }
 
 const Recording& RunPlan::recording() const { return impl_->recording; }
@@ -321,20 +304,7 @@ std::unique_ptr<DeviceSimulation> RunPlan::simulation_on(Device& device) const {
 std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> requests,
                                                InstructionSet set,
                                                const std::function<void(int)>& progress) const {
-  PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunResult> results;
-  if (set == InstructionSet::scalar || !impl_->campaign.scenario.has_plain_loops()) {
-    const int num_orbits_a_run = num_orbits();
-    const auto num_runs = static_cast<int>(requests.size());
-    for (int i = 0; i < num_runs; ++i) {
-      const RunRequest& request = requests[static_cast<std::size_t>(i)];
-      const auto of_all = [&](int num_orbits_done) {
-        if (progress) progress((i * num_orbits_a_run + num_orbits_done) / num_runs);
-      };
-      results.push_back(simulate(request.run, request.table_values, of_all));
-    }
-    return results;
-  }
   for (const RunRecord& record : record_batch(requests, set, progress)) {
     results.push_back(estimate(record));
   }
@@ -344,7 +314,19 @@ std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> reque
 std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> requests,
                                              InstructionSet set,
                                              const std::function<void(int)>& progress) const {
+  PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunRecord> records;
+  if (set == InstructionSet::scalar || !impl_->campaign.scenario.has_plain_loops()) {
+    const auto num_runs = static_cast<int>(requests.size());
+    for (const auto& [run, table_values] : requests) {
+      const int num_before = static_cast<int>(records.size()) * num_steps();
+      const auto of_all = [&](int num_orbits_done) {
+        if (progress) progress((num_before + num_orbits_done) / num_runs);
+      };
+      records.push_back(record(run, table_values, of_all));
+    }
+    return records;
+  }
   std::vector<Lane> lanes;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const auto& [run, table_values] = requests[i];
@@ -393,15 +375,13 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
                    .session = static_cast<std::uint32_t>(finding.loss.session)};
     return result;
   }
-  const Yield yield = impl_->yield_of(record, found);
-  if (!are_in_range(yield.values) || !are_in_range(yield.standard_errors)) {
-    result.status = RunStatus::not_finite;
-    return result;
+  RunResult without_estimates = result;
+  impl_->set_estimates(record, found, result);
+  if (!are_in_range(result.estimate) || !are_in_range(result.standard_error)) {
+    without_estimates.status = RunStatus::not_finite;
+    return without_estimates;
   }
   result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
-  result.estimate = yield.values;
-  result.standard_error = yield.standard_errors;
-  result.correlations = yield.correlations;
   if (has_errors) {
     result.fit = {0.0, 0.0};
     for (const SessionFit& session : found.session_fits) {

@@ -55,24 +55,20 @@ class RunPlan final : public Plan {
   /// @pre method.check() passed for the campaign's sessions.
   RunPlan(const MicroscopeCampaign& campaign, const EstimationMethodInfo& method);
   ~RunPlan() override;
-  RunPlan(RunPlan&&) noexcept;
-  RunPlan& operator=(RunPlan&&) noexcept;
 
   /// Draws an instrument and simulates all sessions. A pure function of the campaign and the
   /// arguments.
   ///
   /// @param table_values  campaign.table_values(run).
   /// @param progress      Called several times an orbit with the number of orbits done.
+  /// @param observer      If there is one, it gets every sample of every session. It changes no
+  /// bit,
+  ///                      and makes no other call any slower.
   [[nodiscard]] RunRecord record(RunIndex run, std::span<const double> table_values,
-                                 const std::function<void(int)>& progress = {}) const;
+                                 const std::function<void(int)>& progress = {},
+                                 const SampleObserver& observer = {}) const;
 
-  /// record(), bit for bit, with an observer that gets every sample of every session. It makes no
-  /// other call any slower.
-  [[nodiscard]] RunRecord observe(RunIndex run, std::span<const double> table_values,
-                                  const SampleObserver& observer,
-                                  const std::function<void(int)>& progress = {}) const;
-
-  /// record() for several runs at once; arguments as for simulate_batch(), `set` not `scalar`.
+  /// record() for several runs at once; arguments as for simulate_batch().
   [[nodiscard]] std::vector<RunRecord> record_batch(
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const;
@@ -97,23 +93,18 @@ class RunPlan final : public Plan {
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const override;
 
-  /// observe(), then estimate(), of the records without what the loops do while they settle.
+  /// record(), then estimate(). The sink gets nothing of what the loops do while they settle.
   [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink& sink,
                                  const std::function<void(int)>& progress = {}) const override;
   [[nodiscard]] const Recording& recording() const override;
   [[nodiscard]] bool runs_on_devices() const override;
   [[nodiscard]] std::unique_ptr<DeviceSimulation> simulation_on(Device& device) const override;
 
-  /// Of all sessions together.
-  [[nodiscard]] int num_orbits() const;
-  /// A step is an orbit.
-  [[nodiscard]] int num_steps() const override { return num_orbits(); }
+  /// Orbits of all sessions together.
+  [[nodiscard]] int num_steps() const override;
 
  private:
   struct Impl;
-  [[nodiscard]] RunRecord record_alone(RunIndex run, std::span<const double> table_values,
-                                       const SampleObserver* observer,
-                                       const std::function<void(int)>& progress) const;
   std::unique_ptr<Impl> impl_;
 };
 

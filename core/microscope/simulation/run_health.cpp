@@ -5,6 +5,7 @@
 
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
+#include "core/microscope/simulation/line_fit.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 #include "core/signal/band_pass.hpp"
 
@@ -36,7 +37,7 @@ double residual_amplitude(const Scenario& scenario, const SessionHealth& session
   const double ratio = scenario.estimation.band_ratio;
   const double fourth = ratio * ratio * ratio * ratio;
   double largest = 0.0;
-  for (const auto& [cosine, sine] : session.residual) {
+  for (const auto& [cosine, sine] : session.monitor.residual) {
     largest = std::max(largest, std::sqrt(cosine * cosine + sine * sine));
   }
   return largest * (1.0 + fourth) / fourth;
@@ -88,9 +89,10 @@ LoopHealth session_health(const Scenario& scenario, const Session& session,
   health.square_noise = bounded(square_noise_of(scenario, session, phasors, quiet));
   if (!record.is_quiet) return health;
   health.residual_m_s2 = bounded(residual_amplitude(scenario, record));
-  health.quadratic_noise = bounded(density(record.quadratic_squares, num_steps(scenario, session),
-                                           scenario.simulation.sample_period_s) /
-                                   least_noise_density(scenario));
+  health.quadratic_noise =
+      bounded(density(record.monitor.quadratic.squares, num_steps(scenario, session),
+                      scenario.simulation.sample_period_s) /
+              least_noise_density(scenario));
   return health;
 }
 
@@ -120,11 +122,9 @@ LoopLoss loss_by_shift(const ShiftBounds& bounds, const LoopHealth& health,
 }
 
 void take_larger(LoopHealth& largest, const LoopHealth& health) {
-  largest.acceleration_m_s2 = std::max(largest.acceleration_m_s2, health.acceleration_m_s2);
-  largest.attitude_rad = std::max(largest.attitude_rad, health.attitude_rad);
-  largest.residual_m_s2 = std::max(largest.residual_m_s2, health.residual_m_s2);
-  largest.quadratic_noise = std::max(largest.quadratic_noise, health.quadratic_noise);
-  largest.square_noise = std::max(largest.square_noise, health.square_noise);
+  for (const HealthValue& value : health_values()) {
+    largest.*value.member = std::max(largest.*value.member, health.*value.member);
+  }
 }
 
 }  // namespace
@@ -133,11 +133,8 @@ LineFit residual_fit(const Scenario& scenario, const Session& session) {
   const double period_s = scenario.orbit.period_s;
   const double resolution_hz = 1.0 / (session.num_orbits * period_s);
   const double ratio = scenario.estimation.band_ratio;
-  LineFit fit;
-  fit.sample_period_s = scenario.simulation.sample_period_s;
-  fit.num_samples = static_cast<std::size_t>(num_record_samples(scenario, session));
-  fit.num_dropped =
-      static_cast<std::size_t>(std::ceil(scenario.estimation.transient_s / fit.sample_period_s));
+  LineFit fit = line_fit(scenario, session);
+  fit.known_hz.clear();
   double frequency_hz = test_frequency_hz(session, period_s);
   if (frequency_hz < 0.99 * resolution_hz) frequency_hz = 1.0 / period_s;
   fit.fit_hz = {frequency_hz};
@@ -160,9 +157,9 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
   for (std::size_t i = 0; i < record.size(); ++i) {
     const SessionHealth& of_session = record[i];
     if (!of_session.is_quiet) continue;
-    quiet.common_squares += of_session.common_squares;
-    quiet.sensor_squares[0] += of_session.sensor_squares[0];
-    quiet.sensor_squares[1] += of_session.sensor_squares[1];
+    quiet.common_squares += of_session.monitor.common_square.squares;
+    quiet.sensor_squares[0] += of_session.monitor.sensor_square[0].squares;
+    quiet.sensor_squares[1] += of_session.monitor.sensor_square[1].squares;
     quiet.num_steps += num_steps(scenario, scenario.sessions[i]);
   }
   HealthFinding finding;

@@ -83,28 +83,8 @@ struct SessionHealth {
   double acceleration_m_s2 = 0.0;  ///< Largest |Γ_mes,k| of a sensor on an axis.
   double attitude_rad = 0.0;       ///< Largest |θ̂| about an axis.
   bool is_quiet = false;           ///< True if the session was monitored; the rest is 0 if not.
-  double quadratic_squares = 0.0;  ///< BlockSteps::squares of LoopMonitor::quadratic.
-  double common_squares = 0.0;     ///< Of common_square.
-  std::array<double, 2> sensor_squares{};           ///< Of sensor_square.
-  std::array<std::array<double, 2>, 3> residual{};  ///< As in LoopMonitor.
+  LoopMonitor<double> monitor{};   ///< At its end.
 };
-
-/// Keeps what the monitor of a session has.
-inline void set_monitored(const LoopMonitor<double>& monitor, SessionHealth& health) {
-  health.quadratic_squares = monitor.quadratic.squares;
-  health.common_squares = monitor.common_square.squares;
-  health.sensor_squares = {monitor.sensor_square[0].squares, monitor.sensor_square[1].squares};
-  health.residual = monitor.residual;
-}
-
-/// What is kept of a session whose loops and monitor ended so.
-[[nodiscard]] inline SessionHealth session_health(const Loop<double>& loop,
-                                                  const LoopMonitor<double>& monitor) {
-  SessionHealth health{.acceleration_m_s2 = loop.largest_acceleration,
-                       .attitude_rad = loop.largest_angle};
-  set_monitored(monitor, health);
-  return health;
-}
 
 /// What is kept of the sessions of a run, in the scenario's order.
 using HealthRecord = std::vector<SessionHealth>;

@@ -52,13 +52,26 @@ const std::array<std::string_view, num_noise_channels>& noise_channel_names() {
   return names;
 }
 
-NoiseStreams noise_streams(std::string_view session_name) {
+namespace {
+
+NoiseStreams streams_of(std::string_view session, std::size_t num_channels,
+                        std::string_view ending) {
   NoiseStreams streams{};
-  for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+  for (std::size_t channel = 0; channel < num_channels; ++channel) {
     streams[channel] =
-        stream_id(fmt::format("session/{}/{}", session_name, noise_channel_names()[channel]));
+        stream_id(fmt::format("session/{}/{}{}", session, noise_channel_names()[channel], ending));
   }
   return streams;
+}
+
+}  // namespace
+
+NoiseStreams noise_streams(std::string_view session_name) {
+  return streams_of(session_name, num_noise_channels, "");
+}
+
+NoiseStreams start_streams(std::string_view session_name) {
+  return streams_of(session_name, num_coloured_channels, "/start");
 }
 
 namespace {
@@ -84,15 +97,6 @@ NoiseState<double> stationary_state(const NoiseShape& shape, const RandomStream&
 }
 
 }  // namespace
-
-NoiseStreams start_streams(std::string_view session_name) {
-  NoiseStreams streams{};
-  for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
-    streams[channel] =
-        stream_id(fmt::format("session/{}/{}/start", session_name, noise_channel_names()[channel]));
-  }
-  return streams;
-}
 
 NoiseStates<double> stationary_states(const NoiseModel& model, std::uint64_t seed, RunIndex run,
                                       const NoiseStreams& starts) {

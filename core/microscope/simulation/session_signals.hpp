@@ -60,8 +60,6 @@ class SessionSignals {
   SessionSignals(const Scenario& scenario, const Session& session, const KeplerOrbit& orbit,
                  const Environment& environment);
 
-  [[nodiscard]] std::size_t num_excitations() const { return num_excitations_; }
-
   /// Samples before the record: the first record sample has t = 0.
   [[nodiscard]] std::int64_t num_settling() const { return num_settling_; }
   /// Samples of the record, see num_record_samples().

@@ -3,6 +3,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/parse_campaign.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
@@ -71,7 +72,7 @@ TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
   for (const MicroscopeCampaign& campaign :
        {MicroscopeCampaign{}, hardy2013_campaign(), unusual_campaign()}) {
     const std::string definition = canonical_definition(campaign);
-    const MicroscopeCampaign read = parse_campaign(
+    const MicroscopeCampaign read = test::parse_campaign(
         "stored definition", definition, campaign.environment_table, campaign.table_columns);
     expect_same(read, campaign);
     EXPECT_EQ(canonical_definition(read), definition);
@@ -91,7 +92,7 @@ TEST(CanonicalDefinition, StatesEveryField) {
   campaign.scenario.sensor.position_m = {0.1, 0.2, 0.3};
   campaign.scenario.sensor.radial_stiffness_s2 = {-0.1, -0.2};
   const std::string definition = canonical_definition(campaign);
-  EXPECT_EQ(canonical_definition(parse_campaign("", definition, {}, {})), definition);
+  EXPECT_EQ(canonical_definition(test::parse_campaign("", definition)), definition);
   for_each_field(campaign.scenario, [&](const FieldInfo& field, const auto&) {
     const std::string path(field.path);
     EXPECT_THAT(definition, HasSubstr("[" + path.substr(0, path.rfind('.')) + "]\n"));
@@ -104,7 +105,7 @@ TEST(CanonicalDefinition, StatesANominalValueThatThePresetReplaces) {
   MicroscopeCampaign campaign;
   campaign.scenario.noise = noise_preset(NoisePreset::wire_suep);
   campaign.scenario.noise.wire.damping_n_m = 0.0;
-  const MicroscopeCampaign read = parse_campaign("", canonical_definition(campaign), {}, {});
+  const MicroscopeCampaign read = test::parse_campaign("", canonical_definition(campaign));
   EXPECT_EQ(read.scenario.noise.wire.damping_n_m, 0.0);
   EXPECT_EQ(read.scenario.noise.wire.mass_kg, campaign.scenario.noise.wire.mass_kg);
 }
@@ -116,8 +117,8 @@ TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
     expect_same(read_microscope(folder / "c.toml"), campaign);
   }
   const MicroscopeCampaign unusual = unusual_campaign();
-  expect_same(parse_campaign("stored definition", commented_campaign(unusual),
-                             unusual.environment_table, unusual.table_columns),
+  expect_same(test::parse_campaign("stored definition", commented_campaign(unusual),
+                                   unusual.environment_table, unusual.table_columns),
               unusual);
 }
 
@@ -132,7 +133,7 @@ TEST(CommentedCampaign, LeavesThePresetInCharge) {
 TEST(ParseStoredCampaign, RefusesWhatIsNoValidCampaign) {
   const auto refusal = [](std::string_view definition, std::vector<std::vector<double>> columns) {
     try {
-      (void)parse_campaign("stored definition", definition, {}, std::move(columns));
+      (void)test::parse_campaign("stored definition", definition, {}, std::move(columns));
     } catch (const DefinitionError& error) {
       return std::string(error.what());
     }

@@ -1,4 +1,4 @@
-#include "core/campaign/simulation_crash.hpp"
+#include "core/error.hpp"
 #include "core/model.hpp"
 #include "tests/test.hpp"
 #include "tests/worker/execution/executor_bench.hpp"

@@ -202,16 +202,6 @@ bool has_settled(const Estimates& before, const Estimates& after, double converg
   return true;
 }
 
-/// Largest move of an estimate, in objectives.
-double largest_move(const Estimates& before, const Estimates& after,
-                    const ParameterArray& objectives) {
-  double largest = 0.0;
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    largest = std::max(largest, std::abs(after.value[i] - before.value[i]) / objectives[i]);
-  }
-  return largest;
-}
-
 }  // namespace
 
 Estimation estimate_hardy2013(const RunPhasors& records, const EstimationInput& input) {
@@ -221,16 +211,13 @@ Estimation estimate_hardy2013(const RunPhasors& records, const EstimationInput& 
   PROOFMASS_EXPECT(records.size() == sessions.size());
   Estimates known;
   Estimation result;
-  double last_move = 0.0;
   while (!result.converged && result.num_rounds < config.num_rounds_max) {
     const Estimates next = Round(records, sessions, config.correction, known).estimates();
     result.converged = has_settled(known, next, config.convergence, objectives);
-    last_move = largest_move(known, next, objectives);
     known = next;
     ++result.num_rounds;
   }
   result.values = known.value;
-  result.diagnostics = {{"last_move", last_move}};
   return result;
 }
 

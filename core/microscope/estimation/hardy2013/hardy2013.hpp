@@ -20,8 +20,7 @@ namespace proofmass {
 ///   or its counterpart (core/microscope/estimation/README.md says which terms the paper prints);
 /// - `second_order`: all products of two instrument errors.
 ///
-/// It has no standard errors. Its diagnostic `last_move` is the largest move of an estimate in the
-/// last round, in objectives.
+/// It has no standard errors.
 [[nodiscard]] Estimation estimate_hardy2013(const RunPhasors& records,
                                             const EstimationInput& input);
 

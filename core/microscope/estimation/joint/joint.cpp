@@ -12,13 +12,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "core/error.hpp"
 #include "core/microscope/control/star_tracker.hpp"
 #include "core/microscope/estimation/joint/joint_model.hpp"
-#include "core/microscope/estimation/low_pass.hpp"
 
 namespace proofmass {
 namespace {
@@ -36,16 +36,10 @@ using NuisanceVector = Eigen::Matrix<double, num_nuisances, 1>;
 /// Factors of the drawn quantities in a sum of them.
 using Combination = Eigen::Matrix<double, num_drawn, 1>;
 
-const DrawGroup& group_of(std::string_view name) {
-  const auto group = std::ranges::find(draw_groups(), name, &DrawGroup::name);
-  PROOFMASS_EXPECT(group != draw_groups().end());
-  return *group;
-}
-
 /// first·(the axis of sensor 1) + second·(that of sensor 2).
 Combination of_pair(std::string_view name, Axis axis, double first, double second) {
   Combination factors = Combination::Zero();
-  const auto at = static_cast<Eigen::Index>(group_of(name).first + index(axis));
+  const auto at = static_cast<Eigen::Index>(draw_group(name).first + index(axis));
   factors[at] = first;
   factors[at + 3] = second;
   return factors;
@@ -54,7 +48,7 @@ Combination of_pair(std::string_view name, Axis axis, double first, double secon
 /// Bias of the fused angles about an axis, from those of the heads.
 Combination fused_bias(const StarTracker& tracker, Eigen::Index axis) {
   Combination factors = Combination::Zero();
-  const auto first = static_cast<Eigen::Index>(group_of("star_tracker_bias_rad").first);
+  const auto first = static_cast<Eigen::Index>(draw_group("star_tracker_bias_rad").first);
   for (Eigen::Index i = 0; i < 6; ++i) {
     factors[first + i] = tracker.weight[static_cast<std::size_t>(i / 3)](axis, i % 3);
   }
@@ -126,24 +120,23 @@ Priors make_priors(const EstimationInput& input, const DrawnSums& drawn) {
   for (std::size_t i = num_parameters; i < num_unknowns; ++i) {
     priors.mean[i] = drawn.mean(sums.col(static_cast<Eigen::Index>(i - num_parameters)));
   }
-  // Products of two sums, which are taken for independent.
-  for (const auto& [unknown, axis] :
-       {std::pair{Unknown::scale_y, Axis::y}, std::pair{Unknown::scale_z, Axis::z}}) {
-    const Combination k2d = of_pair("quadratic_factor_s2_m", axis, 0.5, -0.5);
-    const Combination b = of_pair("parasitic_acceleration_m_s2", axis, -0.5, 0.5);
-    const double mean = 2.0 * drawn.mean(k2d) * drawn.mean(b);
+  const auto set = [&](Unknown unknown, double mean, double variance) {
     const auto row = static_cast<Eigen::Index>(index(unknown) - num_parameters);
     priors.mean[index(unknown)] = mean;
-    covariance(row, row) = 4.0 * drawn.mean_square(k2d) * drawn.mean_square(b) - mean * mean;
-  }
-  // Squares of sums, which are taken for normal.
-  for (const auto& [unknown, axis] :
-       {std::pair{Unknown::square_y, Axis::y}, std::pair{Unknown::square_z, Axis::z}}) {
+    covariance(row, row) = variance;
+  };
+  for (const auto& [scale, square, axis] :
+       {std::tuple{Unknown::scale_y, Unknown::square_y, Axis::y},
+        std::tuple{Unknown::scale_z, Unknown::square_z, Axis::z}}) {
+    const Combination k2d = of_pair("quadratic_factor_s2_m", axis, 0.5, -0.5);
     const Combination k2c = of_pair("quadratic_factor_s2_m", axis, 0.5, 0.5);
+    const Combination b = of_pair("parasitic_acceleration_m_s2", axis, -0.5, 0.5);
+    // A product of two sums, which are taken for independent, and a square of one that is taken for
+    // normal.
+    const double product = 2.0 * drawn.mean(k2d) * drawn.mean(b);
+    set(scale, product, 4.0 * drawn.mean_square(k2d) * drawn.mean_square(b) - product * product);
     const double mean = drawn.mean(k2c), variance = drawn.variance(k2c);
-    const auto row = static_cast<Eigen::Index>(index(unknown) - num_parameters);
-    priors.mean[index(unknown)] = mean * mean + variance;
-    covariance(row, row) = 2.0 * variance * (variance + 2.0 * mean * mean);
+    set(square, mean * mean + variance, 2.0 * variance * (variance + 2.0 * mean * mean));
   }
   const NuisanceVector deviation = covariance.diagonal().cwiseSqrt();
   NuisanceMatrix correlations =
@@ -324,12 +317,10 @@ class JointFit {
     }
     equations.matrix.bottomRightCorner<num_nuisances, num_nuisances>() = priors_.information;
     equations.vector.tail<num_nuisances>() = priors_.information * residual;
-    const auto calibration = std::ranges::find_if_not(input_.sessions, is_test);
-    const auto& means =
-        records_[static_cast<std::size_t>(calibration - input_.sessions.begin())].means;
-    const double mean_square_m2_s4 =
-        mean_square_of_pushes(static_cast<std::size_t>(calibration - input_.sessions.begin()));
-    const Dual constant = mean_differential(means, unknowns, mean_square_m2_s4);
+    const auto calibration = static_cast<std::size_t>(
+        std::ranges::find_if_not(input_.sessions, is_test) - input_.sessions.begin());
+    const auto& means = records_[calibration].means;
+    const Dual constant = mean_differential(means, unknowns, mean_square_of_pushes(calibration));
     NormalVector slope;
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       slope[static_cast<Eigen::Index>(i)] = constant.slope[i] * priors_.unit[i];
@@ -418,14 +409,12 @@ Estimation estimate_joint(const RunPhasors& records, const EstimationInput& inpu
   const JointFit fit(records, input);
   UnknownArray unknowns = fit.start();
   Estimation result;
-  double last_move = 0.0;
   while (!result.converged && result.num_rounds < input.config.num_rounds_max) {
     const Solution solution = solve(fit.of_sessions(unknowns), fit.beside(unknowns));
     for (std::size_t i = 0; i < num_unknowns; ++i) {
       unknowns[i] += fit.unit(i) * solution.step[static_cast<Eigen::Index>(i)];
     }
-    last_move = largest_move(solution);
-    result.converged = last_move <= input.config.convergence;
+    result.converged = largest_move(solution) <= input.config.convergence;
     ++result.num_rounds;
   }
   const std::vector<NormalEquations> sessions = fit.of_sessions(unknowns);
@@ -436,7 +425,6 @@ Estimation estimate_joint(const RunPhasors& records, const EstimationInput& inpu
   }
   std::copy_n(unknowns.begin(), num_parameters, result.values.begin());
   set_errors(at_end.covariance, fit, result);
-  result.diagnostics = {{"last_move", last_move}};
   return result;
 }
 

@@ -16,8 +16,7 @@ namespace proofmass {
 /// model of a line, the weights and the priors.
 ///
 /// The standard errors are those of the fit: noise, and what the nuisances may be. Without noise
-/// (noise.scale 0) they are those of scale 1. Its diagnostic `last_move` is the largest move of an
-/// estimate in the last round, in standard errors.
+/// (noise.scale 0) they are those of scale 1.
 [[nodiscard]] Estimation estimate_joint(const RunPhasors& records, const EstimationInput& input);
 
 /// What the fit of a run tells of the unknowns.

@@ -56,6 +56,17 @@ class Unknowns {
   const UnknownArray& values_;
 };
 
+/// What the symmetric part of G makes of w: that of the angular acceleration is taken out.
+Matrix symmetric(const Matrix& w) {
+  Matrix result;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      result[3 * i + j] = Dual(0.5) * (w[3 * i + j] + w[3 * j + i]);
+    }
+  }
+  return result;
+}
+
 /// w_ij = gain_i v_j, and what the tilt β makes of it: with S the symmetric part of G and B v = β∧v
 /// the signal is Σ w_ij (G + B S + (B S)ᵀ)_ij = Σ (w_ij + [Bᵀ(w + wᵀ)]_ij, made symmetric) G_ij.
 Matrix tilted_product(const Vector& gain, const Vector& v, const Unknowns& x) {
@@ -74,24 +85,9 @@ Matrix tilted_product(const Vector& gain, const Vector& v, const Unknowns& x) {
       }
     }
   }
-  Matrix sum;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      sum[3 * i + j] = w[3 * i + j] + Dual(0.5) * (turned[3 * i + j] + turned[3 * j + i]);
-    }
-  }
+  Matrix sum = symmetric(turned);
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] = w[i] + sum[i];
   return sum;
-}
-
-/// What the symmetric part of G makes of w: that of the angular acceleration is taken out.
-Matrix symmetric(const Matrix& w) {
-  Matrix result;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      result[3 * i + j] = Dual(0.5) * (w[3 * i + j] + w[3 * j + i]);
-    }
-  }
-  return result;
 }
 
 /// Constant part c₀ of the common acceleration that the drag-free loop leaves.
@@ -247,12 +243,7 @@ Prediction predict(const LineCoefficients& coefficients, LineSignals signals,
                    const LinePhasors& line) {
   Prediction sum;
   const auto add = [&](std::span<const Dual> factors, std::size_t first) {
-    for (std::size_t j = 0; j < factors.size(); ++j) {
-      sum.value += factors[j].value * line[first + j];
-      for (std::size_t i = 0; i < num_unknowns; ++i) {
-        sum.slope[i] += factors[j].slope[i] * line[first + j];
-      }
-    }
+    for (std::size_t j = 0; j < factors.size(); ++j) sum.add(factors[j], line[first + j]);
   };
   add(coefficients.common, index(Signal::common_x));
   // The first row stands among the signals that every line has, the others behind them.
@@ -268,19 +259,15 @@ Prediction predict(const LineCoefficients& coefficients, LineSignals signals,
 Prediction push_terms(DragFreeSource source, const UnknownArray& unknowns, const Push& push,
                       PushLine line) {
   Prediction sum;
-  const auto add = [&](const Dual& factor, std::complex<double> product) {
-    sum.value += factor.value * product;
-    for (std::size_t i = 0; i < num_unknowns; ++i) sum.slope[i] += factor.slope[i] * product;
-  };
   const Unknowns x(unknowns);
   const std::complex<double> a = push.at_f, b = push.at_2f;
   const double square = std::norm(a), all_squares = square + 2.0 * push.square_of_others_m2_s4;
   if (push.axis != Axis::x) {
     if (line == PushLine::at_2f) return sum;
     const bool is_y = push.axis == Axis::y;
-    add(Dual(1.5) * x[is_y ? Parameter::a_d12 : Parameter::a_d13] *
-            x[is_y ? Unknown::square_y : Unknown::square_z],
-        all_squares * a);
+    sum.add(Dual(1.5) * x[is_y ? Parameter::a_d12 : Parameter::a_d13] *
+                x[is_y ? Unknown::square_y : Unknown::square_z],
+            all_squares * a);
     return sum;
   }
   const Dual k2c = x[Parameter::k2c];
@@ -290,13 +277,13 @@ Prediction push_terms(DragFreeSource source, const UnknownArray& unknowns, const
   if (source == DragFreeSource::sensor_1) level = Dual(-0.5) * x[Parameter::k2d];
   if (source == DragFreeSource::sensor_2) level = Dual(0.5) * x[Parameter::k2d];
   if (line == PushLine::at_f) {
-    add(k2, std::conj(a) * b);
-    add(k2 * (Dual(2.0) * level - Dual(1.5) * k2c), all_squares * a);
-    add(Dual(-8.75) * k2 * k2c * k2c * k2c, square * square * a);
+    sum.add(k2, std::conj(a) * b);
+    sum.add(k2 * (Dual(2.0) * level - Dual(1.5) * k2c), all_squares * a);
+    sum.add(Dual(-8.75) * k2 * k2c * k2c * k2c, square * square * a);
     return sum;
   }
-  add(k2 * (Dual(2.0) * level - Dual(5.0) * k2c), square * b);
-  add(k2 * k2c * (Dual(4.5) * k2c - Dual(3.0) * level), square * a * a);
+  sum.add(k2 * (Dual(2.0) * level - Dual(5.0) * k2c), square * b);
+  sum.add(k2 * k2c * (Dual(4.5) * k2c - Dual(3.0) * level), square * a * a);
   return sum;
 }
 

@@ -83,6 +83,12 @@ struct LineCoefficients {
 struct Prediction {
   std::complex<double> value{};
   std::array<std::complex<double>, num_unknowns> slope{};
+
+  /// Adds a term.
+  void add(const Dual& factor, std::complex<double> signal) {
+    value += factor.value * signal;
+    for (std::size_t i = 0; i < num_unknowns; ++i) slope[i] += factor.slope[i] * signal;
+  }
 };
 
 /// @param line  Its squares, if it has them, about their means: see centred().

@@ -190,12 +190,9 @@ void check_joint_records(const std::vector<Session>& sessions, double orbit_peri
 }
 
 PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective) {
-  const auto& groups = draw_groups();
-  const auto group =
-      std::ranges::find(groups, std::string_view("quadratic_factor_s2_m"), &DrawGroup::name);
-  PROOFMASS_EXPECT(group != groups.end());
+  const std::size_t first = draw_group("quadratic_factor_s2_m").first;
   double mean_square = 0.0;
-  for (const std::size_t sensor_x : {group->first, group->first + 3}) {
+  for (const std::size_t sensor_x : {first, first + 3}) {
     const auto at = static_cast<Eigen::Index>(sensor_x);
     mean_square += 0.5 * (laws.covariance(at, at) + laws.mean[sensor_x] * laws.mean[sensor_x]);
   }

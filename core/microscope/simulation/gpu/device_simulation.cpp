@@ -263,7 +263,9 @@ void MicroscopeDeviceSimulation::end_session(std::uint32_t index) {
   for (std::size_t lane = 0; lane < group.instruments.size(); ++lane) {
     const auto state = load_words<LaneState>(words.data(), lane);
     const SessionOutcome outcome{.sums = state.sums,
-                                 .health = session_health(state.loop, state.monitor)};
+                                 .health = {.acceleration_m_s2 = state.loop.largest_acceleration,
+                                            .attitude_rad = state.loop.largest_angle,
+                                            .monitor = state.monitor}};
     parts_.keep(slot.session, outcome, group.records[group.record_of[lane]]);
   }
   --group.num_sessions_left;

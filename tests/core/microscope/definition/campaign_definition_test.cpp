@@ -6,6 +6,7 @@
 
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
+#include "tests/support/parse_campaign.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -208,7 +209,7 @@ TEST(ParseCampaign, RefusesWhatIsOfATestWithoutOne) {
        {"[objective]\neotvos_parameter = 1e-15\n", "[gaps]\nglitch_rate_hz = 0.01\n",
         "[drag_free]\nresonator_damping = 0.5\n"}) {
     const std::string text = "[campaign]\nname = \"c\"\n" + table;
-    EXPECT_THROW((void)parse_campaign("c.toml", text, {}, {}), DefinitionError);
+    EXPECT_THROW((void)test::parse_campaign("c.toml", text), DefinitionError);
   }
 }
 
@@ -225,13 +226,13 @@ TEST(CanonicalDefinition, HasGapsWhereTestsLoseData) {
   campaign.scenario.gaps.test = {.depth = 0.5, .phase_rad = 0.0};
   const std::string text = canonical_definition(campaign);
   EXPECT_THAT(text, HasSubstr("\n[gaps]\nglitch_rate_hz = 0.01\ntest_modulation = 0.5\n["));
-  EXPECT_EQ(canonical_definition(parse_campaign("c.toml", text, {}, {})), text);
-  const auto differences = compare_definitions(without, campaign);
+  EXPECT_EQ(canonical_definition(test::parse_campaign("c.toml", text)), text);
+  const auto differences = without.differences_from(campaign);
   ASSERT_EQ(differences.size(), 2u);
   EXPECT_EQ(differences[0].field, "gaps.glitch_rate_hz");
   EXPECT_EQ(differences[1].field, "gaps.test_modulation");
   campaign.scenario.gaps.spin.depth = 0.6;
-  EXPECT_THROW((void)parse_campaign("c.toml", canonical_definition(campaign), {}, {}),
+  EXPECT_THROW((void)test::parse_campaign("c.toml", canonical_definition(campaign)),
                DefinitionError);
 }
 
@@ -240,7 +241,7 @@ TEST(CompareDefinitions, OfWhichOneTestsNamesTheSessions) {
   MicroscopeCampaign second;
   second.scenario.sessions.push_back(second.scenario.sessions.front());
   second.scenario.sessions.back().target = SessionTarget::ep_test;
-  const auto differences = compare_definitions(MicroscopeCampaign{}, second);
+  const auto differences = MicroscopeCampaign{}.differences_from(second);
   ASSERT_EQ(differences.size(), 1u);
   EXPECT_EQ(differences[0].field, "session");
 }
@@ -257,7 +258,7 @@ TEST(CampaignOf, ReadsDefinitionsWithTheFormerLimitsOfHealth) {
   EXPECT_EQ(bits_of(campaign_of(definition)), bits_of(campaign));
   definition.text.insert(place + limits.size(), "more = 1\n");
   EXPECT_THROW((void)campaign_of(definition), DefinitionError);
-  EXPECT_THROW((void)parse_campaign("a.toml", "[campaign]\nname = \"a\"\n" + limits, {}, {}),
+  EXPECT_THROW((void)test::parse_campaign("a.toml", "[campaign]\nname = \"a\"\n" + limits),
                DefinitionError);
 }
 
@@ -280,11 +281,10 @@ std::string with_laws(const std::string& of_y) {
 
 TEST(ParseCampaign, TakesCovariancesInPlaceOfCorrelations) {
   const MicroscopeCampaign campaign =
-      parse_campaign("a.toml", with_laws("covariances = [4e-12]\n"), {}, {});
+      test::parse_campaign("a.toml", with_laws("covariances = [4e-12]\n"));
   EXPECT_NEAR(campaign.dispersions[25].correlations.at(0), 0.5, 1e-15);
   const auto refusal_of = [](const std::string& of_y) {
-    return test::message_of<Error>(
-        [&] { (void)parse_campaign("a.toml", with_laws(of_y), {}, {}); });
+    return test::message_of<Error>([&] { (void)test::parse_campaign("a.toml", with_laws(of_y)); });
   };
   EXPECT_THAT(refusal_of("covariances = [4e-12]\ncorrelations = [0.5]\n"),
               HasSubstr("stands in place of correlations: leave out one of them"));
@@ -300,7 +300,7 @@ TEST(CampaignOf, HasLinesWithoutNegativeZeros) {
   const std::string from = "fit_lines = [[2, 0]]";
   ASSERT_NE(text.find(from), std::string::npos);
   text.replace(text.find(from), from.size(), "fit_lines = [[2, -0.0, -0.0]]");
-  EXPECT_EQ(canonical_definition(parse_campaign("text", text, {}, {})),
+  EXPECT_EQ(canonical_definition(test::parse_campaign("text", text)),
             canonical_definition(nominal));
 }
 

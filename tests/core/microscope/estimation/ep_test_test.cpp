@@ -90,7 +90,7 @@ double in_phase(const MicroscopeCampaign& campaign, const Value& value,
     gg += gravity * gravity;
     gv += gravity * of;
   };
-  (void)RunPlan(campaign, no_calibration).observe(RunIndex{0}, {}, add);
+  (void)RunPlan(campaign, no_calibration).record(RunIndex{0}, {}, {}, add);
   return (gv - g * v / n) / (gg - g * g / n);
 }
 

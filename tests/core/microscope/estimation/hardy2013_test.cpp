@@ -360,26 +360,18 @@ TEST(EstimateHardy2013, WeightsTheSessionsOfATargetByTheirLengths) {
   EXPECT_NEAR(at(result.values, Parameter::a_d12), slope + share * 1e-5, 1e-12);
 }
 
-TEST(EstimateHardy2013, CountsItsRoundsAndSaysHowFarTheLastOneMoved) {
+TEST(EstimateHardy2013, CountsItsRounds) {
   const RunPhasors record = ModelRecord{}.make();
   EstimationConfig config;
   config.num_rounds_max = 1;
   const Estimation one = calibrate(record, config);
   EXPECT_FALSE(one.converged);
   EXPECT_EQ(one.num_rounds, 1U);
-  ASSERT_EQ(one.diagnostics.size(), 1U);
-  EXPECT_EQ(one.diagnostics[0].name, "last_move");
-  double largest = 0.0;  // The first round moves from nothing.
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    largest = std::max(largest, std::abs(one.values[i]) / objectives()[i]);
-  }
-  EXPECT_DOUBLE_EQ(one.diagnostics[0].value, largest);
   config.num_rounds_max = 50;
   const Estimation many = calibrate(record, config);
   EXPECT_TRUE(many.converged);
   EXPECT_GT(many.num_rounds, 1U);
   EXPECT_LT(many.num_rounds, 50U);
-  EXPECT_LE(many.diagnostics[0].value, config.convergence);
 }
 
 TEST(CheckHardy2013, WantsASessionForEveryTarget) {

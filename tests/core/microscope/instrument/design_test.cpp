@@ -2,6 +2,7 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/support/parse_campaign.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -175,9 +176,7 @@ TEST(Design, RefusesWhatDependsOtherwise) {
   EXPECT_EQ(design_refusal(campaign), "");
 }
 
-MicroscopeCampaign read_design(std::string_view text) {
-  return parse_campaign("file", text, {}, {});
-}
+MicroscopeCampaign read_design(std::string_view text) { return test::parse_campaign("file", text); }
 
 TEST(Design, IsReadAndWritten) {
   const MicroscopeCampaign nominal =
@@ -189,7 +188,7 @@ TEST(Design, IsReadAndWritten) {
   EXPECT_EQ(campaign_of(definition_of(other)).design, other.design);
   EXPECT_THAT(canonical_definition(MicroscopeCampaign{}), Not(HasSubstr("\ndesign")));
 
-  const std::vector<DefinitionDifference> differences = compare_definitions(nominal, other);
+  const std::vector<DefinitionDifference> differences = nominal.differences_from(other);
   ASSERT_THAT(differences, SizeIs(2));
   EXPECT_EQ(differences[0].field, "campaign.design");
   EXPECT_EQ(differences[0].second, "latin_hypercube");

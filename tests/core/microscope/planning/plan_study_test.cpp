@@ -9,6 +9,7 @@
 #include "core/microscope/estimation/joint/joint.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/parse_campaign.hpp"
 #include "tests/support/runs.hpp"
 #include "tests/test.hpp"
 
@@ -32,7 +33,7 @@ TEST(PlanStudy, IsTheClosedFormOfOneLineInWhiteNoise) {
   const MicroscopeCampaign campaign = perfect_campaign();
   const Scenario& scenario = campaign.scenario;
   const auto study = study_plan(campaign);
-  std::vector<int> orbits = study->num_steps();
+  std::vector<int> orbits = study->scope().num_steps;
   for (const int num_orbits : {10, 25}) {
     orbits[6] = num_orbits;
     const double duration_s =
@@ -52,12 +53,12 @@ TEST(PlanStudy, IsTheClosedFormOfOneLineInWhiteNoise) {
 // Two objectives of three standard errors, 2Φ(−3), and all others far away.
 TEST(PlanStudy, TellsTheChanceOfTheObjectives) {
   MicroscopeCampaign campaign = perfect_campaign();
-  const PlanBound before = study_plan(campaign)->bound(study_plan(campaign)->num_steps());
+  const PlanBound before = study_plan(campaign)->bound(study_plan(campaign)->scope().num_steps);
   for (std::size_t i = 0; i < num_parameters; ++i) {
     campaign.scenario.objectives[i] = (i < 2 ? 3.0 : 9.0) * before.standard_errors[i];
   }
   const auto study = study_plan(campaign);
-  const PlanBound bound = study->bound(study->num_steps());
+  const PlanBound bound = study->bound(study->scope().num_steps);
   const double miss = 0.0026997960632601866;  // 2Φ(−3), [Wichura1988] or any table.
   EXPECT_NEAR(bound.misses[0], miss, 1e-9);
   EXPECT_LT(bound.misses[2], 1e-17);
@@ -122,7 +123,7 @@ TEST(PlanStudy, IsWhatTheEstimatorStates) {
   test::fix(campaign, "quadratic_factor_s2_m.sensor_2_x", -3000.0);
   campaign.validate();
   const auto study = study_plan(campaign);
-  const PlanBound bound = study->bound(study->num_steps());
+  const PlanBound bound = study->bound(study->scope().num_steps);
   const RunPlan plan(campaign);
   std::vector<double> means(num_parameters);
   double squares = 0.0, variance = 0.0, chi_squared = 0.0, freedom = 0.0;
@@ -213,8 +214,8 @@ TEST(PlanStudy, CountsRunsThatAreLost) {
   std::ranges::sort(accelerations);
   const auto lost_of = [&] {
     const auto study = study_plan(campaign);
-    EXPECT_EQ(study->num_probed(), batch_lanes);
-    return study->bound(study->num_steps());
+    EXPECT_EQ(study->scope().num_probed, batch_lanes);
+    return study->bound(study->scope().num_steps);
   };
   EXPECT_EQ(lost_of().num_lost(), 0U);
   campaign.scenario.sensor.range_m_s2 = 0.5 * (accelerations[7] + accelerations[8]);
@@ -241,7 +242,7 @@ TEST(PlanStudy, NamesWhatLosesRunsBesideTheRange) {
   MicroscopeCampaign campaign = simultaneous_campaign();
   campaign.scenario.objectives[index(Parameter::a_c12)] = 1e-13;
   const auto study = study_plan(campaign);
-  const PlanBound bound = study->bound(study->num_steps());
+  const PlanBound bound = study->bound(study->scope().num_steps);
   ASSERT_EQ(bound.losses.size(), 1U);
   EXPECT_EQ(bound.num_lost(), batch_lanes);
   EXPECT_EQ(bound.losses[0].cause, "attitude");
@@ -250,7 +251,7 @@ TEST(PlanStudy, NamesWhatLosesRunsBesideTheRange) {
 
 TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
   const auto study = study_plan(MicroscopeCampaign{});
-  const PlanBound bound = study->bound(std::vector<int>(study->num_steps().size(), 0));
+  const PlanBound bound = study->bound(std::vector<int>(study->scope().num_steps.size(), 0));
   for (const double error : bound.standard_errors) EXPECT_TRUE(std::isinf(error));
   EXPECT_NEAR(bound.misses_any, 1.0, 1e-12);
 }
@@ -266,16 +267,15 @@ TEST(PlanStudy, WritesTheCampaignThatItsBoundIsOf) {
   MicroscopeCampaign campaign;
   campaign.scenario.estimation.transient_s = 3000.0;
   const auto study = study_plan(campaign);
-  std::vector<int> orbits = study->num_steps();
+  std::vector<int> orbits = study->scope().num_steps;
   orbits[3] = 37;
-  const MicroscopeCampaign written =
-      parse_campaign("written", study->campaign_file(orbits), {}, {});
+  const MicroscopeCampaign written = test::parse_campaign("written", study->campaign_file(orbits));
   EXPECT_EQ(estimation_method(written.scenario.estimation.method).name, "joint");
   EXPECT_EQ(written.num_runs, campaign.num_runs);
   const auto again = study_plan(written);
-  EXPECT_EQ(again->num_steps(), orbits);
+  EXPECT_EQ(again->scope().num_steps, orbits);
   EXPECT_EQ(again->bound(orbits).standard_errors, study->bound(orbits).standard_errors);
-  orbits[3] = study->num_steps_max();
+  orbits[3] = study->scope().num_steps_max;
   EXPECT_FALSE(study->campaign_file(orbits).empty());
   ++orbits[3];
   EXPECT_THROW((void)study->campaign_file(orbits), ConfigError);

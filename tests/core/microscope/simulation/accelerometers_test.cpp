@@ -113,10 +113,11 @@ void compare(const ObservedSample& sample, Comparison& comparison) {
 TEST(TwoAccelerometersAtTheCentre, ReadInEverySampleWhatMicroscopeMeasures) {
   const MicroscopeCampaign campaign = short_campaign();
   std::map<std::size_t, Comparison> sessions;
-  static_cast<void>(RunPlan(campaign).observe(RunIndex{2}, {}, [&](const ObservedSample& sample) {
-    if (mass_excitation(campaign.scenario.sessions[sample.session]) != nullptr) return;
-    compare(sample, sessions[sample.session]);
-  }));
+  static_cast<void>(
+      RunPlan(campaign).record(RunIndex{2}, {}, {}, [&](const ObservedSample& sample) {
+        if (mass_excitation(campaign.scenario.sessions[sample.session]) != nullptr) return;
+        compare(sample, sessions[sample.session]);
+      }));
   EXPECT_GE(sessions.size(), 6U);
   for (const auto& [session, comparison] : sessions) {
     const double rounding = 20.0 * std::numeric_limits<double>::epsilon() * comparison.largest;
@@ -157,7 +158,7 @@ TEST(TwoAccelerometersAtTheCentre, FindTheOffcentringThatMicroscopeFinds) {
   campaign.scenario.noise.scale = 0.0;
   const RunPlan plan(campaign);
   OffcentringFit fit;
-  const RunRecord record = plan.observe(RunIndex{2}, {}, [&](const ObservedSample& sample) {
+  const RunRecord record = plan.record(RunIndex{2}, {}, {}, [&](const ObservedSample& sample) {
     const SessionTarget target = campaign.scenario.sessions[sample.session].target;
     if (sample.index >= 0 && target <= SessionTarget::a_c11_delta_y) fit.add(sample);
   });

@@ -62,7 +62,7 @@ struct Observed {
 
 Observed observe(const RunPlan& plan, RunRecord& record) {
   Observed observed;
-  record = plan.observe(RunIndex{2}, {}, [&](const ObservedSample& sample) {
+  record = plan.record(RunIndex{2}, {}, {}, [&](const ObservedSample& sample) {
     if (sample.session == observed.records.size()) {
       observed.records.emplace_back();
       observed.first.push_back(sample.index);

@@ -47,7 +47,7 @@ TEST(RecordedSignals, HaveNamesOfTheirOwnAndKnownFrames) {
 // out with the bits that the sample has itself.
 TEST(ObservedSample, HasTheLoopThatTheSampleBeganWith) {
   std::size_t num_samples = 0, num_equal = 0;
-  (void)RunPlan(short_campaign()).observe(RunIndex{1}, {}, [&](const ObservedSample& sample) {
+  (void)RunPlan(short_campaign()).record(RunIndex{1}, {}, {}, [&](const ObservedSample& sample) {
     const SatelliteMotion<double> motion =
         sample.loop.motion(sample.constants, sample.shared, sample.noise);
     for (std::size_t k = 0; k < 2; ++k) {

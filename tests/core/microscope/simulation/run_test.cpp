@@ -46,7 +46,6 @@ Estimation first_phasors(const RunPhasors& records, const EstimationInput& input
   for (std::size_t i = 0; i < num_parameters; ++i) {
     estimation.values[i] = records[i].amplitude[index(Signal::differential_x)][0].real();
   }
-  estimation.diagnostics = {{"sessions", static_cast<double>(records.size())}};
   return estimation;
 }
 
@@ -72,8 +71,6 @@ TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
   EXPECT_EQ(other.phasors[7].amplitude, record.phasors[0].amplitude);
   EXPECT_EQ(other.phasors[3].amplitude, record.phasors[3].amplitude);
   EXPECT_TRUE(result.standard_error.empty());
-  const Estimation estimation = plan.estimation(record);
-  EXPECT_EQ(estimation.diagnostics.at(0).value, 11.0);
   campaign.scenario.estimation.convergence = 0.7;
   EXPECT_EQ(RunPlan(campaign, method).simulate(RunIndex{0}, {}).status, RunStatus::not_converged);
 }
@@ -99,22 +96,12 @@ TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
   EXPECT_EQ(result.status, RunStatus::completed);
   EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3e-9));
   EXPECT_EQ(result.fit, (std::vector<double>{3.75, 4.0, 1.25, 1.5, 2.5, 2.5}));
-  ASSERT_EQ(result.correlations.size(), num_correlations(results_of(std::array{method})));
+  ASSERT_EQ(result.correlations.size(), num_correlations(results_with_errors()));
   EXPECT_EQ(result.correlations[9], 0.123457);  // Of the second with the third.
   campaign.scenario.estimation.convergence = 0.7;
   const RunResult unusable = RunPlan(campaign, method).simulate(RunIndex{0}, {});
   EXPECT_EQ(unusable.status, RunStatus::not_finite);
   EXPECT_TRUE(unusable.standard_error.empty());
-
-  const std::array with{*estimation_methods().begin(), method};
-  for (const Quantity& quantity : results_of(with).quantities) {
-    EXPECT_TRUE(quantity.has_standard_error) << quantity.name;
-  }
-  const std::array without{*estimation_methods().begin()};
-  EXPECT_TRUE(results_of(without).fit.empty());
-  for (const Quantity& quantity : results_of(without).quantities) {
-    EXPECT_FALSE(quantity.has_standard_error) << quantity.name;
-  }
 }
 
 // Two sessions of a target, each with noise of its own, give an estimate between those of each.
@@ -215,12 +202,12 @@ TEST(RunPlan, SaysWhatLostARunAndWhichEstimateIsOff) {
   EXPECT_EQ(loss_with([](SessionHealth& h) { h.attitude_rad = 0.05; }),
             test::loss_of(LossCause::attitude, a_c12));
   EXPECT_EQ(loss_with([](SessionHealth& h) {
-              h.residual = {{{1e-7, 0.0}, {}, {}}};
+              h.monitor.residual = {{{1e-7, 0.0}, {}, {}}};
             }),
             test::loss_of(LossCause::residual, a_c11_delta_x));
-  EXPECT_EQ(loss_with([](SessionHealth& h) { h.quadratic_squares *= 1e7; }),
+  EXPECT_EQ(loss_with([](SessionHealth& h) { h.monitor.quadratic.squares *= 1e7; }),
             test::loss_of(LossCause::quadratic_noise, a_c11_delta_x));
-  EXPECT_EQ(loss_with([](SessionHealth& h) { h.common_squares *= 1e7; }),
+  EXPECT_EQ(loss_with([](SessionHealth& h) { h.monitor.common_square.squares *= 1e7; }),
             test::loss_of(LossCause::square_noise, k2d));
 }
 
