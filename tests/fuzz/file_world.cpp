@@ -22,6 +22,7 @@
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
@@ -226,10 +227,12 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     }
     case FileUse::requirement: {
       const Store store = Store::open_read_only(file);
+      const auto campaign = stored_campaign(store);
+      if (!why_not_independent(*campaign).empty()) return;  // As the command, which refuses it.
       const std::array<std::string, 2> texts{"a_c12 < 9e-4 for 90% with 90%",
                                              "all objectives for 90% with 90%"};
-      const Review review = read_review(store, *stored_campaign(store), ReviewDepth::matrix,
-                                        numbered_requirements(texts));
+      const Review review =
+          read_review(store, *campaign, ReviewDepth::matrix, numbered_requirements(texts));
       for (const auto& answer : review.matrix) (void)requirement_text(answer);
       return;
     }

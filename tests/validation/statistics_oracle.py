@@ -254,14 +254,16 @@ def compare_unpaired(a, b, confidence):
 def compare_errors(a, b):
     first, second = columns[a], columns[b]
     limit = 2 * math.sqrt(np.mean(np.concatenate([first, second]) ** 2))
-    location = scipy.stats.ttest_ind(second, first, equal_var=False)
+    # Of a location the larger p-value of both tests, of a scatter that of one variance for both.
+    location = max((scipy.stats.ttest_ind(second, first, equal_var=equal) for equal in (False, True)),
+                   key=lambda test: test.pvalue)
     # The mean of |x - m| scatters as that of |x - m| - s (x - m), s being the mean sign of x - m.
     deviations = [side - float(exact_moments(side)[0]) for side in (first, second)]
     scatters = [abs(d) - np.mean(np.sign(d)) * d for d in deviations]
     scale = scipy.stats.ttest_ind_from_stats(
         *(figure for d, s in zip(deviations, scatters)
           for figure in (float(exact_moments(abs(d))[0]), float(np.std(s, ddof=1)), len(d))),
-        equal_var=False)
+        equal_var=True)
     beyond = [int((abs(side) > limit).sum()) for side in (first, second)]
     within = [len(first) - beyond[0], len(second) - beyond[1]]
     return limit, location.pvalue, scale.pvalue, scipy.stats.fisher_exact([beyond, within])[1]

@@ -76,7 +76,7 @@ def expected_row(database, requirement):
     if name:
         limit = float(limit)
         values = errors_of(database, name)
-        beyond = sum(value >= limit for value in values.values())
+        beyond = sum(value > limit for value in values.values())
     else:
         limit = 1.0
         values = {}

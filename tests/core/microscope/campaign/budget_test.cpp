@@ -180,7 +180,16 @@ TEST(BudgetAfterCalibration, TakesTheGradientOfTheTestNotOfTheSessions) {
   EXPECT_NEAR(budget.entries[0], 4.18e-9, 0.02e-9);
   EXPECT_NEAR(budget.entries[3], 1.67e-8, 0.01e-8);
   EXPECT_EQ(microscope_budget(scenario).note,
-            "Γ_res is that at f_EP of calibration sessions in another pointing\n");
+            "Γ_res is that at f_EP of calibration sessions in another pointing; the loop leaves "
+            "more of the drag at a higher f_EP\n");
+  Session& test = scenario.sessions.emplace_back();
+  test.name = "test";
+  test.target = SessionTarget::ep_test;
+  test.spin_rate_rad_s = scenario.budget.test_spin_rate_rad_s;
+  EXPECT_THAT(microscope_budget(scenario).note, ::testing::Not(::testing::HasSubstr("No test")));
+  test.spin_rate_rad_s = 0.01;
+  EXPECT_THAT(microscope_budget(scenario).note,
+              ::testing::HasSubstr("No test of this campaign turns so"));
 }
 
 TEST(Budget, FollowsTheResidueOfTheRuns) {
