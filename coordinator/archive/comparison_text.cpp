@@ -112,8 +112,11 @@ Table campaign_table(std::span<const ComparedMember> members, const MemberNames&
                           std::to_string(member.statistics.num_estimated),
                           member.comparison ? how_compared(member, members.front()) : ""});
     if (member.comparison && !member.comparison->why_not_compared.empty()) {
-      table.notes.push_back(fmt::format("{} cannot be compared: {}", names.names[i],
-                                        member.comparison->why_not_compared));
+      const bool is_of_first = !members.front().why_not_independent.empty();
+      const std::string note =
+          fmt::format("{} cannot be compared: {}", names.names[is_of_first ? 0 : i],
+                      member.comparison->why_not_compared);
+      if (!is_of_first || i == 1) table.notes.push_back(note);
     }
     if (member.comparison && member.comparison->num_pairs > 0) {
       const CampaignComparison& of = *member.comparison;

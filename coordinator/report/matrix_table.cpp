@@ -49,7 +49,7 @@ Row matrix_cells(const RequirementAnswer& row) {
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
           count_cell(check.num_exceedances),
-          count_cell(check.num_allowed),
+          check.bound_order > 0 ? count_cell(check.bound_order - 1) : Cell("none"),
           value_cell(row, row.bound),
           margin_cell(row),
           {name_of(check.verdict), tone_of(check.verdict)},

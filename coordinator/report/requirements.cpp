@@ -62,10 +62,9 @@ std::string count_lines(const RequirementAnswer& answer) {
     text = fmt::format("{}; {}\n", counts,
                        bounds_text(answer.requirement, *check.exceedance, check.verdict));
   }
-  return text +
+  return text + missing_lines(answer) +
          fmt::format("{}     {} of all draws\n", is_joint ? "Required" : "Allowed ",
-                     given_percent(is_joint ? required : 1.0 - required)) +
-         missing_lines(answer);
+                     given_percent(is_joint ? required : 1.0 - required));
 }
 
 // Tables may show the quantity in another unit than that of the requirement.

@@ -18,7 +18,7 @@ double probability_to_meet(const RequirementCheck& check, double exceedance_prob
   if (check.bound_order == 0) return 0.0;  // No number of exceedances is few enough.
   if (exceedance_probability <= 0.0) return 1.0;
   if (exceedance_probability >= 1.0) return 0.0;
-  return binomial_at_most(static_cast<double>(check.num_allowed),
+  return binomial_at_most(static_cast<double>(check.bound_order - 1),
                           static_cast<double>(check.num_runs), exceedance_probability);
 }
 
@@ -76,7 +76,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                    check.num_runs,
                    check.bound_order == 0
                        ? "So few draws never meet it."
-                       : fmt::format("At most {} of them may exceed it.", check.num_allowed),
+                       : fmt::format("At most {} of them may exceed it.", check.bound_order - 1),
                    given_percent(allowed),
                    figure_text(100.0 * probability_to_meet(check, allowed)))},
       .x = {.label = "draws that exceed the limit, % of all draws", .from = 0.0, .to = 100.0 * end},

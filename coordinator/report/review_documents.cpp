@@ -164,6 +164,11 @@ std::string execution_markup(const Review& review, Tables tables) {
   return html + "</ul>\n";
 }
 
+std::vector<Table> run_tables(const Review& review) {
+  if (review.is_imported) return {identity_table(review)};  // Its runs were computed elsewhere.
+  return {identity_table(review), execution_table(review), host_table(review)};
+}
+
 std::vector<Section> sections_of(const Review& review) {
   // What intervals take for their unit instead of the run.
   const char* const groups = review.results.replicates ? "Replicates of the design" : "Instruments";
@@ -177,10 +182,7 @@ std::vector<Section> sections_of(const Review& review) {
           {"budget-section", "Budget", {review_budget_table(review)}, budget_markup},
           {"causes-section", "Causes of the errors", {cause_table(review)}, causes_markup},
           {"spectra-section", "Spectra of the worst run", {}, spectra_markup},
-          {"how",
-           "How it was run",
-           {identity_table(review), execution_table(review), host_table(review)},
-           execution_markup}};
+          {"how", "How it was run", run_tables(review), execution_markup}};
 }
 
 std::string summary_markup(const Review& review, std::span<const Section> sections) {

@@ -110,8 +110,8 @@ std::string driver_of(const Review& review, std::size_t quantity) {
   const auto term = std::ranges::find(causes->terms, quantity, &CauseTerm::quantity);
   if (term == causes->terms.end()) {
     return fmt::format(
-        "in {} draws no drawn quantity or product of two was found to explain it; those that only "
-        "change its size are listed by `proofmass sensitivity`",
+        "in {} draws no drawn quantity or product of two was found to explain it; whether any "
+        "changes its size, `proofmass sensitivity` tells",
         causes->num_runs);
   }
   return fmt::format("of the variance of this error over the draws, {} % follows from {}",

@@ -117,7 +117,8 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
 /// What it means that no term was found: the fewer runs, the less.
 std::string not_found_text(const DrawnRuns& drawn) {
   const double percent = 100.0 * term_share_found(inputs_of(drawn), default_confidence);
-  const std::string text = "No quantity and no product of two was found to explain the error";
+  const std::string text =
+      "No term, a quantity or a product of two, was found to explain the error";
   if (percent >= 100.0) {
     return fmt::format("{}: {} runs are too few to find any", text, drawn.runs.size());
   }

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -14,6 +15,13 @@ namespace {
 constexpr std::size_t columns_max = 80;  // Of what is broken to lines.
 constexpr std::size_t gap = 2;           // Before a column that is as wide as its cells.
 constexpr std::size_t text_width_min = 8;
+
+std::size_t longest_word(const std::string& text) {
+  std::istringstream words(text);
+  std::size_t longest = 0;
+  for (std::string word; words >> word;) longest = std::max(longest, display_width(word));
+  return longest;
+}
 
 /// Words in lines of at most `first` columns, and then of `width`; a longer word has its own.
 std::vector<std::string> lines_of(const std::string& text, std::size_t first, std::size_t width) {
@@ -56,11 +64,17 @@ class TerminalTable {
   [[nodiscard]] std::string text() const;
 
  private:
+  /// What a table that is too wide does without, in turn: blanks before numbers; lines of several
+  /// words; whole words.
+  enum class Cut : std::uint8_t { blanks, lines, words };
+
   struct ShownColumn {
     const Column* column;
     std::size_t index;      ///< Among all columns of the table.
     std::size_t lead = 0;   ///< Blanks before it.
     std::size_t width = 0;  ///< With the blanks.
+    std::size_t needed =
+        0;  ///< Of that, for its title and its cells; for the longest word of text.
 
     [[nodiscard]] bool has_own_width() const { return column->width > 0; }
     /// For text; a column of numbers is as wide as they are.
@@ -68,7 +82,9 @@ class TerminalTable {
       if (!column->is_text) return width - lead;
       return width - (has_own_width() ? 1 : lead);
     }
-    [[nodiscard]] std::size_t width_min() const {
+    [[nodiscard]] std::size_t width_min(Cut cut) const {
+      if (column->is_text && cut == Cut::blanks) return width;
+      if (!column->is_text || cut == Cut::lines) return needed;
       return has_own_width() ? std::min(column->width, text_width_min + 1) : text_width_min + lead;
     }
   };
@@ -98,13 +114,17 @@ TerminalTable::TerminalTable(const Table& table, const TerminalStyle& style)
     if (column.is_for_documents) continue;
     ShownColumn shown{.column = &column, .index = i};
     if (!shown.has_own_width() && !columns_.empty()) shown.lead = gap;
-    const std::size_t title = display_width(wire::visible_text(column.title));
     const std::size_t blanks = shown.has_own_width() ? 1 : shown.lead;
-    shown.width = std::max(column.width, title + (column.is_text ? blanks : shown.lead));
-    for (const Row& row : table.rows) {
-      const std::size_t needed = display_width(wire::visible_text(row[i].text)) + blanks;
-      shown.width = std::max(shown.width, needed);
-    }
+    shown.width = column.width;
+    const auto make_room = [&](const std::string& text) {
+      const std::string visible = wire::visible_text(text);
+      const std::size_t width = display_width(visible);
+      shown.width = std::max(shown.width, width + blanks);
+      shown.needed =
+          std::max(shown.needed, (column.is_text ? longest_word(visible) : width) + blanks);
+    };
+    make_room(column.title);
+    for (const Row& row : table.rows) make_room(row[i].text);
     columns_.push_back(shown);
   }
   widen_for_groups();
@@ -118,7 +138,9 @@ void TerminalTable::widen_for_groups() {
     std::size_t width = columns_[i].width;
     while (continues_group(i + 1)) width += columns_[++i].width;
     const std::size_t needed = display_width(columns_[first].column->group);
-    if (needed > width) columns_[i].width += needed - width;
+    if (needed <= width) continue;
+    columns_[i].width += needed - width;
+    columns_[i].needed = columns_[i].width;
   }
 }
 
@@ -128,7 +150,7 @@ bool TerminalTable::continues_group(std::size_t i) const {
          columns_[i].column->group == columns_[i - 1].column->group;
 }
 
-// Takes from the widest column of text, one at a time.
+// Takes from the widest column, one at a time.
 void TerminalTable::fit() {
   std::size_t total = 0;
   bool have_own_widths = false;
@@ -136,15 +158,18 @@ void TerminalTable::fit() {
     total += shown.width + (shown.column->is_after_line ? 1 : 0);
     have_own_widths = have_own_widths || shown.has_own_width();
   }
-  const auto to_spare = [](const ShownColumn& shown) {
-    const bool is_cut = shown.column->is_text && shown.width > shown.width_min();
-    return is_cut ? shown.width : 0;
-  };
-  while (total > style_.line_width_max) {
-    ShownColumn& widest = *std::ranges::max_element(columns_, {}, to_spare);
-    if (to_spare(widest) == 0) break;
-    --widest.width;
-    --total;
+  // Rows that are written one at a time stay below one another: their numbers keep their places.
+  for (const Cut cut : {Cut::blanks, Cut::lines, Cut::words}) {
+    if (!style_.wraps_cells && cut != Cut::words) continue;
+    const auto to_spare = [&](const ShownColumn& shown) {
+      return shown.width > shown.width_min(cut) ? shown.width : 0;
+    };
+    while (total > style_.line_width_max) {
+      ShownColumn& widest = *std::ranges::max_element(columns_, {}, to_spare);
+      if (to_spare(widest) == 0) break;
+      --widest.width;
+      --total;
+    }
   }
   are_rows_records_ = total > style_.line_width_max && !have_own_widths && !table_.rows.empty();
 }

@@ -280,7 +280,7 @@ Requirement detail::read_requirement(Phrase& phrase) {
 bool exceeds(const Requirement& requirement, std::span<const double> errors,
              std::span<const double> objectives) {
   if (requirement.subject == Requirement::Subject::parameter) {
-    return std::abs(errors[requirement.parameter]) >= requirement.limit;
+    return std::abs(errors[requirement.parameter]) > requirement.limit;
   }
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (std::abs(errors[i]) > objectives[i]) return true;
@@ -295,7 +295,6 @@ RequirementCheck check_requirement(const Requirement& requirement, const Exceeda
   RequirementCheck check{rule.decide(static_cast<double>(count.num_exceedances), count.num_runs),
                          count};
   check.bound_order = rule.bound_order(count.num_runs);
-  if (check.bound_order > 0) check.num_allowed = check.bound_order - 1;
   if (check.verdict != RequirementVerdict::undecided) return check;
   check.num_runs_at_best = rule.runs_to_meet(count);
   check.num_runs_at_this_rate =

@@ -76,7 +76,7 @@ struct Requirement {
   };
 
   std::size_t parameter = 0;  ///< For Subject::parameter: its position among the names.
-  double limit = 0.0;         ///< For Subject::parameter: SI, > 0; an error on it exceeds it.
+  double limit = 0.0;         ///< For Subject::parameter: SI, > 0.
   Tolerance tolerance;
   Subject subject = Subject::parameter;
 };
@@ -89,8 +89,8 @@ struct Requirement {
 [[nodiscard]] Requirement parse_requirement(std::string_view text,
                                             std::span<const std::string_view> parameters);
 
-/// True if a run with these errors does not do what is required: |error| of the parameter is at or
-/// above the limit, or of any parameter above its objective.
+/// True if a run with these errors does not do what is required: |error| of the parameter is above
+/// the limit, or of any parameter above its objective.
 /// @param errors      estimate − truth, SI.
 /// @param objectives  Largest acceptable |error| of each parameter, SI; as many.
 [[nodiscard]] bool exceeds(const Requirement& requirement, std::span<const double> errors,
@@ -119,10 +119,9 @@ struct Decision {
 
 /// A decision about so many runs, with what it takes to get one.
 struct RequirementCheck : Decision, ExceedanceCount {
-  std::uint64_t num_allowed = 0;  ///< Exceedances with which so many runs would meet it.
   /// Order, from the largest error, of the one below which at least `coverage` of all errors are
   /// with this confidence; 0 if runs are too few. The requirement is met if and only if that error
-  /// is below the limit.
+  /// is not above the limit. One less are the exceedances with which so many runs meet it.
   std::uint64_t bound_order = 0;
   /// If undecided: all runs it takes until the requirement is met if none of the further ones
   /// exceeds, the plan of those who go on. Empty above num_runs_max.

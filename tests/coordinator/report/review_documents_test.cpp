@@ -321,7 +321,7 @@ TEST(VerificationMatrix, BoundsByTheRuleOfItsVerdict) {
   const RequirementAnswer open = answers_to(one, results)[0];
   EXPECT_TRUE(fixed.check.is_of_fixed_size);
   EXPECT_FALSE(open.check.is_of_fixed_size);
-  EXPECT_GT(fixed.check.num_allowed, open.check.num_allowed);
+  EXPECT_GT(fixed.check.bound_order, open.check.bound_order);
   EXPECT_LT(*fixed.bound, *open.bound);
 }
 
