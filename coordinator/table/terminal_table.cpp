@@ -116,15 +116,17 @@ TerminalTable::TerminalTable(const Table& table, const TerminalStyle& style)
     if (!shown.has_own_width() && !columns_.empty()) shown.lead = gap;
     const std::size_t blanks = shown.has_own_width() ? 1 : shown.lead;
     shown.width = column.width;
-    const auto make_room = [&](const std::string& text) {
+    const auto make_room = [&](const std::string& text, std::size_t before) {
       const std::string visible = wire::visible_text(text);
       const std::size_t width = display_width(visible);
-      shown.width = std::max(shown.width, width + blanks);
+      shown.width = std::max(shown.width, width + before);
       shown.needed =
-          std::max(shown.needed, (column.is_text ? longest_word(visible) : width) + blanks);
+          std::max(shown.needed, (column.is_text ? longest_word(visible) : width) + before);
     };
-    make_room(column.title);
-    for (const Row& row : table.rows) make_room(row[i].text);
+    const bool is_beside_number =
+        !columns_.empty() && !columns_.back().column->is_text && !column.is_after_line;
+    make_room(column.title, column.is_text || is_beside_number ? blanks : shown.lead);
+    for (const Row& row : table.rows) make_room(row[i].text, blanks);
     columns_.push_back(shown);
   }
   widen_for_groups();

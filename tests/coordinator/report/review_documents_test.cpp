@@ -194,7 +194,7 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
   EXPECT_THAT(
       sentences_of(review)[3],
       HasSubstr(
-          "; in 0 draws no drawn quantity or product of two was found to explain it; those "));
+          "; in 0 draws no drawn quantity or product of two was found to explain it; whether "));
   const auto term = [](std::string name, double share) {
     return CauseTerm{.name = std::move(name), .found = {.second = {}, .share = share}};
   };

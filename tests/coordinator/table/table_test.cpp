@@ -84,7 +84,7 @@ TEST(TerminalTable, CutsTextAndNoNumberWhereTheLineHasNoRoom) {
 TEST(TerminalTable, GoesOnBelowWhereADocumentHasNoRoom) {
   const Table table = named_runs({{"a calibration/of-it", "12"}, {"b", "3"}});
   EXPECT_EQ(terminal_text(table, {.line_width_max = 15, .wraps_cells = true}),
-            "name       runs\n───────────────\na            12\ncalibrat\nion/of-it\n"
+            "name       runs\n───────────────\na            12\ncalibrati\non/of-it\n"
             "b             3\n");
   EXPECT_EQ(terminal_text(table, document_style(Paint::no)),
             "name                  runs\n──────────────────────────\n"
