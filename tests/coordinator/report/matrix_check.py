@@ -99,7 +99,7 @@ def expected_row(database, requirement):
     run, worst = max(finite.items(), key=lambda item: (item[1], -item[0]))
     is_bound = math.isfinite(bound)
     return {"limit": limit, "draws": n, "without": n - len(finite),
-            "exceedances": beyond, "allowed": max(order - 1, 0),
+            "exceedances": beyond, "allowed": order - 1 if order else "none",
             "bound": bound if is_bound else "none",
             "margin": 1 - bound / limit if is_bound else "none",
             "verdict": verdict, "worst": worst, "run": run}
