@@ -238,8 +238,8 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
                           {"p  ", false, 11}},
                          add_cells);
   table.notes.push_back(fmt::format(
-      "from, to: 95 % interval of the change from {}; p: Student's t of pairs; as a whole also "
-      "Welch's; of fewer than {} runs the larger of it and a test of ranks",
+      "from, to: 95 % interval of the change from {}; p: Student's t, as a whole the larger of "
+      "it and Welch's; of fewer than {} runs the larger of t and Wilcoxon's (pairs) or Smirnov's",
       names.names.front(), num_welch_min));
   return table;
 }

@@ -76,8 +76,7 @@ std::string unwatched_note(const Scenario& scenario) {
   };
   if (std::ranges::any_of(scenario.sessions, is_quiet)) return {};
   return "no session watches the noise of the loops, which may move every estimate: add one "
-         "without "
-         "excitations";
+         "without excitations";
 }
 
 std::string loops_note(const Scenario& scenario) {

@@ -77,8 +77,8 @@ double student_p_value(double mean, double standard_error, double degrees) {
   return student_two_sided(mean / standard_error, degrees);
 }
 
-/// Student's t with one scatter for both, which they have if nothing changes. By its own a small
-/// campaign, in which what is rare lacks, is too sure of its mean.
+/// Student's t with one scatter for both, which they have if nothing changes. With a scatter of its
+/// own, a small campaign that happens to have no rare value would seem too sure of its mean.
 double pooled_p_value(const Moments& first, const Moments& second) {
   const auto m = static_cast<double>(first.count), n = static_cast<double>(second.count);
   const double variance = ((m - 1.0) * first.standard_deviation * first.standard_deviation +

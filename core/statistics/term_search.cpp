@@ -69,7 +69,8 @@ void remove(Column column, Values& values) {
 }
 
 /// Centred, with what is beyond two standard deviations brought there: what is far out counts, but
-/// no sum of products is of a few values alone.
+/// no sum of products is of a few values alone. With 1.5 deviations, among inputs that are 1 in a
+/// fifth of the runs chance is taken for a term eight times too often.
 Values limited(const Values& values) {
   Values result = centred(values);
   const double limit = 2.0 * std::sqrt(dot(result, result) / static_cast<double>(result.size()));

@@ -89,7 +89,8 @@ std::string test_note(const Scenario& scenario) {
     return is_test(session) && turns_so(session);
   };
   if (scenario.has_tests() && std::ranges::none_of(scenario.sessions, is_tested_so)) {
-    note += "No test of this campaign turns so: budget.test_spin_rate_rad_s chooses another\n";
+    note += fmt::format("No test of this campaign turns by budget.test_spin_rate_rad_s, {} rad/s\n",
+                        rate_rad_s);
   }
   const bool is_elsewhere = std::ranges::any_of(scenario.sessions, [&](const Session& session) {
     return !is_test(session) && session.excitations.empty() && !turns_so(session);

@@ -160,8 +160,8 @@ void check_tests(const std::vector<Session>& sessions) {
     if (!is_test(session) || session.spin_rate_rad_s == 0.0) continue;
     if (session.drag_free == calibrated) continue;
     throw ConfigError(fmt::format("session[{}].drag_free", i), spelling(session.drag_free),
-                      fmt::format("must be {}, of which a_d11' is, or a test that spins takes its "
-                                  "constant acceleration for a violation",
+                      fmt::format("must be {}, as in the session of a_d11': in a test that spins, "
+                                  "another constant acceleration looks like a violation",
                                   spelling(calibrated)));
   }
 }

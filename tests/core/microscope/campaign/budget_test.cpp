@@ -189,7 +189,7 @@ TEST(BudgetAfterCalibration, TakesTheGradientOfTheTestNotOfTheSessions) {
   EXPECT_THAT(microscope_budget(scenario).note, ::testing::Not(::testing::HasSubstr("No test")));
   test.spin_rate_rad_s = 0.01;
   EXPECT_THAT(microscope_budget(scenario).note,
-              ::testing::HasSubstr("No test of this campaign turns so"));
+              ::testing::HasSubstr("No test of this campaign turns by"));
 }
 
 TEST(Budget, FollowsTheResidueOfTheRuns) {
