@@ -241,7 +241,7 @@ void Scenario::validate() const {
   if (realism) realism->validate();
   check_controllers(*this);
   check_stability(*this);
-  gaps.validate(sessions, simulation.sample_period_s);
+  gaps.validate(simulation.sample_period_s);
   check_transient(*this);
   check_band(*this);
   check_wanted_lines(*this);

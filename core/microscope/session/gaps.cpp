@@ -13,8 +13,6 @@
 namespace proofmass {
 namespace {
 
-// They bound the memory for a batch: four bytes a window and lane, 95 MB.
-constexpr int num_orbits_max = 1000;
 // Mean number of losses that touch a window. exp(−2), a seventh of the windows, are left.
 constexpr double touches_max = 2.0;
 
@@ -42,7 +40,7 @@ void lose_after_events(const RandomStream& stream, double highest_hz, const Rate
 
 }  // namespace
 
-void GapsConfig::validate(const std::vector<Session>& sessions, double sample_period_s) const {
+void GapsConfig::validate(double sample_period_s) const {
   const double depth = orbital.depth + spin.depth + test.depth;
   if (depth > 1.0) {
     throw ConfigError("gaps.orbital_modulation", fmt::format("{}", orbital.depth),
@@ -58,12 +56,6 @@ void GapsConfig::validate(const std::vector<Session>& sessions, double sample_pe
                       fmt::format("must leave more than a seventh of the windows of {} s: {:.6g} "
                                   "losses touch one, and may be {}",
                                   window_s, touches, touches_max));
-  }
-  for (std::size_t i = 0; lose_data() && i < sessions.size(); ++i) {
-    if (!is_test(sessions[i]) || sessions[i].num_orbits <= num_orbits_max) continue;
-    throw ConfigError(fmt::format("session[{}].orbits", i),
-                      fmt::format("{}", sessions[i].num_orbits),
-                      fmt::format("must be at most {} with gaps", num_orbits_max));
   }
 }
 

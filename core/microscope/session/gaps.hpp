@@ -30,7 +30,7 @@ struct GapsConfig {
 
   /// Checks what has to hold between several values.
   /// @throws ConfigError naming the field, its value and the rule.
-  void validate(const std::vector<Session>& sessions, double sample_period_s) const;
+  void validate(double sample_period_s) const;
 };
 
 /// Which blocks of test_block_size samples of a session's record have a sample that is lost. A pure

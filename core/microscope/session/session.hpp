@@ -154,9 +154,9 @@ struct SessionPhasors {
   std::array<double, num_line_bases> means{};
   /// Of a session that tests the equivalence principle; empty for others.
   std::vector<double> test_products{};
-  /// XᵀRX of a test that has lost data, with X its weighted regressors and R the covariance of the
-  /// windows' noise, of scale 1.
-  std::optional<RegressorProducts> test_noise{};
+  /// XᵀRX of a test, with X its weighted regressors and R the covariance of the windows' noise, of
+  /// scale 1.
+  RegressorProducts test_noise{};
 };
 
 // Targets.

@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::size_t name_length_max = 64;
 constexpr double multiple_max = 1000.0;
+// Of a test: a batch of runs has weights of its windows, four bytes each, 95 MB.
+constexpr int num_test_orbits_max = 1000;
 
 template <typename Choice>
 std::string spelling(Choice choice) {
@@ -178,6 +180,10 @@ void SessionCheck::check_test() const {
   };
   refuse_lines("fit_lines", session_.fit_lines);
   refuse_lines("known_lines", session_.known_lines);
+  if (session_.num_orbits > num_test_orbits_max) {
+    refuse("orbits", fmt::format("{}", session_.num_orbits),
+           fmt::format("must be at most {} with the target ep_test", num_test_orbits_max));
+  }
   // A frame that turns with the Earth's direction sees a constant, which a bias is, too.
   const double resolution_hz = (1.0 - 1e-9) / (session_.num_orbits * orbit_period_s_);
   if (test_frequency_hz(session_, orbit_period_s_) >= resolution_hz) return;

@@ -129,7 +129,7 @@ struct RunPlan::Impl : RunParts {
                             const SessionProgress& progress, RunRecord& record) const {
     Readers readers(*this, i);
     const std::vector<float> of_windows = window_weights(i, record.run);
-    if (!of_windows.empty()) alone.test.window_weights.runs[0] = of_windows.data();
+    alone.test.window_weights.runs[0] = of_windows.data();
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
     keep(i,
@@ -168,7 +168,7 @@ struct RunPlan::Impl : RunParts {
         batch.eotvos_parameters[l] = lane.instrument.eotvos_parameter;
         batch.noise_states[l] = stationary_states(impl.noise, impl.campaign.seed, lane.run, starts);
         of_windows[l] = impl.window_weights(i, lane.run);
-        if (!of_windows[l].empty()) batch.window_weights[l] = of_windows[l].data();
+        batch.window_weights[l] = of_windows[l].data();
       }
     }
     SessionOfBatch(const SessionOfBatch&) = delete;

@@ -54,7 +54,8 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
       drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
       attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)),
       bounds(c.scenario),
-      recording(recording_of(c.scenario, noise)) {
+      recording(recording_of(c.scenario, noise)),
+      weights_of_windows(mean_linear_x(c.scenario.noise), c.scenario.simulation.sample_period_s) {
   weights.reserve(campaign.scenario.sessions.size());
   residual_weights.resize(campaign.scenario.sessions.size());
   for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
@@ -71,18 +72,27 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     if (is_test(session) || !session.excitations.empty() || is_monitored_before(i)) continue;
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
-  if (!campaign.scenario.gaps.lose_data()) return;
-  weights_of_windows.emplace(mean_linear_x(c.scenario.noise),
-                             c.scenario.simulation.sample_period_s);
   for (std::size_t i = 0; i < tests.size(); ++i) regressors.push_back(nominal_regressors(i));
+  if (campaign.scenario.gaps.lose_data()) return;
+  // The windows of every run are those of the first.
+  for (std::size_t i = 0; i < tests.size(); ++i) {
+    const std::vector<WindowRegressors> of_windows = std::move(regressors[i]);
+    noise_of_complete.push_back(
+        weights_of_windows.noise_products(window_weights(i, RunIndex{0}), of_windows));
+  }
 }
 
 std::vector<float> RunParts::window_weights(std::size_t i, RunIndex run) const {
   const Scenario& scenario = campaign.scenario;
-  if (!weights_of_windows || !is_test(scenario.sessions[i])) return {};
-  return weights_of_windows->of(lost_blocks(scenario.gaps, scenario.sessions[i], campaign.seed, run,
-                                            tests[i].num_blocks, scenario.orbit.period_s,
-                                            scenario.simulation.sample_period_s));
+  if (!is_test(scenario.sessions[i])) return {};
+  return weights_of_windows.of(lost_blocks(scenario.gaps, scenario.sessions[i], campaign.seed, run,
+                                           tests[i].num_blocks, scenario.orbit.period_s,
+                                           scenario.simulation.sample_period_s));
+}
+
+RegressorProducts RunParts::window_noise(std::size_t i, RunIndex run) const {
+  if (!noise_of_complete.empty()) return noise_of_complete[i];
+  return weights_of_windows.noise_products(window_weights(i, run), regressors[i]);
 }
 
 std::vector<WindowRegressors> RunParts::nominal_regressors(std::size_t i) const {
@@ -171,10 +181,7 @@ void RunParts::keep(std::size_t i, const SessionOutcome& outcome, RunRecord& rec
   }
   if (is_test(campaign.scenario.sessions[i])) {
     phasors.test_products.assign(outcome.test_products.begin(), outcome.test_products.end());
-    if (weights_of_windows) {
-      phasors.test_noise =
-          weights_of_windows->noise_products(window_weights(i, record.run), regressors[i]);
-    }
+    phasors.test_noise = window_noise(i, record.run);
   }
   record.health[i] = outcome.health;
   record.health[i].is_quiet = is_quiet(i);

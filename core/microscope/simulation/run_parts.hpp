@@ -46,8 +46,11 @@ struct RunParts {
 
   [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const;
 
-  /// Weights of the windows of a run's session; none if each counts once.
+  /// Weights of the windows of a run's session; none unless it tests.
   [[nodiscard]] std::vector<float> window_weights(std::size_t i, RunIndex run) const;
+
+  /// SessionPhasors::test_noise of a run's session that tests.
+  [[nodiscard]] RegressorProducts window_noise(std::size_t i, RunIndex run) const;
 
   /// What is known of a run before it is simulated.
   [[nodiscard]] RunRecord drawn_record(RunIndex run, const AcceptedDraw& draw) const;
@@ -70,9 +73,11 @@ struct RunParts {
   std::vector<std::vector<LineGroup>> groups;                ///< Of each session's further lines.
   std::vector<std::vector<LineWeights>> group_weights;       ///< Of those groups.
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
-  std::vector<TestSetup> tests;                     ///< Of each session; of use where it is a test.
-  std::optional<WindowWeights> weights_of_windows;  ///< If tests lose data.
-  std::vector<std::vector<WindowRegressors>> regressors;  ///< Of each session; none if none do.
+  std::vector<TestSetup> tests;  ///< Of each session; of use where it is a test.
+  WindowWeights weights_of_windows;
+  /// Of each session; none unless it tests and loses data.
+  std::vector<std::vector<WindowRegressors>> regressors;
+  std::vector<RegressorProducts> noise_of_complete;  ///< Of each session, if none loses data.
 
   /// Whether the masses of any session feel stiffness.
   [[nodiscard]] bool has_stiffness() const;

@@ -27,16 +27,14 @@ struct TestSetup {
   }
 };
 
-/// Weights of the windows of each run of T, window after window; null where each counts once.
+/// Weights of the windows of each run of T, window after window.
 template <typename T>
 struct WeightsOfRuns {
   std::array<const float*, sizeof(T) / sizeof(double)> runs{};
 
   PROOFMASS_INLINE T at(std::size_t window) const {
     std::array<double, sizeof(T) / sizeof(double)> values;
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-      values[i] = runs[i] == nullptr ? 1.0 : double{runs[i][window]};
-    }
+    for (std::size_t i = 0; i < runs.size(); ++i) values[i] = double{runs[i][window]};
     return __builtin_bit_cast(T, values);
   }
 };

@@ -41,30 +41,9 @@ struct TestRecord {
   /// nulls the first or the second.
   double common_part = 0.0;
   Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
-  Fitted density;                 ///< At the line of each regressor, (m/s²)²/Hz.
-  FittedMatrix noise;             ///< w²XᵀRX of the regressors, of noise of scale 1.
+  FittedMatrix noise;             ///< XᵀRX of the regressors, of noise of scale 1.
+  double weight = 0.0;            ///< 1/S(f_EP), Hz/(m/s²)².
 };
-
-/// Sessions count by their noise at f_EP.
-double weight(const TestRecord& test) { return 1.0 / test.density[0]; }
-
-FittedMatrix fitted_block(const TestRecord& record);
-
-/// w²XᵀRX: that of the run if it has lost data. Otherwise regressors are narrow lines.
-FittedMatrix noise_products(const SessionPhasors& record, const TestRecord& of,
-                            const EstimationInput& input) {
-  FittedMatrix noise;
-  if (record.test_noise) {
-    for (Eigen::Index i = 0; i < num_fitted; ++i) {
-      const auto& row = (*record.test_noise)[static_cast<std::size_t>(i)];
-      noise.row(i) = Eigen::Map<const Fitted>(row.data()).transpose();
-    }
-    return weight(of) * weight(of) * noise;
-  }
-  const double window_s = static_cast<double>(test_block_size) * input.sample_period_s;
-  const Fitted root = (0.5 / window_s * of.density).cwiseSqrt();
-  return weight(of) * weight(of) * root.asDiagonal() * fitted_block(of) * root.asDiagonal();
-}
 
 TestRecord test_record(const SessionPhasors& record, const Session& session,
                        const EstimationInput& input) {
@@ -89,14 +68,14 @@ TestRecord test_record(const SessionPhasors& record, const Session& session,
   of.mean_gradient << mean(gradient_xx), mean(gradient_xy), mean(gradient_xz);
   if (session.drag_free == DragFreeSource::sensor_1) of.common_part = -1.0;
   if (session.drag_free == DragFreeSource::sensor_2) of.common_part = 1.0;
+  for (Eigen::Index i = 0; i < num_fitted; ++i) {
+    const auto& products = record.test_noise[static_cast<std::size_t>(i)];
+    of.noise.row(i) = Eigen::Map<const Fitted>(products.data()).transpose();
+  }
   const double f = test_frequency_hz(session, input.orbit_period_s);
-  const auto density = [&](double frequency_hz) {
-    return differential_x_density(input.noise, [&](const SensorNoise& x) {
-      return 2.0 * window_noise_psd(x, frequency_hz, input.sample_period_s);
-    });
-  };
-  of.density << density(f), density(2.0 * f), density(2.0 * f);
-  of.noise = noise_products(record, of, input);
+  of.weight = 1.0 / differential_x_density(input.noise, [&](const SensorNoise& x) {
+                return 2.0 * window_noise_psd(x, f, input.sample_period_s);
+              });
   return of;
 }
 
@@ -174,14 +153,14 @@ class TestFit {
     }
     PROOFMASS_EXPECT(!tests_.empty());
     FittedMatrix normal = FittedMatrix::Zero();
-    for (const TestRecord& test : tests_) normal += weight(test) * fitted_block(test);
+    for (const TestRecord& test : tests_) normal += test.weight * fitted_block(test);
     inverse_ = normal.llt().solve(FittedMatrix::Identity());
   }
 
   [[nodiscard]] Fitted values(const ParameterArray& calibration) const {
     Fitted sum = Fitted::Zero();
     for (const TestRecord& test : tests_) {
-      sum += weight(test) * (fitted_rows(test) * corrected(test, calibration));
+      sum += test.weight * (fitted_rows(test) * corrected(test, calibration));
     }
     return 2.0 * (inverse_ * sum);
   }
@@ -189,7 +168,7 @@ class TestFit {
   /// By noise.
   [[nodiscard]] FittedMatrix covariance() const {
     FittedMatrix sum = FittedMatrix::Zero();
-    for (const TestRecord& test : tests_) sum += test.noise;
+    for (const TestRecord& test : tests_) sum += test.weight * test.weight * test.noise;
     return 4.0 * scale_ * scale_ * inverse_ * sum * inverse_;
   }
 

@@ -10,8 +10,7 @@
 
 namespace proofmass {
 
-// How much the windows of a test count that has lost data, and the variance that this makes.
-// README.md derives both.
+// How much the windows of a test count, and the variance that this makes. README.md derives both.
 
 /// Autocovariance, (m/s²)², of half the difference of two sensors' noise, averaged over windows.
 struct WindowAutocovariance {

@@ -75,6 +75,8 @@ TEST(ValidateSessions, RefusesLinesAndExcitationsOfTests) {
             "session[11].fit_lines = 1 lines (target ep_test has lines of its own, f_EP and "
             "2 f_EP: leave this out)");
   EXPECT_THAT(refusal([](Session& s) { s.known_lines = {{1, 0}}; }), HasSubstr("known_lines"));
+  EXPECT_EQ(refusal([](Session& s) { s.num_orbits = 1001; }),
+            "session[11].orbits = 1001 (must be at most 1000 with the target ep_test)");
   EXPECT_THAT(refusal([](Session& s) { s.excitations = hardy2013_sessions()[2].excitations; }),
               HasSubstr("target ep_test needs none"));
   // The frame turns with the Earth's direction.
