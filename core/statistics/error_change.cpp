@@ -162,6 +162,27 @@ double found_deviate(std::size_t num_parameters) {
   return inverse_normal(1.0 - 0.5 * level);
 }
 
+/// The factor f = next(f); empty if there is none or only a very large one.
+/// @param slope  next() rises by this for each 1 at the most.
+template <typename Next>
+std::optional<double> fixed_point(double slope, const Next& next) {
+  if (!(slope < 0.99)) return std::nullopt;
+  double factor = 1.0;
+  for (int i = 0; i < 2000; ++i) factor = next(factor);  // Each time nearer by `slope` at least.
+  return factor;
+}
+
+/// Distances from the mean, in units of their own mean; none if there is no scatter.
+std::vector<double> relative_distances(std::span<const double> values) {
+  std::vector<double> relative = distances(values, mean_of(values, {}));
+  const double mean = moments(relative).mean;
+  if (!(mean > 0.0)) return {};
+  for (double& distance : relative) distance /= mean;
+  return relative;
+}
+
+constexpr double rounding_max = 1e-9;  // Of a change of the scatter.
+
 }  // namespace
 
 // f − 1 = z √(c²/n + f² c²/m) + z' √(c²/m + f² c²/n) with the relative deviation c of the distances
@@ -175,19 +196,17 @@ std::optional<double> smallest_scale_factor(std::span<const double> first,
   const double of_a = a.standard_deviation / a.mean, of_b = b.standard_deviation / b.mean;
   const double c = std::sqrt(((m - 1.0) * of_a * of_a + (n - 1.0) * of_b * of_b) / (m + n - 2.0));
   const double z = found_deviate(num_parameters), z_found = inverse_normal(finding_probability);
-  const double slope = c * (z / std::sqrt(m) + z_found / std::sqrt(n));
-  if (!(slope < 0.99)) return std::nullopt;
-  double factor = 1.0;
-  for (int i = 0; i < 2000; ++i) {  // Each time nearer by `slope` at least.
+  return fixed_point(c * (z / std::sqrt(m) + z_found / std::sqrt(n)), [&](double factor) {
     const double square = factor * factor;
-    factor =
-        1.0 + c * (z * std::sqrt(1.0 / n + square / m) + z_found * std::sqrt(1.0 / m + square / n));
-  }
-  return factor;
+    return 1.0 +
+           c * (z * std::sqrt(1.0 / n + square / m) + z_found * std::sqrt(1.0 / m + square / n));
+  });
 }
 
-// Of few pairs both tests must find it; Wilcoxon's needs no more than 1/0.864 times the pairs of
-// Student's t, whatever the law.
+// f − 1 = (z + z') s(f)/(μ √n), with s(f) the deviation of f b − a, a and b being the distances of
+// a pair from the means, b brought to the mean μ of a: what has changed is not of the scatter of
+// pairs. Of few pairs both tests must find it; Wilcoxon's needs no more than 1/0.864 times the
+// pairs of Student's t, whatever the law.
 std::optional<double> smallest_paired_scale_factor(std::span<const double> first,
                                                    std::span<const double> second,
                                                    std::size_t num_parameters) {
@@ -195,12 +214,21 @@ std::optional<double> smallest_paired_scale_factor(std::span<const double> first
   if (first.size() < num_pairs_min) return std::nullopt;
   const double efficiency = first.size() < num_welch_min ? 0.864 : 1.0;
   const auto n = static_cast<double>(first.size());
-  const double deviation = moments(deviation_differences(first, second)).standard_deviation;
-  const double z = found_deviate(num_parameters) + inverse_normal(finding_probability);
-  const double change = z * deviation / std::sqrt(efficiency * n);
-  const double mean = moments(distances(first, mean_of(first, {}))).mean;
-  if (!(mean > 0.0)) return std::nullopt;
-  return 1.0 + change / mean;
+  const std::vector<double> a = relative_distances(first), b = relative_distances(second);
+  if (a.empty() || b.empty()) return std::nullopt;
+  const double scatter = moments(b).standard_deviation, of_a = moments(a).standard_deviation;
+  std::vector<double> differences(a.size());
+  std::ranges::transform(b, a, differences.begin(), std::minus<>());
+  const double apart = moments(differences).standard_deviation;
+  if (apart < rounding_max) return std::nullopt;  // Any factor is found in pairs that are equal.
+  const double covariance_of_b = 0.5 * (apart * apart + scatter * scatter - of_a * of_a);
+  const double z = (found_deviate(num_parameters) + inverse_normal(finding_probability)) /
+                   std::sqrt(efficiency * n);
+  return fixed_point(z * scatter, [&](double factor) {  // f b − a = (b − a) + (f − 1) b.
+    const double more = factor - 1.0;
+    return 1.0 + z * std::sqrt(apart * apart + more * more * scatter * scatter +
+                               2.0 * more * covariance_of_b);
+  });
 }
 
 std::vector<ChangePValues> adjusted_changes(std::span<const ChangePValues> changes) {

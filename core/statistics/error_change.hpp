@@ -55,7 +55,8 @@ inline constexpr double finding_probability = 0.9;
 [[nodiscard]] std::optional<double> smallest_scale_factor(std::span<const double> first,
                                                           std::span<const double> second,
                                                           std::size_t num_parameters);
-/// The factor that compare_paired_errors() would have found; empty of fewer than ten pairs.
+/// The factor that compare_paired_errors() would have found, whatever has changed; empty of fewer
+/// than ten pairs, and of pairs that are equal but for a factor.
 [[nodiscard]] std::optional<double> smallest_paired_scale_factor(std::span<const double> first,
                                                                  std::span<const double> second,
                                                                  std::size_t num_parameters);

@@ -167,6 +167,26 @@ TEST(ErrorChange, IsFoundWithTheProbabilityThatGoesWithTheSmallestFactor) {
   }
 }
 
+// What a comparison could find does not grow with what has changed.
+TEST(ErrorChange, ThatPairsWouldShowIsThatOfTheirScatterAlone) {
+  const auto normal = [](std::uint32_t column) {
+    return test::column_of(400, {.seed = 85, .repetition = 0, .column = column}, inverse_normal);
+  };
+  const Values first = normal(0);
+  Values second = normal(1), fourfold = second, doubled = first;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    second[i] = first[i] + 0.1 * second[i];
+    fourfold[i] = 4.0 * second[i] + 7.0;
+    doubled[i] *= 2.0;
+  }
+  const auto found = smallest_paired_scale_factor(first, second, 10);
+  EXPECT_NEAR(*smallest_paired_scale_factor(first, fourfold, 10), *found, 1e-12);
+  // Distances differ by 0.1 n, n normal. Level 0.05·0.4/10 of two sides and 90 %: 3.09 + 1.28.
+  const double expected = 4.37 * 0.1 / std::sqrt(2.0 / std::numbers::pi) / std::sqrt(400.0);
+  EXPECT_NEAR(*found - 1.0, expected, 0.1 * expected);
+  EXPECT_EQ(smallest_paired_scale_factor(first, doubled, 10), std::nullopt);
+}
+
 // The mean of an exponential law moves the distances from it: by their own scatter alone, a test of
 // 5 % found a change in 12 % of pairs of campaigns without one. Standard error 0.7 %.
 TEST(ErrorChange, OfScaleIsRarelyFoundInASkewLawWithoutOne) {
