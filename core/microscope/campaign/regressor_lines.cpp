@@ -147,12 +147,20 @@ SpectralLines modulated_lines(const Session& session, Axis axis, const SpectralL
 constexpr std::array<double, index(SessionTarget::no_target)> construction_bounds{
     20e-6, 20e-6, 20e-6, 2.6e-3, 2.6e-3, 1e-2, 1.6e-3, 1.6e-3, 14000.0, 14000.0, 14000.0};
 
-/// The positive frequency at which a signal is largest, Hz.
-double strongest_hz(double resolution_hz, const SpectralLines& regressor) {
+/// The positive frequency at which a signal is largest, Hz. That of the motion of masses does not
+/// count for the parameters which it modulates: other signals are there.
+double strongest_hz(const Session& session, double resolution_hz, const SpectralLines& regressor) {
+  const Excitation* const motion = mass_excitation(session);
+  const bool is_modulated =
+      session.target == SessionTarget::a_c12 || session.target == SessionTarget::a_c13;
   double strongest = 0.0;
   double largest = 0.0;
   for (const SpectralLine& line : regressor) {
     if (line.frequency_hz < resolution_hz || std::abs(line.amplitude) <= largest) continue;
+    if (is_modulated && motion != nullptr &&
+        std::abs(line.frequency_hz - motion->frequency_hz) < resolution_hz) {
+      continue;
+    }
     largest = std::abs(line.amplitude);
     strongest = line.frequency_hz;
   }
@@ -243,11 +251,13 @@ double fit_duration_s(const Scenario& scenario, const Session& session) {
 
 namespace {
 
-/// Standard error that the sensors' noise, not scaled, gives a session's target where the
-/// regressor's line has this amplitude, in units of the target.
+/// Standard error that noise gives a session's target where the regressor's line has this
+/// amplitude, in units of the target. Noise is that of the design, or less: a noisy sensor has its
+/// signals.
 double line_sigma(const Scenario& scenario, const Session& session, double frequency_hz,
                   double amplitude) {
-  const double density = differential_x_psd(scenario.noise, frequency_hz);
+  const double density = std::min(differential_x_psd(scenario.noise, frequency_hz),
+                                  differential_x_psd(NoiseConfig{}, frequency_hz));
   return std::abs(target_info(session.target).scale) *
          std::sqrt(density / fit_duration_s(scenario, session)) / amplitude;
 }
@@ -273,7 +283,8 @@ void check_regressors(const Scenario& scenario) {
                       "error of {:.2g}, and construction bounds it by {:g}; the signal's strongest "
                       "line is at {:.4g} Hz{}",
                       session.name, name_of(session.target), frequency_hz, sigma, bound,
-                      strongest_hz(1.0 / (session.num_orbits * scenario.orbit.period_s), regressor),
+                      strongest_hz(session, 1.0 / (session.num_orbits * scenario.orbit.period_s),
+                                   regressor),
                       session.spin_rate_rad_s != 0.0 && line.spin == 0.0
                           ? "; lines of the gravity gradient turn with the spin, as [2, 0, 2] does"
                           : ""));

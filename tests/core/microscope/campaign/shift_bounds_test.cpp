@@ -88,7 +88,22 @@ TEST(RegressorLines, MustBeThereWhereTheyAreFitted) {
       campaign.scenario.sessions[i].known_lines = {};
     });
     EXPECT_NE(moved.find("has no signal of"), std::string::npos) << i << moved;
+    // a_c12 and a_c13 have two, f_TM ± 2 f_orb.
+    const bool is_modulated = i == 3 || i == 4;
+    EXPECT_EQ(moved.find("line is at 0.00954") != std::string::npos ||
+                  moved.find("line is at 0.01022") != std::string::npos,
+              is_modulated)
+        << moved;
   }
+}
+
+// A sensor with twenty times the noise has its signals where others have them.
+TEST(RegressorLines, AreThereInEveryNoise) {
+  EXPECT_EQ(refusal_of([](MicroscopeCampaign& campaign) {
+              campaign.scenario.noise.linear_x.white_asd *= 20.0;
+              campaign.scenario.noise.linear_x.rise_asd *= 20.0;
+            }),
+            "");
 }
 
 /// The largest numbers of a nominal campaign, and every truth at its bound.
