@@ -27,24 +27,14 @@ Correlations correlations_of(std::span<const double> input, const DrawnRuns& dra
   return correlations;
 }
 
-std::vector<double> values_of_term(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  std::vector<double> values = drawn.columns[term.first];
-  if (!term.second) return values;
-  const std::vector<double>& other = drawn.columns[*term.second];
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] *= other[i];
-  return values;
-}
-
 void add_input(Causes& causes, const std::string& name, Correlations correlations) {
   if (std::ranges::find(causes.inputs, name) != causes.inputs.end()) return;
   causes.inputs.push_back(name);
   causes.correlations.push_back(std::move(correlations));
 }
 
-void add_terms(const DrawnRuns& drawn, std::size_t quantity,
-               std::span<const proofmass::Column> inputs, Causes& causes) {
-  for (const ExplanatoryTerm& term :
-       explanatory_terms(inputs, drawn.errors[quantity], num_terms_max, default_confidence)) {
+void add_terms(const DrawnRuns& drawn, std::size_t quantity, Causes& causes) {
+  for (const ExplanatoryTerm& term : terms_of(drawn, quantity)) {
     const std::string name = term_name(drawn, term);
     causes.terms.push_back({quantity, name, term});
     add_input(causes, name, correlations_of(values_of_term(drawn, term), drawn));
@@ -78,10 +68,9 @@ std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) 
     std::ranges::replace(drawn.names, of_truth, fmt::format("true {}", quantity.symbol));
   }
   Causes causes{.num_runs = drawn.runs.size(), .num_with_estimate = drawn.num_with_estimate};
-  const std::vector<proofmass::Column> inputs(drawn.columns.begin(), drawn.columns.end());
   std::vector<Correlations> of_columns;
-  for (const proofmass::Column input : inputs) of_columns.push_back(correlations_of(input, drawn));
-  for (std::size_t i = 0; i < drawn.errors.size(); ++i) add_terms(drawn, i, inputs, causes);
+  for (const auto& column : drawn.columns) of_columns.push_back(correlations_of(column, drawn));
+  for (std::size_t i = 0; i < drawn.errors.size(); ++i) add_terms(drawn, i, causes);
   for (std::size_t i = 0; i < drawn.errors.size(); ++i) {
     add_correlated(drawn, i, of_columns, causes);
   }

@@ -114,7 +114,7 @@ std::string driver_of(const Review& review, std::size_t quantity) {
         "changes its size, `proofmass sensitivity` tells",
         causes->num_runs);
   }
-  return fmt::format("of the variance of this error over the draws, {} % follows from {}",
+  return fmt::format("of the variance of this error over the draws, {} % goes with {}",
                      figure_text(100.0 * term->found.share), term->name);
 }
 

@@ -13,6 +13,7 @@
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "core/statistics/moments.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -52,11 +53,6 @@ std::vector<proofmass::Column> inputs_of(const DrawnRuns& drawn) {
   return {drawn.columns.begin(), drawn.columns.end()};
 }
 
-std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quantity) {
-  return explanatory_terms(inputs_of(drawn), drawn.errors[quantity], num_terms_max,
-                           default_confidence);
-}
-
 /// Of error and |error|, the most significant first.
 std::vector<std::vector<Sensitivity>> sensitivities_of(const DrawnRuns& drawn,
                                                        std::size_t quantity) {
@@ -65,7 +61,7 @@ std::vector<std::vector<Sensitivity>> sensitivities_of(const DrawnRuns& drawn,
   std::ranges::transform(errors, magnitudes.begin(), [](double error) { return std::abs(error); });
   const std::vector<proofmass::Column> inputs = inputs_of(drawn);
   const std::vector<proofmass::Column> outputs{errors, magnitudes};
-  return sensitivities(inputs, outputs, default_confidence);
+  return sensitivities(inputs, outputs, default_confidence, 2 * drawn.errors.size());
 }
 
 std::string share_of(const FirstOrderIndex& index) {
@@ -91,32 +87,47 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                                   "--rows 5 lists the first ones nevertheless",
                                   output)}};
   }
-  Table table{.columns = {{fmt::format("drives {}", output), true, 39},
-                          {"% of variance (95 %)", false, 21}}};
+  Table table{.columns = {{fmt::format("drives {}", output), true, 39}}};
   if (position) {
-    table.columns.insert(table.columns.end(), {{"value", false, 10}, {"% below", false, 10}});
+    table.columns.insert(
+        table.columns.end(),
+        {{"% of variance", false, 14}, {"value", false, 9}, {"% below", false, 9}});
   } else {
-    table.columns.insert(table.columns.end(), {{"rank", false, 9}, {"p", false, 11}});
+    table.columns.insert(table.columns.end(),
+                         {{"% of variance (95 %)", false, 21}, {"rank", false, 9}});
   }
+  table.columns.push_back({"p", false, position ? 9u : 11u});
   for (const Sensitivity& row : rows) {
     Row& cells = table.rows.emplace_back();
-    cells = {drawn.names[row.input], share_of(row.first_order)};
+    cells = {drawn.names[row.input]};
     if (position) {
       const std::vector<double>& values = drawn.columns[row.input];
       const double value = values[*position];
+      cells.emplace_back(fmt::format("{:.1f}", 100.0 * row.first_order.index));
       cells.emplace_back(fmt::format("{:.3g}", value));
       cells.emplace_back(fmt::format("{:.1f}", percentile_of(values, value)));
     } else {
+      cells.emplace_back(share_of(row.first_order));
       cells.emplace_back(fmt::format("{:+.2f}", row.rank_correlation));
-      cells.emplace_back(p_value_cell(row.adjusted_p_value));
     }
+    cells.emplace_back(p_value_cell(row.adjusted_p_value));
   }
   return table;
 }
 
+/// The note about p below the tables of drivers.
+std::string note_of_p(std::size_t num_inputs, std::size_t num_quantities) {
+  return fmt::format(
+      "p: that chance alone makes one of {} inputs look so influential on one of {} errors or "
+      "their "
+      "magnitudes (Kruskal-Wallis, Holm)",
+      num_inputs, num_quantities);
+}
+
 /// What it means that no term was found: the fewer runs, the less.
 std::string not_found_text(const DrawnRuns& drawn) {
-  const double percent = 100.0 * term_share_found(inputs_of(drawn), default_confidence);
+  const double percent =
+      100.0 * term_share_found(inputs_of(drawn), default_confidence, drawn.errors.size());
   const std::string text =
       "No term, a quantity or a product of two, was found to explain the error";
   if (percent >= 100.0) {
@@ -127,18 +138,32 @@ std::string not_found_text(const DrawnRuns& drawn) {
 }
 
 /// The sum of quantities and products of two that explains the error.
-Table term_table(const DrawnRuns& drawn, std::size_t quantity) {
+/// @param position  Of a run: what each adds to its error, less the mean of all.
+Table term_table(const DrawnRuns& drawn, std::size_t quantity,
+                 std::optional<std::size_t> position) {
   const std::vector<ExplanatoryTerm> terms = terms_of(drawn, quantity);
   if (terms.empty()) return {.notes = {not_found_text(drawn)}};
+  const Quantity& info = drawn.quantities[quantity];
   Table table{.columns = {{"error as a sum of", true, 44},
-                          {"slope", false, 12},
+                          {position ? "of this run" : "slope", false, 12},
                           {"of variance", false, 13},
-                          {"p", false, 11}},
-              .notes = {"slope: in SI units; of variance: R², beyond that of the terms above; p: "
-                        "that chance alone makes one of all quantities and products of two look "
-                        "so"}};
+                          {"p", false, 11}}};
+  table.notes = {
+      fmt::format("{}; of variance: R², beyond that of the terms above; p: that chance "
+                  "alone makes one of all quantities and products of two look so in one "
+                  "of {} errors",
+                  position ? fmt::format("of this run: what the term, less its mean, "
+                                         "adds to the error, {}",
+                                         info.display_unit)
+                           : "slope: in SI units",
+                  drawn.errors.size())};
   for (const ExplanatoryTerm& term : terms) {
-    table.rows.push_back({term_name(drawn, term), fmt::format("{:.3g}", term.slope),
+    double figure = term.slope;
+    if (position) {
+      const std::vector<double> values = values_of_term(drawn, term);
+      figure *= (values[*position] - moments(values).mean) / info.display_scale;
+    }
+    table.rows.push_back({term_name(drawn, term), fmt::format("{:.3g}", figure),
                           fmt::format("{:.1f} %", 100.0 * term.share), p_value_cell(term.p_value)});
   }
   return table;
@@ -232,6 +257,19 @@ Json json_of_terms(const DrawnRuns& drawn, std::size_t quantity) {
 
 }  // namespace
 
+std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quantity) {
+  return explanatory_terms(inputs_of(drawn), drawn.errors[quantity], num_terms_max,
+                           default_confidence, drawn.errors.size());
+}
+
+std::vector<double> values_of_term(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  std::vector<double> values = drawn.columns[term.first];
+  if (!term.second) return values;
+  const std::vector<double>& other = drawn.columns[*term.second];
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] *= other[i];
+  return values;
+}
+
 std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
   const std::string& first = drawn.names[term.first];
   if (!term.second) return first;
@@ -277,16 +315,14 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
   const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
   Table drivers = driver_table(drawn, of_error, "error", std::nullopt);
   if (!of_error.empty() || !of_magnitude.empty()) {
-    drivers.notes.push_back(
-        fmt::format("% of variance: with its 95 % interval; rank: rank correlation; p: that chance "
-                    "alone makes one of {} quantities look so influential (Kruskal-Wallis, Holm)",
-                    both[1].size()));
+    drivers.notes.push_back("% of variance: with its 95 % interval; rank: rank correlation; " +
+                            note_of_p(both[1].size(), drawn.errors.size()));
   }
   return fmt::format(
       "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", drawn.quantities[quantity].symbol, drawn.runs.size(),
       limit_line(drawn), left_out(drawn),
       terminal_text(driver_table(drawn, of_magnitude, "|error|", std::nullopt), style),
-      terminal_text(drivers, style), terminal_text(term_table(drawn, quantity), style),
+      terminal_text(drivers, style), terminal_text(term_table(drawn, quantity, {}), style),
       worst_run_text(drawn, quantity, !of_error.empty() || !of_magnitude.empty()));
 }
 
@@ -297,12 +333,18 @@ std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIn
   const Quantity& info = drawn.quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];
   const auto both = sensitivities_of(drawn, quantity);
-  return fmt::format(
-      "Run {}: error of {} {}, rank {} of {}\n{}{}\n{}\n{}", run.value, info.symbol,
-      quantity_text(errors[position], info), rank_of(errors, position), errors.size(),
-      limit_line(drawn), left_out(drawn),
-      terminal_text(driver_table(drawn, first_of(both[1], num_rows), "|error|", position), style),
-      terminal_text(driver_table(drawn, first_of(both[0], num_rows), "error", position), style));
+  const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
+  Table drivers = driver_table(drawn, of_error, "error", position);
+  if (!of_error.empty() || !of_magnitude.empty()) {
+    drivers.notes.push_back("% below: of the runs; " +
+                            note_of_p(both[1].size(), drawn.errors.size()));
+  }
+  return fmt::format("Run {}: error of {} {}, rank {} of {}\n{}{}\n{}\n{}\n{}", run.value,
+                     info.symbol, quantity_text(errors[position], info), rank_of(errors, position),
+                     errors.size(), limit_line(drawn), left_out(drawn),
+                     terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
+                     terminal_text(drivers, style),
+                     terminal_text(term_table(drawn, quantity, position), style));
 }
 
 std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,

@@ -48,6 +48,13 @@ inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 /// Parts of a sum that explain an error that are searched for at most.
 inline constexpr std::size_t num_terms_max = 3;
 
+/// The terms that explain a quantity's error.
+[[nodiscard]] std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quantity);
+
+/// The values that a term has in the runs.
+[[nodiscard]] std::vector<double> values_of_term(const DrawnRuns& drawn,
+                                                 const ExplanatoryTerm& term);
+
 /// The name of a column, of its square or of the product of two: `truth_gain × truth_offset_m`.
 [[nodiscard]] std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term);
 
@@ -64,7 +71,8 @@ inline constexpr std::size_t num_rows_by_default = 5;
                                            Paint paint = Paint::no);
 
 /// Why a run is as far off as it is: the place of its |error| among the runs, and its values of the
-/// quantities that drive |error| and error of the parameter, each with its percentile.
+/// quantities that drive |error| and error of the parameter, each with its percentile, and what the
+/// terms add to its error.
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
 [[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
                                            RunIndex run, std::optional<std::size_t> num_rows = {},

@@ -150,11 +150,13 @@ std::vector<Ranks> ranks_of_all(std::span<const Column> outputs) {
   return ranks;
 }
 
-void adjust(std::vector<Sensitivity>& of_output) {
+void adjust(std::vector<Sensitivity>& of_output, std::size_t num_outputs) {
   std::vector<double> p_values;
   for (const Sensitivity& one : of_output) p_values.push_back(one.first_order.p_value);
   const std::vector<double> adjusted = holm_adjusted(p_values);
-  for (std::size_t i = 0; i < of_output.size(); ++i) of_output[i].adjusted_p_value = adjusted[i];
+  for (std::size_t i = 0; i < of_output.size(); ++i) {
+    of_output[i].adjusted_p_value = std::min(1.0, static_cast<double>(num_outputs) * adjusted[i]);
+  }
 }
 
 void rank(std::vector<Sensitivity>& of_output, double significance) {
@@ -170,7 +172,7 @@ void rank(std::vector<Sensitivity>& of_output, double significance) {
 
 std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inputs,
                                                     std::span<const Column> outputs,
-                                                    double confidence) {
+                                                    double confidence, std::size_t num_outputs) {
   std::vector<std::vector<Sensitivity>> all(outputs.size());
   if (inputs.empty() || outputs.empty()) return all;
   const std::vector<Ranks> output_ranks = ranks_of_all(outputs);
@@ -190,7 +192,7 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
     }
   }
   for (std::vector<Sensitivity>& of_output : all) {
-    adjust(of_output);
+    adjust(of_output, num_outputs);
     rank(of_output, 1.0 - confidence);
   }
   return all;

@@ -33,7 +33,7 @@ struct Sensitivity {
   std::size_t input = 0;          ///< Index of the column.
   double rank_correlation = 0.0;  ///< Of input and output.
   FirstOrderIndex first_order;
-  /// p_value of the index, corrected by holm_adjusted() for all inputs that vary.
+  /// p_value of the index, corrected by holm_adjusted() for all inputs that vary, and for outputs.
   double adjusted_p_value = 1.0;
 };
 
@@ -47,10 +47,12 @@ using Column = std::span<const double>;
 ///
 /// Takes some 0.1 s for a million runs, an input and an output.
 ///
+/// @param num_outputs  That somebody looks at, these among them: p-values are multiplied by it.
 /// @throws InvalidArgument if columns differ in size, have too few values or one is not finite.
 [[nodiscard]] std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inputs,
                                                                   std::span<const Column> outputs,
-                                                                  double confidence);
+                                                                  double confidence,
+                                                                  std::size_t num_outputs);
 
 /// One input, or the product of two, as a term of a sum that explains an output.
 struct ExplanatoryTerm {
@@ -65,11 +67,12 @@ struct ExplanatoryTerm {
 ///
 /// 1. Of all inputs and all products of two inputs, squares among them, the one with the largest
 ///    linear correlation with what is left of the output is the candidate.
-/// 2. It is kept if its p-value times the number of all inputs and products is below
-///    1 − confidence, and it explains at least `term_share_min` of the output's variance. A product
-///    must explain more than its factors do: both are fitted linearly and taken from product and
-///    output first, as in x y the factor y ≈ 1 would else make a driver of any x. If it is not
-///    kept, the next one by correlation is asked, of num_term_candidates at most.
+/// 2. It is kept if its p-value times the number of all inputs and products, and times that of the
+///    outputs that somebody looks at, is below 1 − confidence, and it explains at least
+///    `term_share_min` of the output's variance. A product must explain more than its factors do:
+///    both are fitted linearly and taken from product and output first, as in x y the factor y ≈ 1
+///    would else make a driver of any x. If it is not kept, the next one by correlation is asked,
+///    of num_term_candidates at most.
 /// 3. The output is fitted again by all terms, least squares with a constant, and what is left goes
 ///    on to 1.
 ///
@@ -84,14 +87,16 @@ struct ExplanatoryTerm {
 ///         one is not finite; confidence must be in (0, 1).
 [[nodiscard]] std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs,
                                                              Column output, std::size_t num_max,
-                                                             double confidence);
+                                                             double confidence,
+                                                             std::size_t num_outputs);
 
 /// The share of an output's variance that a term has to explain to be found by explanatory_terms()
 /// in half of all samples of this size: z²/n, where the normal law exceeds z with the probability
 /// that a candidate is kept at, as the statistic of a term with the correlation r is about r√n.
 ///
 /// @return At least term_share_min; above 1 if no term would be found so often.
-[[nodiscard]] double term_share_found(std::span<const Column> inputs, double confidence);
+[[nodiscard]] double term_share_found(std::span<const Column> inputs, double confidence,
+                                      std::size_t num_outputs);
 
 /// Smallest share of the variance that a term must explain.
 inline constexpr double term_share_min = 0.01;

@@ -93,8 +93,11 @@ struct Candidate {
 
 class TermSearch {
  public:
-  TermSearch(std::span<const Column> inputs, Column output)
-      : output_(centred(output)), rest_(output_), variance_(dot(output_, output_)) {
+  TermSearch(std::span<const Column> inputs, Column output, std::size_t num_outputs)
+      : num_outputs_(static_cast<double>(num_outputs)),
+        output_(centred(output)),
+        rest_(output_),
+        variance_(dot(output_, output_)) {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       const double largest = std::abs(
           *std::ranges::max_element(inputs[i], {}, [](double value) { return std::abs(value); }));
@@ -188,8 +191,9 @@ class TermSearch {
       const double product = dot(values, rest_);
       const double share = product * product / square / variance_;
       if (share < term_share_min) continue;
-      const double p_value = std::min(
-          num_terms_of(columns_.size()) * p_value_of(candidate, values_of(candidate)), 1.0);
+      const double p_value = std::min(num_outputs_ * num_terms_of(columns_.size()) *
+                                          p_value_of(candidate, values_of(candidate)),
+                                      1.0);
       if (p_value >= significance) continue;
       kept_.push_back(candidate);
       remove(values, rest_);
@@ -225,6 +229,7 @@ class TermSearch {
     }
   }
 
+  double num_outputs_;
   std::vector<std::size_t> positions_;  ///< Of the inputs that vary.
   std::vector<double> units_;
   std::vector<Values> columns_;
@@ -238,21 +243,24 @@ class TermSearch {
 }  // namespace
 
 std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs, Column output,
-                                               std::size_t num_max, double confidence) {
+                                               std::size_t num_max, double confidence,
+                                               std::size_t num_outputs) {
   detail::check_fraction("confidence", confidence);
   detail::check_values("output", output, sensitivity_values_min);
   for (const Column input : inputs) {
     detail::check_same_size("input", input, output);
     detail::check_values("input", input, sensitivity_values_min);
   }
-  return TermSearch(inputs, output).run(num_max, 1.0 - confidence);
+  return TermSearch(inputs, output, num_outputs).run(num_max, 1.0 - confidence);
 }
 
-double term_share_found(std::span<const Column> inputs, double confidence) {
+double term_share_found(std::span<const Column> inputs, double confidence,
+                        std::size_t num_outputs) {
   detail::check_fraction("confidence", confidence);
   const auto num_inputs = static_cast<std::size_t>(std::ranges::count_if(inputs, detail::varies));
   if (num_inputs == 0) return 1.0;
-  const double significance = (1.0 - confidence) / num_terms_of(num_inputs);
+  const double significance =
+      (1.0 - confidence) / static_cast<double>(num_outputs) / num_terms_of(num_inputs);
   const double square = chi_square_quantile(1.0 - significance, 1.0);  // Of a normal deviate.
   return std::max(square / static_cast<double>(inputs.front().size()), term_share_min);
 }

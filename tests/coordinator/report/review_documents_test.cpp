@@ -201,7 +201,7 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
   review.causes->terms = {term("true a × b", 0.982), term("c", 0.01)};
   EXPECT_THAT(sentences_of(review)[3],
               HasSubstr("100 nm or 100 % of its objective; of the variance of this error over the "
-                        "draws, 98.2 % follows from true a × b."));
+                        "draws, 98.2 % goes with true a × b."));
 }
 
 TEST_F(ReviewSummary, HoldsWithoutObjectivesAndBudget) {

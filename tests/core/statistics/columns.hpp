@@ -56,7 +56,7 @@ inline std::vector<double> differences_of(std::span<const double> first,
 /// That of sensitivities() of one input and one output; empty if one of them does not vary.
 inline std::optional<FirstOrderIndex> first_order_index(const Column& input, const Column& output,
                                                         double confidence) {
-  const auto all = sensitivities({&input, 1}, {&output, 1}, confidence);
+  const auto all = sensitivities({&input, 1}, {&output, 1}, confidence, 1);
   if (all[0].empty()) return std::nullopt;
   return all[0][0].first_order;
 }

@@ -64,7 +64,7 @@ class SensitivitiesOfAnError : public testing::Test {
 };
 
 TEST_F(SensitivitiesOfAnError, AreRankedByTheirIndex) {
-  const auto all = sensitivities(input_columns_, output_columns_, 0.95);
+  const auto all = sensitivities(input_columns_, output_columns_, 0.95, 1);
   ASSERT_EQ(all.size(), 3u);
   ASSERT_EQ(all[0].size(), 3u);  // The fixed input explains nothing.
   EXPECT_EQ(all[0][0].input, 1u);
@@ -77,7 +77,7 @@ TEST_F(SensitivitiesOfAnError, AreRankedByTheirIndex) {
 }
 
 TEST_F(SensitivitiesOfAnError, AreThoseOfTheSingleFunctions) {
-  const auto all = sensitivities(input_columns_, output_columns_, 0.9);
+  const auto all = sensitivities(input_columns_, output_columns_, 0.9, 1);
   const Sensitivity& first = all[0][0];
   EXPECT_EQ(first.rank_correlation, rank_correlation(inputs_[1], outputs_[0]));
   const auto index = test::first_order_index(inputs_[1], outputs_[0], 0.9);
@@ -88,7 +88,7 @@ TEST_F(SensitivitiesOfAnError, AreThoseOfTheSingleFunctions) {
 
 // The magnitude is even in its driver: no correlation sees it, the index does.
 TEST_F(SensitivitiesOfAnError, FindTheDriverOfAMagnitude) {
-  const auto all = sensitivities(input_columns_, output_columns_, 0.95);
+  const auto all = sensitivities(input_columns_, output_columns_, 0.95, 1);
   EXPECT_EQ(all[1][0].input, 1u);
   EXPECT_GT(all[1][0].first_order.index, 0.7);
   EXPECT_LT(std::abs(all[1][0].rank_correlation), 0.1);
@@ -97,10 +97,10 @@ TEST_F(SensitivitiesOfAnError, FindTheDriverOfAMagnitude) {
 TEST_F(SensitivitiesOfAnError, RefuseColumnsThatDoNotFit) {
   const std::vector<double> few(10, 1.0);
   EXPECT_EQ(test::message_of<InvalidArgument>(
-                [&] { (void)sensitivities(std::vector<Column>{few}, output_columns_, 0.95); }),
+                [&] { (void)sensitivities(std::vector<Column>{few}, output_columns_, 0.95, 1); }),
             "input = 10 values (must be as many as the others, 2000)");
   EXPECT_EQ(test::message_of<InvalidArgument>([&] {
-              (void)sensitivities(std::vector<Column>{few}, std::vector<Column>{few}, 0.95);
+              (void)sensitivities(std::vector<Column>{few}, std::vector<Column>{few}, 0.95, 1);
             }),
             "output = 10 values (must be at least 16)");
 }
