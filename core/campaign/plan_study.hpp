@@ -55,7 +55,10 @@ struct PlanScope {
   int num_steps_min = 1;  ///< That a session may have.
   int num_steps_max = 0;
   std::size_t num_instruments = 0;  ///< Drawn, that a bound is the mean over.
-  std::size_t num_probed = 0;       ///< Runs whose loops were simulated, with their noise.
+  std::size_t num_probed = 0;       ///< Runs that were simulated, in short sessions.
+  /// Of these, those whose data do not fit what the method takes them for: its errors are larger
+  /// than the bound.
+  std::size_t num_misfits = 0;
 };
 
 /// What the sessions of a campaign's runs find out together, whatever their lengths are.

@@ -99,6 +99,17 @@ void add_losses(const Planned& plan, Table& table) {
       "run");
 }
 
+void add_misfits(const PlanScope& scope, Table& table) {
+  if (scope.num_misfits == 0) return;
+  table.remarks.push_back(
+      {fmt::format("the data of {} of {} probed runs do not fit the model of {}", scope.num_misfits,
+                   scope.num_probed, scope.method),
+       Tone::bad});
+  table.notes.push_back(
+      "where data do not fit, errors are larger than σ and the chances above are too high; "
+      "`report` of some runs tells which sessions do not fit");
+}
+
 /// Names the parameters whose objectives are small against what the sessions tell of them.
 void add_undetermined(const Planned& plan, Table& table) {
   for (std::size_t i = 0; i < plan.objectives.size(); ++i) {
@@ -141,6 +152,7 @@ Table bound_table(const Planned& plan) {
       plan.study.scope().method, plan.study.scope().num_instruments));
   add_undetermined(plan, table);
   add_losses(plan, table);
+  add_misfits(plan.study.scope(), table);
   if (!plan.note.empty()) table.notes.push_back(plan.note);
   return table;
 }
@@ -176,6 +188,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"step_name", built_in_model().step_name()},
             {"num_instruments", plan.study.scope().num_instruments},
             {"num_probed", plan.study.scope().num_probed},
+            {"num_misfits", plan.study.scope().num_misfits},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", plan.bound.mean_budget},
             {"losses", Json::array()},
@@ -248,9 +261,10 @@ AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) 
   return rule;
 }
 
-/// Lost runs have an exit code of their own, because the figures are those of the others.
+/// Lost runs and misfits have an exit code of their own, because the figures are not theirs.
 int exit_code_of(const Planned& plan) {
-  return plan.bound.losses.empty() ? exit_done : exit_not_met;
+  const bool holds = plan.bound.losses.empty() && plan.study.scope().num_misfits == 0;
+  return holds ? exit_done : exit_not_met;
 }
 
 /// An allocation, and whether a signal ended the search for a better one.

@@ -147,6 +147,22 @@ void check_orbit(const OrbitConfig& orbit) {
       fmt::format("perigee must be above the ground, not {:.0f} km high", 1e-3 * altitude_m));
 }
 
+/// Thrusters that cannot give the commanded push leave its lines to whatever they do instead.
+void check_thrust(const Scenario& scenario) {
+  const double limit_m_s2 = scenario.realism ? scenario.realism->thrust_limit_m_s2 : 0.0;
+  if (limit_m_s2 == 0.0) return;
+  for (const Session& session : scenario.sessions) {
+    for (const Excitation& excitation : session.excitations) {
+      if (excitation.kind != ExcitationKind::drag_free || excitation.amplitude < limit_m_s2) {
+        continue;
+      }
+      throw ConfigError("realism.thrust_limit_m_s2", fmt::format("{}", limit_m_s2),
+                        fmt::format("must be above the {} m/s² that session {} pushes with",
+                                    excitation.amplitude, session.name));
+    }
+  }
+}
+
 /// a_d11' holds what the constant accelerations of its own session make of the quadratic factors.
 /// Where a test holds another mass, that differs by up to 2 K2d b_1d = 4e-4 of the 3e-10 m/s² that
 /// the loop leaves at f_EP of a test that spins: 3e-14 of δ.
@@ -195,6 +211,13 @@ EnvironmentTable parse_environment(std::string_view text, const std::string& nam
 void check_joint_campaign(const MicroscopeCampaign& campaign) {
   const Scenario& scenario = campaign.scenario;
   check_joint_records(scenario.sessions, scenario.orbit.period_s, scenario.estimation.transient_s);
+  if (scenario.orbit.eccentricity > joint_eccentricity_max) {
+    throw ConfigError("orbit.eccentricity", fmt::format("{}", scenario.orbit.eccentricity),
+                      fmt::format("must be <= {} for estimation.method = \"joint\", which is of "
+                                  "first order in it",
+                                  joint_eccentricity_max));
+  }
+  check_joint_motions(scenario.sessions);
   check_joint_pushes(scenario.sessions,
                      push_limits(drawn_moments(campaign.dispersions),
                                  scenario.objectives[index(Parameter::a_d11_prime)]));
@@ -217,6 +240,7 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   try {
     campaign.validate();
     check_orbit(campaign.scenario.orbit);
+    check_thrust(campaign.scenario);
     check_tests(campaign.scenario.sessions);
     check_magnitudes(campaign);
     check_regressors(campaign.scenario);

@@ -91,24 +91,28 @@ MicroscopeCampaign measured_campaign(MicroscopeCampaign campaign) {
   return campaign;
 }
 
-/// Records what the health of the loops is judged by, and nothing else.
-constexpr EstimationMethodInfo probe_method{
-    .name = "probe",
-    .needs = [](const Session&) { return RecordNeeds{.signals = SignalSet::health}; },
-    .check = joint_method.check,
-    .estimate = joint_method.estimate,
+/// A run that was simulated, and what became of it.
+struct Probe {
+  RunRecord record;
+  bool is_misfit = false;  ///< Its data do not fit the model, beyond chance.
 };
 
 /// The first runs that have an instrument, with noise and the paper's loops.
-std::vector<RunRecord> probe_records(MicroscopeCampaign campaign,
-                                     const std::vector<RunIndex>& runs) {
+std::vector<Probe> probes_of(MicroscopeCampaign campaign, const std::vector<RunIndex>& runs) {
   campaign.scenario.realism.reset();
   campaign.scenario.controllers.clear();
   std::vector<RunRequest> requests;
   for (std::size_t i = 0; i < std::min(runs.size(), batch_lanes); ++i) {
     requests.push_back({runs[i], campaign.table_values(runs[i])});
   }
-  return RunPlan(campaign, probe_method).record_batch(requests, best_instruction_set());
+  const RunPlan plan(campaign, joint_method);
+  std::vector<Probe> probes;
+  for (RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
+    const RunResult result = plan.estimate(record);
+    const bool is_misfit = !result.fit.empty() && is_beyond_chance(result.fit[0], result.fit[1]);
+    probes.push_back({.record = std::move(record), .is_misfit = is_misfit});
+  }
+  return probes;
 }
 
 /// What the squares of a record would have been, had it been longer.
@@ -216,13 +220,14 @@ class JointStudy final : public PlanStudy {
                                 .laws = laws,
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};
-    probes_ = probe_records(brief, add_instruments(record.phasors, input));
+    probes_ = probes_of(brief, add_instruments(record.phasors, input));
     scope_ = {
         .method = std::string(joint_method.name),
         .num_steps_min = joint_orbits_min(scenario.orbit.period_s, scenario.estimation.transient_s),
         .num_steps_max = num_session_orbits_max,
         .num_instruments = instruments_.size(),
-        .num_probed = probes_.size()};
+        .num_probed = probes_.size(),
+        .num_misfits = static_cast<std::size_t>(std::ranges::count_if(probes_, &Probe::is_misfit))};
     for (const Session& session : whole_.scenario.sessions) {
       if (is_test(session)) {
         scope_.num_steps_beside += session.num_orbits;
@@ -356,13 +361,14 @@ class JointStudy final : public PlanStudy {
     const ShiftBounds bounds(scenario);
     std::vector<PlanLoss> losses;
     for (std::size_t k = 0; k < probes_.size(); ++k) {
-      HealthRecord record = probes_[k].health;
+      const RunRecord& probe = probes_[k].record;
+      HealthRecord record = probe.health;
       for (std::size_t i = 0; i < record.size(); ++i) {
         lengthen(record[i].monitor, static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
       }
       const bool are_usable = std::ranges::all_of(errors[k], is_in_range);
       const HealthFinding finding =
-          judge_health(scenario, bounds, record, probes_[k].phasors, probes_[k].truth,
+          judge_health(scenario, bounds, record, probe.phasors, probe.truth,
                        are_usable ? std::span<const double>(errors[k]) : std::span<const double>());
       if (finding.loss.cause == LossCause::none) continue;
       PlanLoss loss = plan_loss(scenario, record, finding);
@@ -418,7 +424,7 @@ class JointStudy final : public PlanStudy {
   MicroscopeCampaign campaign_;       ///< Of those that calibrate.
   std::vector<int> measured_orbits_;  ///< Of each session: what `instruments_` is of.
   std::vector<JointInformation> instruments_;
-  std::vector<RunRecord> probes_;  ///< Of the first instruments.
+  std::vector<Probe> probes_;  ///< Of the first instruments.
   PlanScope scope_;
 };
 
@@ -426,7 +432,7 @@ class JointStudy final : public PlanStudy {
 
 std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign) {
   if (campaign.scenario.noise.scale == 0.0) {
-    throw ConfigError("noise.scale", "0", "must be > 0: without noise estimates have no errors");
+    throw ConfigError("noise.scale", "0", "must be > 0: standard errors are those of noise");
   }
   return std::make_unique<JointStudy>(campaign);
 }

@@ -5,6 +5,8 @@
 
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
+#include "core/microscope/campaign/regressor_lines.hpp"
+#include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/line_fit.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 #include "core/signal/band_pass.hpp"
@@ -43,6 +45,10 @@ double residual_amplitude(const Scenario& scenario, const SessionHealth& session
   return largest * (1.0 + fourth) / fourth;
 }
 
+double square_density(const Scenario& scenario, double squares, const QuietSums& quiet) {
+  return density(squares, quiet.num_steps, scenario.simulation.sample_period_s);
+}
+
 /// Power of the noise at the session's lines over that of the squared signal there: cosine and sine
 /// of a line each have the variance S/duration.
 double square_noise_of(const Scenario& scenario, const Session& session,
@@ -61,17 +67,50 @@ double square_noise_of(const Scenario& scenario, const Session& session,
     default:
       return 0.0;
   }
-  if (quiet.num_steps == 0.0) return 0.0;
-  const double duration_s =
-      session.num_orbits * scenario.orbit.period_s - scenario.estimation.transient_s;
   double signal = 0.0;
   for (std::size_t i = 0; i < phasors.num_fit_lines; ++i) {
     signal += std::norm(phasors.amplitude[index(Signal::product)][i]);
   }
-  const double noise = 2.0 *
-                       density(squares, quiet.num_steps, scenario.simulation.sample_period_s) /
-                       duration_s * static_cast<double>(phasors.num_fit_lines);
-  return noise / signal;
+  return 2.0 * square_density(scenario, squares, quiet) / fit_duration_s(scenario, session) *
+         static_cast<double>(phasors.num_fit_lines) / signal;
+}
+
+/// The same where one fit reads the squares of both sensors at lines of all sessions: each counts
+/// by its power.
+double square_noise_of_all(const Scenario& scenario, const RunPhasors& phasors,
+                           const QuietSums& quiet) {
+  const EstimationMethodInfo& method = estimation_method(scenario.estimation.method);
+  std::array<double, 2> signal{};
+  for (std::size_t i = 0; i < phasors.size(); ++i) {
+    const Session& session = scenario.sessions[i];
+    const std::vector<WantedLine> lines = method.needs(session).lines;
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      if (lines[k].signals != LineSignals::squares) continue;
+      for (std::size_t sensor = 0; sensor < signal.size(); ++sensor) {
+        signal[sensor] += fit_duration_s(scenario, session) *
+                          std::norm(phasors[i].lines[k][num_line_bases + sensor]);
+      }
+    }
+  }
+  double largest = 0.0;
+  for (std::size_t sensor = 0; sensor < signal.size(); ++sensor) {
+    const double noise = square_density(scenario, quiet.sensor_squares[sensor], quiet);
+    if (signal[sensor] > 0.0) largest = std::max(largest, 2.0 * noise / signal[sensor]);
+  }
+  return largest;
+}
+
+/// LoopHealth::square_noise of a run; 0 if no session watches the noise.
+double square_noise(const Scenario& scenario, const RunPhasors& phasors, const QuietSums& quiet) {
+  if (quiet.num_steps == 0.0) return 0.0;
+  const bool has_further_lines = std::ranges::any_of(
+      phasors, [](const SessionPhasors& of_session) { return !of_session.lines.empty(); });
+  if (has_further_lines) return square_noise_of_all(scenario, phasors, quiet);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < phasors.size(); ++i) {
+    largest = std::max(largest, square_noise_of(scenario, scenario.sessions[i], phasors[i], quiet));
+  }
+  return largest;
 }
 
 /// What is not a number counts as too large to be stored.
@@ -79,14 +118,12 @@ double bounded(double value) { return value <= magnitude_max ? value : magnitude
 
 /// Health of one session.
 LoopHealth session_health(const Scenario& scenario, const Session& session,
-                          const SessionHealth& record, const SessionPhasors& phasors,
-                          const QuietSums& quiet) {
+                          const SessionHealth& record, const SessionPhasors& phasors) {
   LoopHealth health{.acceleration_m_s2 = bounded(record.acceleration_m_s2),
                     .attitude_rad = bounded(record.attitude_rad)};
   // Loops that grew beyond all numbers left none to look at.
   const auto& differential = phasors.amplitude[index(Signal::differential_x)];
   if (!std::isfinite(differential[0].real())) health.acceleration_m_s2 = magnitude_max;
-  health.square_noise = bounded(square_noise_of(scenario, session, phasors, quiet));
   if (!record.is_quiet) return health;
   health.residual_m_s2 = bounded(residual_amplitude(scenario, record));
   health.quadratic_noise =
@@ -165,12 +202,13 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
   HealthFinding finding;
   for (std::size_t i = 0; i < record.size(); ++i) {
     const Session& session = scenario.sessions[i];
-    const LoopHealth health = session_health(scenario, session, record[i], phasors[i], quiet);
+    const LoopHealth health = session_health(scenario, session, record[i], phasors[i]);
     take_larger(finding.health, health);
     const bool is_saturated = health.acceleration_m_s2 > scenario.sensor.range_m_s2;
     if (finding.loss.cause != LossCause::none || !is_saturated) continue;
     finding.loss = {.cause = LossCause::saturation, .session = session.target};
   }
+  finding.health.square_noise = bounded(square_noise(scenario, phasors, quiet));
   if (finding.loss.cause == LossCause::none) {
     finding.loss = loss_by_shift(bounds, finding.health, truth, standard_errors);
   }

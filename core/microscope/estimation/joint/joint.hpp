@@ -76,6 +76,16 @@ struct PushLimits {
 };
 [[nodiscard]] PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective);
 
+/// Largest amplitude of a moving mass, m: what it makes of the noise of the estimated attitude is
+/// not in the standard errors (README.md).
+inline constexpr double joint_motion_max_m = 2e-5;
+
+/// @throws ConfigError if a mass moves farther.
+void check_joint_motions(const std::vector<Session>& sessions);
+
+/// Largest eccentricity: the model is of first order in it (README.md).
+inline constexpr double joint_eccentricity_max = 0.03;
+
 /// @throws ConfigError if a push is stronger.
 void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& limits);
 

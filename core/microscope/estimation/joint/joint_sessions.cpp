@@ -201,6 +201,21 @@ PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective) {
           .beside_others = std::sqrt(part / 1.5 / mean_square)};
 }
 
+void check_joint_motions(const std::vector<Session>& sessions) {
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const std::vector<Excitation>& excitations = sessions[i].excitations;
+    for (std::size_t k = 0; k < excitations.size(); ++k) {
+      if (excitations[k].kind != ExcitationKind::test_mass) continue;
+      if (excitations[k].amplitude <= joint_motion_max_m) continue;
+      throw ConfigError(fmt::format("session[{}].excitations[{}].amplitude_m", i, k),
+                        fmt::format("{}", excitations[k].amplitude),
+                        fmt::format("must be <= {} for estimation.method = \"joint\": of larger "
+                                    "motions errors exceed the standard errors",
+                                    joint_motion_max_m));
+    }
+  }
+}
+
 void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& limits) {
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     const std::vector<Excitation>& excitations = sessions[i].excitations;

@@ -224,17 +224,55 @@ TEST(PlanStudy, CountsRunsThatAreLost) {
   EXPECT_GE(some.num_lost(), 6U);
   const double part = static_cast<double>(some.num_lost()) / batch_lanes;
   EXPECT_NEAR(some.misses[index(Parameter::a_d12)], part, 1e-9);
-  campaign.scenario.sensor.range_m_s2 = 1e-5;
-  campaign.scenario.sessions[1].excitations[0].amplitude = 0.1;
+  campaign.scenario.sensor.range_m_s2 = 1e-9;
   const PlanBound all = lost_of();
   EXPECT_EQ(most_of().front().status, RunStatus::lost);
   EXPECT_EQ(all.misses_any, 1.0);
   ASSERT_EQ(all.losses.size(), 1U);
   EXPECT_EQ(all.losses[0].num_runs, batch_lanes);
   EXPECT_EQ(all.losses[0].cause, "saturation");
-  EXPECT_EQ(all.losses[0].session, "yz_yz");
+  const std::string& first = campaign.scenario.sessions.front().name;
+  EXPECT_EQ(all.losses[0].session, first);
   EXPECT_EQ(all.losses[0].detail,
-            "a sensor measures more than sensor.range_m_s2 = 1e-05 in session yz_yz");
+            "a sensor measures more than sensor.range_m_s2 = 1e-09 in session " + first);
+}
+
+// What the model leaves out is far above the noise of perfect sensors.
+TEST(PlanStudy, CountsRunsThatDoNotFit) {
+  MicroscopeCampaign campaign = simultaneous_campaign();
+  EXPECT_EQ(study_plan(campaign)->scope().num_misfits, 0U);
+  campaign.scenario.noise.scale = 1e-3;
+  EXPECT_EQ(study_plan(campaign)->scope().num_misfits, batch_lanes);
+}
+
+// The squares' noise has the fourth power of the loops' noise. A record that is as long again has
+// twice the signal; noise is watched only where nothing is shaken.
+TEST(PlanStudy, SeesTheNoiseOfSquaresOfAllSessionsTogether) {
+  constexpr std::size_t square_noise = 4;
+  const auto of = [](double noise_scale, int num_repetitions, bool is_watched) {
+    MicroscopeCampaign campaign = simultaneous_campaign();
+    campaign.scenario.noise.scale = noise_scale;
+    std::vector<Session>& sessions = campaign.scenario.sessions;
+    const std::vector<Session> once = sessions;
+    for (int i = 1; i < num_repetitions; ++i) {
+      for (Session session : once) {
+        session.name += "_again";
+        sessions.push_back(session);
+      }
+    }
+    if (is_watched) {
+      Session quiet = once.front();
+      quiet.name = "quiet";
+      quiet.excitations.clear();
+      sessions.push_back(quiet);
+    }
+    return RunPlan(campaign).simulate(RunIndex{0}, {}).health[square_noise];
+  };
+  EXPECT_EQ(of(5.0, 1, false), 0.0);
+  const double once = of(5.0, 1, true);
+  EXPECT_GT(once, 0.0);
+  EXPECT_NEAR(of(10.0, 1, true) / once, 16.0, 3.0);
+  EXPECT_NEAR(of(5.0, 2, true) / once, 0.5, 0.05);
 }
 
 // A misalignment that is to be known to 1e-13 rad is moved by the square of any angle.
