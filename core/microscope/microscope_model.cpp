@@ -16,6 +16,7 @@
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/campaign/loop_margins.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/definition/made_environment.hpp"
@@ -99,11 +100,37 @@ std::string loops_note(const Scenario& scenario) {
       axis_text(phase), of_realism);
 }
 
+/// The band-pass lets no drift through, but answers its beginning.
+std::string drift_note(const Scenario& scenario) {
+  constexpr double num_decays = 7.0;
+  if (!scenario.realism || estimation_method(scenario.estimation.method).has_standard_errors)
+    return {};
+  const auto& drifts = scenario.realism->bias_drift_m_s3;
+  if (std::ranges::all_of(drifts, [](double drift) { return drift == 0.0; })) return {};
+  double longest_s = 0.0;
+  for (const Session& session : scenario.sessions) {
+    if (is_test(session) || session.fit_lines.empty()) continue;
+    longest_s = std::max(longest_s, band_decay_s(scenario, session));
+  }
+  const double least_s = num_decays * longest_s;
+  if (scenario.estimation.transient_s >= least_s) return {};
+  return fmt::format(
+      "biases drift, and the filter's answer to the beginning of a record is not over after "
+      "estimation.transient_s = {} s: estimates may be off by several objectives; {:.0f} s would "
+      "do",
+      scenario.estimation.transient_s, std::ceil(least_s));
+}
+
 }  // namespace
 
 std::string MicroscopeCampaign::note() const {
-  const std::string unwatched = unwatched_note(scenario), loops = loops_note(scenario);
-  return unwatched.empty() || loops.empty() ? unwatched + loops : unwatched + "; " + loops;
+  std::string all;
+  for (const std::string& note :
+       {unwatched_note(scenario), loops_note(scenario), drift_note(scenario)}) {
+    if (!all.empty() && !note.empty()) all += "; ";
+    all += note;
+  }
+  return all;
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {

@@ -36,6 +36,10 @@ using SpectralLines = std::vector<SpectralLine>;
 [[nodiscard]] std::complex<double> drag_free_sensitivity(const DragFreeConfig& config,
                                                          double frequency_hz);
 
+/// Time in which what a session's band-pass answers to the beginning of a record decays by e, s:
+/// that of Butterworth's poles at its lower edge.
+[[nodiscard]] double band_decay_s(const Scenario& scenario, const Session& session);
+
 /// Time by which a fit divides the density of noise, s: cosine and sine of a line each have the
 /// variance S/duration.
 [[nodiscard]] double fit_duration_s(const Scenario& scenario, const Session& session);

@@ -163,6 +163,24 @@ void check_thrust(const Scenario& scenario) {
   }
 }
 
+/// As a mass begins to move along X, the band-pass answers with far more than K2 makes of the
+/// motion: after one decay it moves K2c by 2000 s²/m, after six by a hundredth of its objective.
+void check_transient(const Scenario& scenario) {
+  constexpr double num_decays = 6.0;
+  for (const Session& session : scenario.sessions) {
+    const Product product = target_info(session.target).product;
+    if (product != Product::sensor_1_squared && product != Product::sensor_2_squared) continue;
+    const double least_s = num_decays * band_decay_s(scenario, session);
+    if (scenario.estimation.transient_s >= least_s) continue;
+    throw ConfigError(
+        "estimation.transient_s", fmt::format("{}", scenario.estimation.transient_s),
+        fmt::format("must be {:.0f} or more with estimation.band_ratio = {}, so that "
+                    "the filter of session {} has forgotten how its mass began to "
+                    "move",
+                    std::ceil(least_s), scenario.estimation.band_ratio, session.name));
+  }
+}
+
 /// a_d11' holds what the constant accelerations of its own session make of the quadratic factors.
 /// Where a test holds another mass, that differs by up to 2 K2d b_1d = 4e-4 of the 3e-10 m/s² that
 /// the loop leaves at f_EP of a test that spins: 3e-14 of δ.
@@ -247,6 +265,8 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     check_independence(law_set(campaign.dispersions), campaign);
     if (estimation_method(campaign.scenario.estimation.method).name == joint_method.name) {
       check_joint_campaign(campaign);
+    } else {
+      check_transient(campaign.scenario);
     }
   } catch (const ConfigError& error) {
     throw document.located(error);
