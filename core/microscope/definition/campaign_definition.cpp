@@ -164,9 +164,9 @@ void check_thrust(const Scenario& scenario) {
 }
 
 /// As a mass begins to move along X, the band-pass answers with far more than K2 makes of the
-/// motion: after one decay it moves K2c by 2000 s²/m, after six by a hundredth of its objective.
+/// motion: after one decay it moves K2c by 2,000 s²/m, after four by a thirtieth of its objective.
 void check_transient(const Scenario& scenario) {
-  constexpr double num_decays = 6.0;
+  constexpr double num_decays = 4.0;
   for (const Session& session : scenario.sessions) {
     const Product product = target_info(session.target).product;
     if (product != Product::sensor_1_squared && product != Product::sensor_2_squared) continue;
