@@ -94,7 +94,7 @@ ParameterArray allowance_for_biases(const MicroscopeCampaign& campaign) {
 
 void expect_recovery(const MicroscopeCampaign& campaign, const ParameterArray& allowance) {
   campaign.validate();
-  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  const RunResult result = test::simulated(RunPlan(campaign), 1).front();
   ASSERT_EQ(result.status, RunStatus::completed);
   for (const test::ParameterInfo& info : test::parameter_infos()) {
     EXPECT_LE(std::abs(result.error(index(info.parameter))), allowance[index(info.parameter)])
@@ -309,7 +309,7 @@ TEST(RecoveryInAFrameThatSpins, FindsTheCentrifugalAccelerationInADPrime) {
     excite(campaign, Parameter::k2c);
     test::fix(campaign, "offcentring_m.x", offcentring_S_m);
     test::spin_sessions(campaign, 4.5);
-    return RunPlan(campaign).simulate(RunIndex{0}, {}).error(index(Parameter::a_d11_prime));
+    return test::simulated(RunPlan(campaign), 1).front().error(index(Parameter::a_d11_prime));
   };
   const MicroscopeCampaign campaign;
   const double mean_motion = 2.0 * std::numbers::pi / campaign.scenario.orbit.period_s;

@@ -45,6 +45,9 @@ double residual_amplitude(const Scenario& scenario, const SessionHealth& session
   return largest * (1.0 + fourth) / fourth;
 }
 
+/// What is not a number counts as too large to be stored.
+double bounded(double value) { return value <= magnitude_max ? value : magnitude_max; }
+
 double square_density(const Scenario& scenario, double squares, const QuietSums& quiet) {
   return density(squares, quiet.num_steps, scenario.simulation.sample_period_s);
 }
@@ -95,7 +98,8 @@ double square_noise_of_all(const Scenario& scenario, const RunPhasors& phasors,
   double largest = 0.0;
   for (std::size_t sensor = 0; sensor < signal.size(); ++sensor) {
     const double noise = square_density(scenario, quiet.sensor_squares[sensor], quiet);
-    if (signal[sensor] > 0.0) largest = std::max(largest, 2.0 * noise / signal[sensor]);
+    if (signal[sensor] == 0.0) continue;  // No session has such a line.
+    largest = std::max(largest, bounded(2.0 * noise / signal[sensor]));
   }
   return largest;
 }
@@ -108,13 +112,11 @@ double square_noise(const Scenario& scenario, const RunPhasors& phasors, const Q
   if (has_further_lines) return square_noise_of_all(scenario, phasors, quiet);
   double largest = 0.0;
   for (std::size_t i = 0; i < phasors.size(); ++i) {
-    largest = std::max(largest, square_noise_of(scenario, scenario.sessions[i], phasors[i], quiet));
+    largest = std::max(largest,
+                       bounded(square_noise_of(scenario, scenario.sessions[i], phasors[i], quiet)));
   }
   return largest;
 }
-
-/// What is not a number counts as too large to be stored.
-double bounded(double value) { return value <= magnitude_max ? value : magnitude_max; }
 
 /// Health of one session.
 LoopHealth session_health(const Scenario& scenario, const Session& session,
@@ -208,7 +210,7 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
     if (finding.loss.cause != LossCause::none || !is_saturated) continue;
     finding.loss = {.cause = LossCause::saturation, .session = session.target};
   }
-  finding.health.square_noise = bounded(square_noise(scenario, phasors, quiet));
+  finding.health.square_noise = square_noise(scenario, phasors, quiet);
   if (finding.loss.cause == LossCause::none) {
     finding.loss = loss_by_shift(bounds, finding.health, truth, standard_errors);
   }
