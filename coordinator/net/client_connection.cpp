@@ -96,6 +96,12 @@ class ClientConnection::Impl {
     const double waited_s = config_.reply_wait.count();
     if (monitor_.is_connected()) fail(fmt::format("no answer within {:.3g} s", waited_s));
     if (refusal_) throw Error(*refusal_);
+    if (monitor_.is_unanswered()) {
+      fail(
+          fmt::format("accepts the connection and has not answered within {:.3g} s: stopped, "
+                      "overloaded, or no coordinator",
+                      waited_s));
+    }
     fail(fmt::format("nobody there; waited {:.3g} s", waited_s));
   }
 

@@ -12,6 +12,7 @@
 #include <zmq.hpp>
 
 #include "core/error.hpp"
+#include "proto/link/socket.hpp"
 #include "proto/wire/endpoint.hpp"
 
 namespace proofmass::wire {
@@ -56,6 +57,17 @@ std::string broken_off_text(const std::string& endpoint, const ClientSecurity& s
                          ? "it has another key than coordinator.pub, or none, or is no "
                            "coordinator"
                          : "it wants --keys, or is no coordinator");
+}
+
+/// Who breaks a handshake off does so at once; ZeroMQ gives up one that nobody answers after
+/// handshake_duration_max.
+constexpr Duration silent_handshake_min = handshake_duration_max / 2;
+
+std::string unanswered_text(const std::string& endpoint) {
+  return fmt::format(
+      "coordinator = {} (accepts the connection and does not answer: it is stopped or overloaded, "
+      "or no coordinator)",
+      endpoint);
 }
 
 }  // namespace
@@ -113,7 +125,11 @@ void ConnectionMonitor::update(TimePoint now) {
 }
 
 void ConnectionMonitor::take_in(const SocketEvent& event, TimePoint now) {
+  const std::optional<TimePoint> accepted_at = std::exchange(accepted_at_, std::nullopt);
   switch (event.kind) {
+    case ZMQ_EVENT_CONNECTED:
+      accepted_at_ = now;
+      break;
     case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
       is_connected_ = true;
       num_breaks_ = 0;
@@ -138,7 +154,11 @@ void ConnectionMonitor::take_in(const SocketEvent& event, TimePoint now) {
       break;
     case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
       // ZeroMQ tries again by itself.
-      if (++num_breaks_ >= breaks_before_report) report(broken_off_text(endpoint_, security_));
+      if (accepted_at && now - *accepted_at >= silent_handshake_min) {
+        report(unanswered_text(endpoint_));
+      } else if (++num_breaks_ >= breaks_before_report) {
+        report(broken_off_text(endpoint_, security_));
+      }
       break;
     default:
       break;

@@ -72,6 +72,9 @@ class ConnectionMonitor {
   /// True from a complete handshake to the loss of that connection.
   [[nodiscard]] bool is_connected() const { return is_connected_; }
 
+  /// True if the peer has accepted the connection and not yet answered, as one that is stopped.
+  [[nodiscard]] bool is_unanswered() const { return accepted_at_.has_value(); }
+
   /// Why the peer at the address does not let this program in, for people; once for each reason
   /// until a connection succeeds.
   [[nodiscard]] std::optional<std::string> take_refusal() { return std::exchange(news_, {}); }
@@ -90,8 +93,9 @@ class ConnectionMonitor {
   ClientSecurity security_;
   SocketEvents events_;
   bool is_connected_ = false;
-  int num_breaks_ = 0;              ///< Handshakes broken off without a reason, in a row.
-  std::set<std::string> reported_;  ///< Since the last connection.
+  std::optional<TimePoint> accepted_at_;  ///< Of a connection whose handshake is not over.
+  int num_breaks_ = 0;                    ///< Handshakes broken off without a reason, in a row.
+  std::set<std::string> reported_;        ///< Since the last connection.
   std::optional<std::string> news_;
   std::optional<TimePoint> retry_at_;
   Duration pause_;

@@ -18,7 +18,6 @@ namespace proofmass::wire {
 namespace {
 
 // Times in ms.
-constexpr int handshake_duration_max = 5000;
 // A host that is gone is noticed within 20 s, whether or not something is under way to it: by
 // probes after 10 s without traffic, or because what was sent is not confirmed.
 constexpr int tcp_idle_s = 10;
@@ -50,7 +49,7 @@ void limit(zmq::socket_t& socket, std::size_t message_size, int linger) {
   socket.set(zmq::sockopt::rcvhwm, unread_count_max);
   socket.set(zmq::sockopt::sndhwm, unsent_count_max);
   socket.set(zmq::sockopt::linger, linger);
-  socket.set(zmq::sockopt::handshake_ivl, handshake_duration_max);
+  socket.set(zmq::sockopt::handshake_ivl, static_cast<int>(handshake_duration_max.count()));
   // ZMTP's heartbeats stay off, for the same reason: the protocol has its own.
   socket.set(zmq::sockopt::tcp_keepalive, 1);
   socket.set(zmq::sockopt::tcp_keepalive_idle, tcp_idle_s);

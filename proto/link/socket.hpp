@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +21,9 @@ namespace proofmass::wire {
 // there. The sender of a message never waits: send with zmq::send_flags::dontwait. The number of
 // messages that wait to be received has no limit: a process that others can reach must watch its
 // memory.
+
+/// After it, ZeroMQ gives up a peer that does not answer.
+inline constexpr std::chrono::milliseconds handshake_duration_max{5000};
 
 /// A ROUTER, bound. With keys, an Authenticator must be bound in the same context before:
 /// peers that come earlier are refused.

@@ -213,13 +213,25 @@ TEST(ConnectionMonitor, TellsThatThePeerIsNoCoordinator) {
     std::optional<std::string> refusal;
     EXPECT_TRUE(peer.until([&] {
       stranger.serve();
-      peer.let_pass(std::chrono::seconds(31));
+      peer.let_pass(std::chrono::seconds(2));
       return (refusal = peer.monitor().take_refusal()).has_value();
     })) << greeting;
     EXPECT_EQ(refusal.value_or("none"),
               "coordinator = " + stranger.endpoint() +
                   " (breaks the connection off: it wants --keys, or is no coordinator)");
   }
+}
+
+// One that is stopped: the system accepts for it.
+TEST(ConnectionMonitor, TellsAPeerThatDoesNotAnswerFromOneThatBreaksOff) {
+  Stranger stranger("");
+  Peer peer(stranger.endpoint(), {});
+  EXPECT_TRUE(peer.until([&] { return peer.monitor().is_unanswered(); }));
+  peer.let_pass(std::chrono::seconds(5));
+  stranger.serve();
+  EXPECT_EQ(peer.refusal(), "coordinator = " + stranger.endpoint() +
+                                " (accepts the connection and does not answer: it is stopped or "
+                                "overloaded, or no coordinator)");
 }
 
 TEST(ConnectionMonitor, AddressThatCanNeverBeConnectedIsAnError) {
