@@ -84,7 +84,8 @@ void check(const proto::Hello& hello) {
   if (!hello.has_former()) return;
   require_in(hello.former().signal(), 0, signal_max, "former signal");
   (void)checked_id(hello.former().session(), "former session");
-  check_reason(hello.former().reason(), {LossReason::crashed, LossReason::out_of_memory});
+  check_reason(hello.former().reason(),
+               {LossReason::crashed, LossReason::out_of_memory, LossReason::preempted});
 }
 
 void check(const proto::Welcome& welcome) {

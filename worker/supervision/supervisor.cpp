@@ -109,14 +109,11 @@ class Supervisor {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
 
-  /// A child that somebody killed, or that hung, says nothing against its runs: the coordinator
-  /// hears no more of it, or has told it to end.
+  /// What the next child tells of one that a signal ended, so that nobody waits for its runs.
   static std::optional<proto::FormerSession> former_session(wire::SessionId session, int status,
                                                             bool is_memory_short) {
     const wire::LossReason reason = wire::reason_of_end(status, is_memory_short);
-    if (reason == wire::LossReason::failed || reason == wire::LossReason::preempted) {
-      return std::nullopt;
-    }
+    if (reason == wire::LossReason::failed) return std::nullopt;
     proto::FormerSession former;
     former.set_session(session.value);
     former.set_reason(wire::message_value(reason));

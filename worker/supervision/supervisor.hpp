@@ -41,7 +41,7 @@ class RestartPolicy {
 /// What a child process begins with.
 struct ChildStart {
   wire::SessionId session;
-  std::optional<proto::FormerSession> former;  ///< How the child before it crashed, if it did.
+  std::optional<proto::FormerSession> former;  ///< Of the child before it, if a signal ended it.
 };
 
 /// Signal by which a supervisor hands on to its child that it was asked to end; the value that

@@ -52,6 +52,22 @@ TEST_F(HostsTest, ACrashIsBelievedFromTheSameKeyOnTheSameHost) {
   EXPECT_TRUE(campaign(one).suspects.contains({0}));
 }
 
+// Its runs are free at once, and neither they nor the host are blamed.
+TEST_F(HostsTest, AKillIsNoCrash) {
+  add_campaign(one, 10);
+  join_and_take_runs(first, some_key);
+  proto::Hello successor = hello(1, "host");
+  *successor.mutable_former() = make_former(session_of(first), LossReason::preempted);
+  say_hello(second, successor, some_key);
+  outbox.forget();
+  EXPECT_FALSE(state.workers.contains(first));
+  EXPECT_EQ(num_crashes(some_key), 0U);
+  EXPECT_TRUE(campaign(one).suspects.empty());
+  heartbeat(second);
+  EXPECT_GT(state.workers.at(second).num_lent, 0U);
+  outbox.forget();
+}
+
 TEST_F(HostsTest, ACrashIsNotBelievedFromAnotherKeyOrHost) {
   add_campaign(one, 10);
   join_and_take_runs(first, some_key);
