@@ -141,26 +141,46 @@ std::string read_list(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-void add_pair(const std::filesystem::path& directory, KeyRole role, const std::string& name) {
-  if (!wire::is_name(name)) {
+/// A pair to add, of a name that is free: nothing is written before all are known to be.
+class NewPair {
+ public:
+  NewPair(const std::filesystem::path& directory, KeyRole role, const std::string& name)
+      : directory_(directory),
+        role_(role),
+        name_(checked(role, name)),
+        list_(directory / list_name(role)),
+        text_(read_list(list_)) {
+    wire::check_key_directory(directory);
+    for (const auto& [key, owner] : parse_allow_list(text_, domain_of(role), list_)) {
+      if (owner.name != name) continue;
+      throw UsageError(
+          fmt::format("--{} = {} (is in {} already)", to_text(role), name, list_.string()));
+    }
+    files_.emplace(directory, std::vector<std::string>{name + ".key", name + ".pub"});
+  }
+
+  void write() {
+    const wire::KeyPair pair = wire::make_key_pair();
+    wire::write_key_pair(directory_, name_, role_, pair);
+    if (!text_.empty() && text_.back() != '\n') text_ += '\n';
+    wire::write_whole_file("allow-list", list_, text_ + list_line(pair, name_), wire::trusted_mode,
+                           wire::IfThere::replace);
+    files_->keep();
+  }
+
+ private:
+  static const std::string& checked(KeyRole role, const std::string& name) {
+    if (wire::is_name(name)) return name;
     throw UsageError(fmt::format("--{} = {} ({})", to_text(role), name, is_name_rule));
   }
-  const std::filesystem::path list = directory / list_name(role);
-  std::string text = read_list(list);
-  wire::check_key_directory(directory);
-  for (const auto& [key, owner] : parse_allow_list(text, domain_of(role), list)) {
-    if (owner.name != name) continue;
-    throw UsageError(
-        fmt::format("--{} = {} (is in {} already)", to_text(role), name, list.string()));
-  }
-  FilesOfOneSet files(directory, {name + ".key", name + ".pub"});
-  const wire::KeyPair pair = wire::make_key_pair();
-  wire::write_key_pair(directory, name, role, pair);
-  if (!text.empty() && text.back() != '\n') text += '\n';
-  wire::write_whole_file("allow-list", list, text + list_line(pair, name), wire::trusted_mode,
-                         wire::IfThere::replace);
-  files.keep();
-}
+
+  std::filesystem::path directory_;
+  KeyRole role_;
+  std::string name_;
+  std::filesystem::path list_;
+  std::string text_;
+  std::optional<FilesOfOneSet> files_;
+};
 
 void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
                        std::string_view name) {
@@ -178,15 +198,22 @@ void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
 /// who may connect; or adds pairs to one. Says what to copy where.
 int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
   const std::filesystem::path& directory = options.directory;
-  if (options.worker) {
-    add_pair(directory, KeyRole::worker, *options.worker);
+  if (options.worker && options.worker == options.client) {
+    throw UsageError(
+        fmt::format("--client = {} (must be another name than that of --worker)", *options.client));
+  }
+  std::optional<NewPair> of_worker, of_client;
+  if (options.worker) of_worker.emplace(directory, KeyRole::worker, *options.worker);
+  if (options.client) of_client.emplace(directory, KeyRole::client, *options.client);
+  if (of_worker) {
+    of_worker->write();
     say_where_to_copy(directory, KeyRole::worker, *options.worker);
   }
-  if (options.client) {
-    add_pair(directory, KeyRole::client, *options.client);
+  if (of_client) {
+    of_client->write();
     say_where_to_copy(directory, KeyRole::client, *options.client);
   }
-  if (options.worker || options.client) return exit_done;
+  if (of_worker || of_client) return exit_done;
   make_whole_set(directory, is_stopped);
   fmt::print(
       "wrote {0}\nKeep this directory on the coordinator's machine:\n"
