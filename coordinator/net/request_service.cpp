@@ -95,7 +95,7 @@ proto::StatusReply RequestService::service_status() const {
   proto::StatusReply reply;
   reply.set_version(context_.config.version);
   reply.set_model_version(std::string(built_in_model().version()));
-  reply.set_uptime_s(seconds(now - began_at_));
+  reply.set_uptime_s(seconds(std::chrono::steady_clock::now() - began_at_));  // With stalls.
   reply.set_num_workers(state.workers.size());
   reply.set_num_slots(state.num_slots);
   reply.set_num_campaigns(campaigns_.num_campaigns());

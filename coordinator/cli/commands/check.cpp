@@ -77,7 +77,8 @@ std::string advice_to_plan(const CheckOptions& options, const Campaign& campaign
   } catch (const Error&) {
     return "";
   }
-  return fmt::format("see `proofmass plan {}`", options.file.string());
+  return fmt::format("see `proofmass plan {}`{}", options.file.string(),
+                     options.overrides.assignments.empty() ? "" : " with the same --set");
 }
 
 std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
