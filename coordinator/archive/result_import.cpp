@@ -37,7 +37,6 @@ constexpr std::size_t inputs_max = 900;  // A model draws 1,000 at most, and the
 struct ResultColumn {
   std::string heading;
   bool may_be_missing = false;  ///< Then its value is NaN.
-  bool is_standard_error = false;
   std::size_t position = 0;
   std::vector<double> values = {};
 };
@@ -83,9 +82,7 @@ void read_quantity(Document& document, const std::string& path, ImportSchema& sc
   document.read(path + ".estimate", estimate);
   const bool has_error = document.read(path + ".standard_error", error);
   schema.estimates.push_back({.heading = std::move(estimate), .may_be_missing = true});
-  if (has_error)
-    schema.errors.push_back(
-        {.heading = std::move(error), .may_be_missing = true, .is_standard_error = true});
+  if (has_error) schema.errors.push_back({.heading = std::move(error), .may_be_missing = true});
   Json quantity{{"name", name}, {"truth", name}, {"standard_error", has_error}};
   for (const char* const key : {"symbol", "unit", "display_unit"}) {
     copy_key<std::string>(document, path, key, quantity);
@@ -129,12 +126,6 @@ double number_in(const CsvReader& reader, const ResultColumn& column) {
     return std::numeric_limits<double>::quiet_NaN();
   }
   const double value = reader.number(column.position, column.heading);
-  if (column.is_standard_error && value <= 0.0) {
-    reader.refuse(
-        fmt::format("{} = {} (a standard error must be above 0; leave it empty if the run "
-                    "has none)",
-                    column.heading, value));
-  }
   if (column.may_be_missing || is_in_range(value)) return value;
   reader.refuse(fmt::format("{} = {} (must be in [-{:g}, {:g}])", column.heading, value,
                             magnitude_max, magnitude_max));

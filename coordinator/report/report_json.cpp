@@ -216,10 +216,6 @@ std::string report_json(const Review& review, std::span<const StatedRequirement>
   if (results.instruments) json["instruments"] = json_of(schema, *results.instruments);
   if (results.replicates) json["replicates"] = json_of(schema, *results.replicates);
   json["why_not_independent"] = review.why_not_independent;
-  json["stop_rule"] = nullptr;
-  if (!review.stop_rule.empty()) {
-    json["stop_rule"] = {{"rule", review.stop_rule}, {"is_met", !review.is_rule_missed}};
-  }
   for (const StatedRequirement& each : stated) {
     json["requirements"].push_back(json_of(answer_to(each, review)));
   }

@@ -45,9 +45,8 @@ constexpr std::size_t margin = 13;
 std::string missing_lines(const RequirementAnswer& answer) {
   const std::uint64_t num_missing = answer.check.num_without_estimate;
   if (num_missing == 0) return "";
-  return fmt::format("{0:{1}}{2} of {4} for want of an estimate:\n{0:{1}}{3}\n", "", margin,
-                     num_missing, reasons_text(answer.missing),
-                     answer.is_joint() ? "the others" : "them");
+  return fmt::format("{0:{1}}{2} of them for want of an estimate:\n{0:{1}}{3}\n", "", margin,
+                     num_missing, reasons_text(answer.missing));
 }
 
 /// How many runs exceed the limit, or in how many all objectives hold, and the bound that decides.

@@ -78,8 +78,6 @@ Review read_review(const Store& store, const Campaign& campaign, ReviewDepth dep
   store.read_one_state([&] {
     review = read_of_one_state(store, campaign, depth, std::move(stated));
     review.stop = stop_text(store);
-    review.stop_rule = store.stop_plan().stop_rule;
-    review.is_rule_missed = is_rule_missed(store);
   });
   return review;
 }

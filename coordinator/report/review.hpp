@@ -46,9 +46,7 @@ struct Review {
   std::optional<Causes> causes = {};       ///< Empty if runs are too few, or not asked for.
   std::optional<RunSpectra> spectra = {};  ///< Of worst_run_of(); empty if not asked for.
   CampaignExecution execution = {};
-  std::string stop = {};        ///< See stop_text().
-  std::string stop_rule = {};   ///< Of the campaign; empty if it has none.
-  bool is_rule_missed = false;  ///< See is_rule_missed().
+  std::string stop = {};  ///< See stop_text().
 };
 
 /// The run with the largest |error| of any quantity beside its objective; none if no run has an

@@ -77,8 +77,7 @@ std::string advice_to_plan(const CheckOptions& options, const Campaign& campaign
   } catch (const Error&) {
     return "";
   }
-  return fmt::format("see `proofmass plan {}`{}", options.file.string(),
-                     options.overrides.assignments.empty() ? "" : " with the same --set");
+  return fmt::format("see `proofmass plan {}`", options.file.string());
 }
 
 std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
