@@ -18,6 +18,7 @@
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -77,7 +78,13 @@ std::string advice_to_plan(const CheckOptions& options, const Campaign& campaign
   } catch (const Error&) {
     return "";
   }
-  return fmt::format("see `proofmass plan {}`", options.file.string());
+  // Without them it would tell of another campaign.
+  std::string command = "proofmass plan " + wire::shell_word(options.file.string());
+  for (const std::string& assignment : options.overrides.assignments) {
+    command += " --set " + wire::shell_word(assignment);
+  }
+  if (options.overrides.seed) command += fmt::format(" --seed {}", *options.overrides.seed);
+  return fmt::format("see `{}`", command);
 }
 
 std::string outlook_text(const CheckOptions& options, const Campaign& campaign,

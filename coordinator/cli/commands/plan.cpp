@@ -227,11 +227,18 @@ std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& 
 
 /// What is to be allocated. @throws UsageError if it cannot be, or no allocation is better.
 AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) {
+  const int least_of_method = study.scope().num_steps_min;
+  if (options.minimum < least_of_method) {
+    throw UsageError(
+        fmt::format("--minimum = {} (must be {} or more: less the transient at its beginning, a "
+                    "shorter session "
+                    "is too short for the method {})",
+                    options.minimum, least_of_method, study.scope().method));
+  }
   const std::vector<int>& of_file = study.scope().num_steps;
   const int in_all = options.num_steps.value_or(std::accumulate(of_file.begin(), of_file.end(), 0));
-  const AllocationRule rule{.num_steps = in_all,
-                            .minimum = std::max(options.minimum, study.scope().num_steps_min),
-                            .maximum = study.scope().num_steps_max};
+  const AllocationRule rule{
+      .num_steps = in_all, .minimum = options.minimum, .maximum = study.scope().num_steps_max};
   const auto refuse = [&](std::string_view limit, std::size_t number, std::string_view each) {
     throw UsageError(fmt::format("--{} = {} (must be {} or {}, {} for each of {} sessions)",
                                  built_in_model().step_name(), in_all, number, limit, each,
@@ -298,6 +305,30 @@ void print_changed_method(const Campaign& campaign, const std::string& method) {
   }
 }
 
+/// What the lengths in the campaign file promise, to be held beside the new ones.
+void print_former_chance(const Campaign& campaign, const PlanStudy& study) {
+  const Planned former = planned(campaign, study, study.scope().num_steps);
+  print_lines(fmt::format("before, with {} {}: all objectives hold in {} % of the runs\n",
+                          former.num_steps_in_all(), built_in_model().step_name(),
+                          percent_text(former.bound.misses_any)));
+}
+
+/// Names the data files that a new campaign file in another folder does not find.
+void print_absent_files(const Campaign& campaign, const PlanOptions& options) {
+  const std::filesystem::path folder = options.new_file.parent_path();
+  std::error_code failure;
+  std::vector<std::string> absent;
+  for (const DefinitionItem& item : campaign.items()) {
+    const auto* const file = std::get_if<std::string>(&item.value);
+    if (file == nullptr || file->empty() || !item.key.ends_with(".file")) continue;
+    const bool is_there = std::filesystem::exists(folder / *file, failure);
+    if (!is_there && std::ranges::find(absent, *file) == absent.end()) absent.push_back(*file);
+  }
+  if (absent.empty()) return;
+  print_lines(fmt::format("copy to its folder, as it names what is not there: {}\n",
+                          fmt::join(absent, ", ")));
+}
+
 /// Writes the best allocation, or the best so far if a signal ends the search.
 int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStudy& study) {
   Allocated best = allocated(options, study);
@@ -313,7 +344,9 @@ int optimise(const PlanOptions& options, const Campaign& campaign, const PlanStu
   }
   print_plan(options, plan);
   if (options.format == OutputFormat::text) {
+    print_former_chance(campaign, study);
     print_lines(fmt::format("wrote {}\n", options.new_file.string()));
+    print_absent_files(campaign, options);
     print_changed_method(campaign, plan.study.scope().method);
   }
   if (!best.is_interrupted) return exit_code_of(plan);
