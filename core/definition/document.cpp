@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -187,7 +188,7 @@ bool Document::read(const std::string& path, double& value, const Range& range) 
   const double number = found->is_integer() ? static_cast<double>(found->as_integer()->get())
                                             : found->as_floating_point()->get();
   if (!range.contains(number)) {
-    refuse(path, range.rule());
+    refuse(path, std::isfinite(number) ? range.rule() : range::any.rule());
     return false;
   }
   value = number;

@@ -92,6 +92,9 @@ void Phrase::refuse(std::string_view rule) const { throw ConfigError(field_, tex
 double Phrase::number() {
   double value = 0.0;
   const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+  if (error == std::errc::result_out_of_range) {
+    refuse(fmt::format("{} is out of the range of numbers", std::string_view(rest_.data(), end)));
+  }
   if (error != std::errc()) refuse_form();
   rest_ = without_blanks_in_front(rest_.substr(static_cast<std::size_t>(end - rest_.data())));
   return value;
