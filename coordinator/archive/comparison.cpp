@@ -141,6 +141,8 @@ void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
   if (!comparison.is_paired()) return;
   comparison.num_pairs = of_first.count(Partner::with_estimate);
   const std::size_t a = of_first.count(Partner::none), b = of_second.count(Partner::none);
+  comparison.num_alone_first = a;
+  comparison.num_alone_second = b;
   const bool are_many = std::max(a, b) >= std::max(comparison.num_pairs, std::size_t{2});
   if (!are_many || std::min(of_first.size(), of_second.size()) < 2) return;
   (a > b ? comparison.num_tested_first : comparison.num_tested_second) = std::max(a, b);

@@ -71,7 +71,9 @@ struct CampaignComparison {
   std::size_t num_first = 0;   ///< Runs of the first campaign with an estimate.
   std::size_t num_second = 0;  ///< Runs of the second campaign with an estimate.
   std::size_t num_pairs = 0;   ///< Runs with an estimate in both; 0 unless paired.
-  /// Runs that the other campaign has not computed, and that are tested beside the pairs.
+  /// Runs with an estimate that the other campaign has not computed; 0 unless paired.
+  std::size_t num_alone_first = 0, num_alone_second = 0;
+  /// Those of them that are tested beside the pairs.
   std::size_t num_tested_first = 0, num_tested_second = 0;
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;

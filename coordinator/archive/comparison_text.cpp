@@ -73,18 +73,31 @@ std::string how_compared(const ComparedMember& member, const ComparedMember& fir
                      comparison.num_pairs == 1 ? "run" : "runs");
 }
 
-/// Says what becomes of the runs of a campaign that have no pair in the other.
-/// @param num_tested  Of them.
-void add_unpaired(std::size_t num_unpaired, std::size_t num_tested, std::string_view name,
-                  std::string_view other, Table& table) {
-  if (num_unpaired == 0) return;
+/// Runs of a campaign with an estimate that are in no pair.
+struct Unpaired {
+  std::size_t num_runs = 0;
+  std::size_t num_alone = 0;   ///< Of them: not computed in the other campaign.
+  std::size_t num_tested = 0;  ///< Of these.
+};
+
+/// Says what becomes of them.
+void add_unpaired(const Unpaired& runs, std::string_view name, std::string_view other,
+                  Table& table) {
+  if (runs.num_runs == 0) return;
+  const std::size_t num_missing = runs.num_runs - runs.num_alone;
+  std::string what = "were not computed in " + std::string(other);
+  if (runs.num_alone == 0) {
+    what = "have no estimate in " + std::string(other);
+  } else if (num_missing > 0) {
+    what += fmt::format(" or, {} of them, have no estimate there", num_missing);
+  }
   table.notes.push_back(fmt::format(
-      "{} runs of {} have no estimate in {}: they count in bias, std and tail, not in change; {}",
-      num_unpaired, name, other,
-      num_tested == 0 ? "they are in no test"
-                      : fmt::format("the {} that {} has not computed are tested as a whole, and p "
-                                    "is twice the smaller of both tests",
-                                    num_tested, other)));
+      "{} runs of {} {}: they count in bias, std and tail, not in change; {}", runs.num_runs, name,
+      what,
+      runs.num_tested == 0 ? "they are in no test"
+                           : fmt::format("the {} not computed are tested as a whole, and p is "
+                                         "twice the smaller of both tests",
+                                         runs.num_tested)));
 }
 
 /// Names the quantities that only one of two campaigns has, which are not compared.
@@ -99,6 +112,12 @@ void add_own_quantities(const ComparedMember& first, const ComparedMember& other
   };
   add(first, first_name, other, other_name);
   add(other, other_name, first, first_name);
+}
+
+/// `B`, or `campaign.runs=10` of a sweep, whose names alone are numbers.
+std::string label(const MemberNames& names, std::size_t member) {
+  const std::string& name = names.names[member];
+  return names.title == lettered(0).title ? name : fmt::format("{}={}", names.title, name);
 }
 
 Table campaign_table(std::span<const ComparedMember> members, const MemberNames& names) {
@@ -120,10 +139,15 @@ Table campaign_table(std::span<const ComparedMember> members, const MemberNames&
     }
     if (member.comparison && member.comparison->num_pairs > 0) {
       const CampaignComparison& of = *member.comparison;
-      const std::string& first = names.names.front();
-      add_unpaired(of.num_first - of.num_pairs, of.num_tested_first, first, names.names[i], table);
-      add_unpaired(of.num_second - of.num_pairs, of.num_tested_second, names.names[i], first,
-                   table);
+      const std::string first = label(names, 0), other = label(names, i);
+      add_unpaired({.num_runs = of.num_first - of.num_pairs,
+                    .num_alone = of.num_alone_first,
+                    .num_tested = of.num_tested_first},
+                   first, other, table);
+      add_unpaired({.num_runs = of.num_second - of.num_pairs,
+                    .num_alone = of.num_alone_second,
+                    .num_tested = of.num_tested_second},
+                   other, first, table);
     }
     add_own_quantities(members.front(), member, names.names.front(), names.names[i], table);
     if (member.missing.total() == 0) continue;

@@ -207,9 +207,11 @@ TEST(Comparison, CountsAllRunsAndTestsPairsAndTheOthersTogether) {
   EXPECT_EQ(parameter.p_values.location, std::min(1.0, 2.0 * expected.location));
   EXPECT_EQ(parameter.p_values.scale, std::min(1.0, 2.0 * expected.scale));
   EXPECT_EQ(parameter.p_values.tail, std::min(1.0, 2.0 * expected.tail));
-  EXPECT_THAT(text_of(comparison),
-              HasSubstr("\n  change; the 4 that B has not computed are tested as a whole, and p is "
-                        "twice\n  the smaller of both tests\n"));
+  EXPECT_THAT(
+      text_of(comparison),
+      HasSubstr("5 runs of A were not computed in B or, 1 of them, have no estimate there: "
+                "they\n  count in bias, std and tail, not in change; the 4 not computed are "
+                "tested as a\n  whole, and p is twice the smaller of both tests\n"));
 }
 
 // Fewer than the pairs would cost these more than they tell.
@@ -221,7 +223,7 @@ TEST(Comparison, LeavesFewOthersOutOfTheTests) {
   }
   EXPECT_EQ(comparison.parameters[0].second.mean, 4.0);
   EXPECT_THAT(text_of(comparison),
-              HasSubstr("3 runs of B have no estimate in A: they count in bias, std and tail, not "
+              HasSubstr("3 runs of B were not computed in A: they count in bias, std and tail, not "
                         "in\n  change; they are in no test\n"));
 }
 
