@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "coordinator/campaign_file/data_file.hpp"
-#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
 #include "core/result_rules.hpp"
+#include "core/statistics/independence.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
 
@@ -37,6 +37,7 @@ constexpr std::size_t inputs_max = 900;  // A model draws 1,000 at most, and the
 struct ResultColumn {
   std::string heading;
   bool may_be_missing = false;  ///< Then its value is NaN.
+  bool is_positive = false;     ///< A standard error: other numbers are mistakes.
   std::size_t position = 0;
   std::vector<double> values = {};
 };
@@ -82,7 +83,10 @@ void read_quantity(Document& document, const std::string& path, ImportSchema& sc
   document.read(path + ".estimate", estimate);
   const bool has_error = document.read(path + ".standard_error", error);
   schema.estimates.push_back({.heading = std::move(estimate), .may_be_missing = true});
-  if (has_error) schema.errors.push_back({.heading = std::move(error), .may_be_missing = true});
+  if (has_error) {
+    schema.errors.push_back(
+        {.heading = std::move(error), .may_be_missing = true, .is_positive = true});
+  }
   Json quantity{{"name", name}, {"truth", name}, {"standard_error", has_error}};
   for (const char* const key : {"symbol", "unit", "display_unit"}) {
     copy_key<std::string>(document, path, key, quantity);
@@ -126,6 +130,9 @@ double number_in(const CsvReader& reader, const ResultColumn& column) {
     return std::numeric_limits<double>::quiet_NaN();
   }
   const double value = reader.number(column.position, column.heading);
+  if (column.is_positive && value <= 0.0) {
+    reader.refuse(fmt::format("{} = {} (must be > 0)", column.heading, value));
+  }
   if (column.may_be_missing || is_in_range(value)) return value;
   reader.refuse(fmt::format("{} = {} (must be in [-{:g}, {:g}])", column.heading, value,
                             magnitude_max, magnitude_max));
@@ -182,11 +189,34 @@ RunResult result_of(const ImportSchema& schema, std::size_t run) {
   return result;
 }
 
+/// Truths may be independent where errors are not: the lines may be in the order of their errors.
+void check_errors(const ImportSchema& schema, const wire::DescribedCampaign& campaign) {
+  if (!schema.is_independent) return;
+  const std::size_t num_inputs = schema.drawn.size() - schema.estimates.size();
+  for (std::size_t i = 0; i < schema.estimates.size(); ++i) {
+    std::vector<double> errors;
+    for (std::size_t run = 0; run < campaign.num_runs; ++run) {
+      const double estimate = schema.estimates[i].values[run];
+      if (is_in_range(estimate)) {
+        errors.push_back(estimate - schema.drawn[num_inputs + i].values[run]);
+      }
+    }
+    const std::string why = why_dependent(errors);
+    if (why.empty()) continue;
+    throw ConfigError(
+        "campaign.independent", "true",
+        fmt::format("{} - {} {}; leave the key out, or draw each row anew",
+                    schema.estimates[i].heading, schema.drawn[num_inputs + i].heading, why));
+  }
+}
+
 /// What a schema says that the campaign does not allow.
-void check(const wire::DescribedCampaign& campaign, const std::string& file) {
+void check(const ImportSchema& schema, const wire::DescribedCampaign& campaign,
+           const std::string& file) {
   try {
     campaign.validate();
     check_independence(campaign.law_set(), campaign);
+    check_errors(schema, campaign);
   } catch (const ConfigError& error) {
     // All columns have the one key of the schema.
     constexpr std::string_view key = ".independent";
@@ -198,8 +228,10 @@ void check(const wire::DescribedCampaign& campaign, const std::string& file) {
 }
 
 /// Some of what the database has from the beginning; nothing after the last run.
+/// @param missing  Counts the runs without an estimate among them.
 std::vector<Entry> entries_of(const ImportSchema& schema, std::uint64_t first_run,
-                              std::uint64_t end_run, std::uint64_t num_runs) {
+                              std::uint64_t end_run, std::uint64_t num_runs,
+                              MissingEstimates& missing) {
   constexpr wire::SessionId importer{1};
   if (first_run == num_runs) return {};
   std::vector<Entry> entries;
@@ -210,8 +242,9 @@ std::vector<Entry> entries_of(const ImportSchema& schema, std::uint64_t first_ru
                                    .process_id = static_cast<std::uint64_t>(getpid())});
   }
   for (std::uint64_t run = first_run; run < end_run; ++run) {
-    entries.push_back(
-        Delivery{.result = result_of(schema, run), .worker = importer, .attempt = {1}});
+    RunResult result = result_of(schema, run);
+    missing.add(result);
+    entries.push_back(Delivery{.result = std::move(result), .worker = importer, .attempt = {1}});
   }
   if (end_run == num_runs) {
     entries.push_back(WorkerEnded{.session = importer, .reason = wire::LossReason::drained});
@@ -222,8 +255,10 @@ std::vector<Entry> entries_of(const ImportSchema& schema, std::uint64_t first_ru
 
 }  // namespace
 
-void import_results(const std::filesystem::path& results, const std::filesystem::path& schema_file,
-                    const std::filesystem::path& database, const IsStopped& is_stopped) {
+MissingEstimates import_results(const std::filesystem::path& results,
+                                const std::filesystem::path& schema_file,
+                                const std::filesystem::path& database,
+                                const IsStopped& is_stopped) {
   Document document(
       schema_file.string(),
       detail::read_definition_text(schema_file, schema_size_max, detail::Pipes::refused), {});
@@ -233,18 +268,21 @@ void import_results(const std::filesystem::path& results, const std::filesystem:
   campaign.name = schema.name;
   campaign.num_runs = read_columns(results, schema, is_stopped);
   for (const ResultColumn& column : schema.drawn) campaign.table_columns.push_back(column.values);
-  check(campaign, schema_file.string());
+  check(schema, campaign, schema_file.string());
+  MissingEstimates missing;
   std::uint64_t next_run = 0;
   const auto next_entries = [&] {
     if (is_stopped()) throw Interrupted();
     constexpr std::uint64_t batch_size = 10'000;
     const std::uint64_t end_run = std::min(campaign.num_runs, next_run + batch_size);
-    return entries_of(schema, std::exchange(next_run, end_run), end_run, campaign.num_runs);
+    return entries_of(schema, std::exchange(next_run, end_run), end_run, campaign.num_runs,
+                      missing);
   };
   Store store = Store::create_with_results(database, campaign,
                                            campaign.definition(TableColumns::left_out).text,
                                            schema.num_runs != 0, next_entries);
   update_statistics(store, campaign);
+  return missing;
 }
 
 }  // namespace proofmass::coordinator

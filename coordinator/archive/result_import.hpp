@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "coordinator/archive/archive_error.hpp"
+#include "coordinator/report/read_results.hpp"
 
 namespace proofmass::coordinator {
 
@@ -14,9 +15,12 @@ namespace proofmass::coordinator {
 ///                  or standard error is no number is not finite.
 /// @param schema    TOML that says what the columns are, see README.md.
 /// @param database  A new file.
+/// @return How many runs have no estimate, and why.
 /// @throws DefinitionError naming file, line and rule; StoreError if the database exists or cannot
 ///         be written; what `is_stopped` throws.
-void import_results(const std::filesystem::path& results, const std::filesystem::path& schema,
-                    const std::filesystem::path& database, const IsStopped& is_stopped);
+[[nodiscard]] MissingEstimates import_results(const std::filesystem::path& results,
+                                              const std::filesystem::path& schema,
+                                              const std::filesystem::path& database,
+                                              const IsStopped& is_stopped);
 
 }  // namespace proofmass::coordinator

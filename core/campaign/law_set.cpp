@@ -158,7 +158,10 @@ class ExpressionCheck {
     };
     const auto follow = [&](std::string_view name) {
       const std::size_t next = set_.index_of(name);
-      if (next == set_.laws.size()) refuse(fmt::format("{} is no drawn quantity", name));
+      if (next == set_.laws.size()) {
+        refuse(
+            fmt::format("{} is no drawn quantity; the functions are sqrt(x) and pow(x, n)", name));
+      }
       if (states_[next] == State::open) refuse(fmt::format("{} depends on it in turn", name));
       if (depth_ == chain_size_max) {
         refuse(fmt::format("more than {} need one another in a row", chain_size_max));
@@ -214,9 +217,11 @@ void check_laws(const LawSet& set) {
     if (set.laws[i].law == Law::correlated) check_partners(set, i);
   }
   if (const auto quantity = correlation_factor(set).not_definite) {
-    throw ConfigError(set.path_of(*quantity) + ".correlations",
-                      fmt::format("[{}]", fmt::join(set.laws[*quantity].correlations, ", ")),
-                      "with those before it, the correlations must be positive definite");
+    throw ConfigError(
+        set.path_of(*quantity) + ".correlations",
+        fmt::format("[{}]", fmt::join(set.laws[*quantity].correlations, ", ")),
+        "with those before it, the correlations must be positive definite; `covariances` give "
+        "them over both standard deviations");
   }
 }
 
@@ -250,16 +255,11 @@ void check_independence(const LawSet& set, const Campaign& campaign) {
     for (std::size_t run = 0; run < column.size(); run += campaign.num_realisations()) {
       rows.push_back(column[run]);
     }
-    const IndependencePValues p_values = independence_p_values(rows);
-    const bool is_serial = p_values.serial < independence_p_value_min;
-    if (!is_serial && p_values.regular >= independence_p_value_min) continue;
+    const std::string why = why_dependent(rows);
+    if (why.empty()) continue;
     throw ConfigError(
         set.path_of(drawn[i]) + ".independent", "true",
-        fmt::format("column \"{}\" {}, p = {:.1g}; leave the key out, or draw each row anew",
-                    law.column,
-                    is_serial ? "depends on the order of its rows"
-                              : "covers its range more evenly than independent draws do",
-                    is_serial ? p_values.serial : p_values.regular));
+        fmt::format("column \"{}\" {}; leave the key out, or draw each row anew", law.column, why));
   }
 }
 

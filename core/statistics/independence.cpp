@@ -1,5 +1,7 @@
 #include "core/statistics/independence.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -86,6 +88,16 @@ IndependencePValues independence_p_values(std::span<const double> values) {
   detail::check_values("values", values, 0);
   if (values.size() < num_values_min) return {};
   return {.serial = serial_p_value(values), .regular = regular_p_value(values)};
+}
+
+std::string why_dependent(std::span<const double> values) {
+  const IndependencePValues p_values = independence_p_values(values);
+  if (p_values.serial < independence_p_value_min) {
+    return fmt::format("depends on the order of its rows, p = {:.1g}", p_values.serial);
+  }
+  if (p_values.regular >= independence_p_value_min) return "";
+  return fmt::format("covers its range more evenly than independent draws do, p = {:.1g}",
+                     p_values.regular);
 }
 
 }  // namespace proofmass

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 
 namespace proofmass {
 
@@ -14,6 +15,10 @@ struct IndependencePValues {
 /// Below 20 values nothing is tested.
 /// @throws InvalidArgument if a value is not finite.
 [[nodiscard]] IndependencePValues independence_p_values(std::span<const double> values);
+
+/// Why a column is not taken for independent: `depends on the order of its rows, p = 1e-05`, or
+/// that it is too even; empty if it is.
+[[nodiscard]] std::string why_dependent(std::span<const double> values);
 
 /// A column is taken for dependent where a p-value is below: one of 5,000 columns of independent
 /// draws at most is refused by mistake.

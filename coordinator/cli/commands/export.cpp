@@ -48,10 +48,15 @@ struct ImportOptions {
 
 int import_file(const ImportOptions& options, const IsStopped& is_stopped) {
   check_new_file("db", options.database);
-  import_results(options.results, options.schema, options.database, is_stopped);
+  const MissingEstimates missing =
+      import_results(options.results, options.schema, options.database, is_stopped);
   const Store store = Store::open_read_only(options.database);
-  print_lines(fmt::format("imported {} runs into {}\nDigest {}\n", store.num_runs(),
-                          options.database.string(), store.summary()->digests.results));
+  const std::string without = missing.total() == 0
+                                  ? ""
+                                  : fmt::format(", {} of them without an estimate ({})",
+                                                missing.total(), reasons_text(missing));
+  print_lines(fmt::format("imported {} runs into {}{}\nDigest {}\n", store.num_runs(),
+                          options.database.string(), without, store.summary()->digests.results));
   return exit_done;
 }
 

@@ -117,7 +117,7 @@ TEST(DerivedLaw, RefusesWhatIsNoFunctionOfOthers) {
   laws[1] = derived("2 * offcentring_m.q");
   EXPECT_EQ(refusal_of(laws),
             "dispersion.scale_factor_error.sensor_1_y.expression = \"2 * offcentring_m.q\" "
-            "(offcentring_m.q is no drawn quantity)");
+            "(offcentring_m.q is no drawn quantity; the functions are sqrt(x) and pow(x, n))");
   laws[1] = derived("1 +");
   EXPECT_EQ(refusal_of(laws),
             "dispersion.scale_factor_error.sensor_1_y.expression = \"1 +\" (character 4 must be a "
@@ -260,7 +260,8 @@ TEST(CorrelatedLaw, RefusesWhatIsNoCorrelation) {
   laws[25] = correlated(0.0, 1.0, {"offcentring_m.x"}, {0.9});
   laws[26] = correlated(0.0, 1.0, {"offcentring_m.x", "offcentring_m.y"}, {0.9, 0.0});
   EXPECT_EQ(refusal_of(laws), z + "correlations = [0.9, 0] (with those before it, the correlations "
-                                  "must be positive definite)");
+                                  "must be positive definite; `covariances` give them over both "
+                                  "standard deviations)");
 }
 
 TEST(DiscreteLaw, RefusesWhatAreNoProbabilities) {
