@@ -26,7 +26,7 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string given_up_text(std::span<const RunRange> given_up,
                                         Paint paint = Paint::no);
 
-/// What report_text() tells, but for the stop rule, and the answers to requirements, as JSON for
+/// What report_text() tells, and the answers to requirements, as JSON for
 /// programs, with the verification matrix: in full precision and SI units.
 /// coordinator/cli/README.md lists the keys.
 /// @param stated  The requirements whose answers are listed beside the matrix, which has them.

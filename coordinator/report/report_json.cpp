@@ -181,6 +181,25 @@ Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
   return json;
 }
 
+/// Null without a stop rule.
+Json stop_of(const std::optional<StopOutcome>& outcome) {
+  if (!outcome) return nullptr;
+  const std::optional<StopCheckRow>& row = outcome->check;
+  Json json{{"rule", outcome->rule},
+            {"answer", row ? Json(outcome->answer) : Json(nullptr)},
+            {"is_missed", outcome->is_missed},
+            {"num_runs", nullptr},
+            {"estimate", nullptr},
+            {"interval", nullptr},
+            {"relative_half_width", nullptr}};
+  if (!row) return json;
+  json["num_runs"] = row->num_runs;
+  json["estimate"] = row->check.estimate;
+  json["interval"] = row->check.interval;
+  json["relative_half_width"] = row->check.relative_half_width;
+  return json;
+}
+
 }  // namespace
 
 std::string report_json(const Review& review, std::span<const StatedRequirement> stated) {
@@ -211,6 +230,7 @@ std::string report_json(const Review& review, std::span<const StatedRequirement>
               {"fraction_within_interval", statistics.within_objectives(missing.num_given_up)}}},
             {"standard_errors", standard_errors_of(schema, results.standard_errors)},
             {"budget", budget_of(review)},
+            {"stop", stop_of(review.stop_outcome)},
             {"requirements", Json::array()},
             {"matrix", Json::array()}};
   if (results.instruments) json["instruments"] = json_of(schema, *results.instruments);

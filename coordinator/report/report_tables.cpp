@@ -113,9 +113,10 @@ std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_est
   return text + " (one parameter by itself, not all together)";
 }
 
-/// That chance alone makes such a bias, by Student's law; 1 where nothing is known.
+/// That chance alone makes such a bias, by Student's law.
+/// @pre num_runs ≥ 2
 double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
-  if (num_runs < 2 || error.bias == 0.0) return 1.0;
+  if (error.bias == 0.0) return 1.0;
   if (error.standard_deviation <= 0.0) return 0.0;
   const auto n = static_cast<double>(num_runs);
   return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
@@ -124,6 +125,7 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
 /// Which biases differ from 0 if all parameters are looked at together.
 std::string bias_sentence(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
+  if (statistics.num_estimated < 2) return "Bias: one run does not tell whether it differs from 0.";
   std::vector<double> p_values;
   for (const AccuracyStatistic& accuracy : statistics.accuracy) {
     p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
@@ -291,7 +293,10 @@ Table interval_table(const Review& review) {
     table.rows.push_back(interval_row(review.schema.quantities[i], statistics.accuracy[i],
                                       statistics.num_estimated));
   }
-  if (statistics.num_estimated < num_runs_of_bootstrap) {
+  if (statistics.num_estimated < num_runs_of_bootstrap &&
+      std::ranges::any_of(statistics.accuracy, [](const AccuracyStatistic& accuracy) {
+        return accuracy.deviation_interval.has_value();
+      })) {
     table.notes.emplace_back(
         "std: an interval from fewer than 200 runs is too narrow, see core/statistics");
   }

@@ -45,8 +45,12 @@ constexpr std::size_t margin = 13;
 std::string missing_lines(const RequirementAnswer& answer) {
   const std::uint64_t num_missing = answer.check.num_without_estimate;
   if (num_missing == 0) return "";
-  return fmt::format("{0:{1}}{2} of them for want of an estimate:\n{0:{1}}{3}\n", "", margin,
-                     num_missing, reasons_text(answer.missing));
+  // What count_lines() counts of all objectives are the runs that hold.
+  const std::string of = answer.is_joint()
+                             ? fmt::format("the {} others", answer.check.num_exceedances)
+                             : std::string("them");
+  return fmt::format("{0:{1}}{2} of {3} for want of an estimate:\n{0:{1}}{4}\n", "", margin,
+                     num_missing, of, reasons_text(answer.missing));
 }
 
 /// How many runs exceed the limit, or in how many all objectives hold, and the bound that decides.

@@ -78,6 +78,7 @@ Review read_review(const Store& store, const Campaign& campaign, ReviewDepth dep
   store.read_one_state([&] {
     review = read_of_one_state(store, campaign, depth, std::move(stated));
     review.stop = stop_text(store);
+    review.stop_outcome = stop_outcome(store);
   });
   return review;
 }

@@ -9,6 +9,7 @@
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/run_spectra.hpp"
 #include "coordinator/report/sensitivity.hpp"
+#include "coordinator/report/summarise.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
@@ -39,7 +40,7 @@ struct Review {
   Interpretation interpretation = Interpretation::mixed;
   std::optional<ErrorBudget> budget = {};
   std::vector<QuantityFigures> figures = {};  ///< Of each quantity.
-  /// The row of all objectives together is the last one.
+  /// In the order in which requirements are stated.
   std::vector<RequirementAnswer> matrix = {};
   /// See why_not_independent(); then the matrix has no verdicts to be shown.
   std::string why_not_independent = {};
@@ -47,6 +48,7 @@ struct Review {
   std::optional<RunSpectra> spectra = {};  ///< Of worst_run_of(); empty if not asked for.
   CampaignExecution execution = {};
   std::string stop = {};  ///< See stop_text().
+  std::optional<StopOutcome> stop_outcome = {};
 };
 
 /// The run with the largest |error| of any quantity beside its objective; none if no run has an

@@ -60,7 +60,8 @@ std::string draws(const Review& review) {
   std::string text = num_done < num_wanted
                          ? fmt::format("The campaign is not finished: {} of {} {} {} done",
                                        num_done, num_wanted, unit_of(review), be(num_done))
-                         : fmt::format("All {} {} are done", num_wanted, unit_of(review));
+                         : fmt::format("{}{} {} {} done", num_wanted == 1 ? "1 of " : "All ",
+                                       num_wanted, unit_of(review), be(num_wanted));
   if (num_missing > 0) {
     text += fmt::format(", {} of them without an estimate ({}), which {} as {}", num_missing,
                         reasons_text(review.results.missing), num_missing == 1 ? "counts" : "count",

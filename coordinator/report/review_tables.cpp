@@ -135,8 +135,8 @@ Table execution_table(const Review& review) {
 
 /// Runs a second; a database keeps whole seconds, so that a short campaign has none.
 std::string rate_text(const HostShare& host) {
-  if (host.serving_s <= 0.0) return "unknown";
-  return figure_text(static_cast<double>(host.num_results) / host.serving_s);
+  if (host.serving_s < 10.0) return "unknown";
+  return fmt::format("{:.2g}", static_cast<double>(host.num_results) / host.serving_s);
 }
 
 Table host_table(const Review& review) {
@@ -151,7 +151,9 @@ Table host_table(const Review& review) {
                           rate_text(host), hours(host.compute_s)});
   }
   table.notes.push_back(
-      "runs/s: results over the time from the first registration of a worker to the last result.");
+      "runs/s: results over the time from the first registration of a worker to the last result, "
+      "in "
+      "whole seconds; unknown below ten.");
   if (review.execution.num_hosts > review.execution.hosts.size()) {
     table.notes.push_back(fmt::format("The first {} of {} machines, by results.",
                                       review.execution.hosts.size(), review.execution.num_hosts));
@@ -172,9 +174,9 @@ std::vector<std::pair<std::string, std::string>> reproducing_commands(const Revi
        "checks the database, simulates a tenth of the runs again and compares all bits"},
       {fmt::format("proofmass report {}{} --html report.html", database, review.options),
        "makes this report anew"}};
-  if (!review.matrix.empty() && review.matrix.back().worst) {
+  if (const std::optional<RunIndex> worst = worst_run_of(review)) {
     commands.emplace_back(fmt::format("proofmass replay {0} --run {1} --output run{1}.h5{2}",
-                                      database, review.matrix.back().worst->run.value, program),
+                                      database, worst->value, program),
                           "writes the time series of the worst run");
   }
   return commands;

@@ -207,14 +207,27 @@ bool lacks_stop_check(const Store& store) {
   return !check || check->num_runs < store.num_runs();
 }
 
-bool is_rule_missed(const Store& store) {
-  if (lacks_stop_check(store)) return true;
+std::optional<StopOutcome> stop_outcome(const Store& store) {
   const StopPlan plan = store.stop_plan();
-  const auto check = last_check(store, plan);
-  if (!check) return false;
+  if (plan.stop_rule.empty()) return std::nullopt;
+  StopOutcome outcome{.rule = plan.stop_rule, .check = last_check(store, plan), .is_missed = true};
+  if (!outcome.check) return outcome;
   const StopRule rule = parse_stop_rule(plan.stop_rule, store.schema());
-  if (rule.statistic != StopRule::Statistic::verdict) return !check->check.is_reached;
-  return verdict_of(rule, check->check) != RequirementVerdict::met;
+  const bool is_reached = outcome.check->check.is_reached;
+  bool holds = is_reached;
+  outcome.answer = is_reached ? "reached" : "not reached";
+  if (rule.statistic == StopRule::Statistic::verdict) {
+    const RequirementVerdict verdict = verdict_of(rule, outcome.check->check);
+    holds = verdict == RequirementVerdict::met;
+    outcome.answer = name_of(verdict);
+  }
+  outcome.is_missed = !holds || outcome.check->num_runs < store.num_runs();
+  return outcome;
+}
+
+bool is_rule_missed(const Store& store) {
+  const std::optional<StopOutcome> outcome = stop_outcome(store);
+  return outcome && outcome->is_missed;
 }
 
 std::string stop_text(const Store& store) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 namespace proofmass::coordinator {
@@ -64,7 +63,6 @@ std::vector<StatedRequirement> matrix_requirements(const ResultSchema& schema,
   if (has_finite(objectives) && std::ranges::none_of(stated, is_joint)) {
     stated.push_back(joint_requirement());
   }
-  std::ranges::stable_partition(stated, std::not_fn(is_joint));
   return stated;
 }
 

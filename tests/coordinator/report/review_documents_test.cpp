@@ -299,16 +299,17 @@ TEST(MatrixRequirements, AreTheObjectivesIfThereAreNone) {
   EXPECT_EQ(requirements.back().requirement, "all objectives for 95% with 90%");
 }
 
-TEST(MatrixRequirements, EndWithAllObjectivesTogether) {
+TEST(MatrixRequirements, KeepTheirOrderAndEndWithAllObjectivesIfThatIsNotAmongThem) {
   const std::vector<double> objectives = ones();
   const auto two = matrix_requirements(
       test::schema(), {stated("all objectives for 99% with 95%"), stated("k2c < 1 for 9% with 9%")},
       objectives);
   ASSERT_EQ(two.size(), 2U);
-  EXPECT_EQ(two[1].requirement, "all objectives for 99% with 95%");
-  EXPECT_EQ(
-      matrix_requirements(test::schema(), {stated("k2c < 1 for 9% with 9%")}, objectives).size(),
-      2U);
+  EXPECT_EQ(two[0].requirement, "all objectives for 99% with 95%");
+  const auto added =
+      matrix_requirements(test::schema(), {stated("k2c < 1 for 9% with 9%")}, objectives);
+  ASSERT_EQ(added.size(), 2U);
+  EXPECT_EQ(added[1].requirement, "all objectives for 95% with 90%");
   const std::vector<double> none(num_parameters, std::numeric_limits<double>::infinity());
   EXPECT_TRUE(matrix_requirements(test::schema(), {}, none).empty());
 }
