@@ -1,7 +1,12 @@
 #include "coordinator/net/server_paths.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <system_error>
+
+#include "coordinator/store/store_error.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -10,6 +15,15 @@ constexpr std::string_view before_a_path = " \t\n\"'`(=[,;";
 
 bool may_begin_path(std::string_view text, std::size_t position) {
   return position == 0 || before_a_path.find(text[position - 1]) != std::string_view::npos;
+}
+
+/// A client has a disk of its own, and did not name the file that the coordinator could not write.
+void name_full_disk(std::string& failure) {
+  if (failure.find(fmt::format("({};", disk_full_text)) == std::string::npos) return;
+  failure = fmt::format(
+      "disk of the coordinator's host {} = full (what was stored before is safe; free space there "
+      "and try again)",
+      wire::host_name());
 }
 
 }  // namespace
@@ -56,7 +70,10 @@ void ServerPaths::hide_in(proto::ReplyEnvelope& reply) const {
   const auto hide = [&](std::string* text) { *text = hidden_in(*text); };
   if (reply.has_status()) hide_in(*reply.mutable_status());
   if (reply.has_done()) hide(reply.mutable_done()->mutable_text());
-  if (reply.has_error()) hide(reply.mutable_error()->mutable_text());
+  if (reply.has_error()) {
+    hide(reply.mutable_error()->mutable_text());
+    name_full_disk(*reply.mutable_error()->mutable_text());
+  }
   if (reply.has_answer()) hide(reply.mutable_answer()->mutable_error_text());
 }
 

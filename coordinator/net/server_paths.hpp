@@ -20,7 +20,8 @@ class ServerPaths {
   /// The text with files of the directory named within it: `campaign database = a.db (is no file)`.
   /// Other paths stay: they are those that a client sent.
   [[nodiscard]] std::string hidden_in(std::string_view text) const;
-  /// Hides paths in all that the reply says of files and failures. To be called before it is
+  /// Hides paths in all that the reply says of files and failures; an error of a full disk says
+  /// whose disk that is instead. To be called before it is
   /// encoded, since that may change or cut a path.
   void hide_in(proto::ReplyEnvelope& reply) const;
   void hide_in(proto::StatusReply& reply) const;

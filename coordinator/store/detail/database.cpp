@@ -133,7 +133,8 @@ std::string explanation(int code, sqlite3* connection, const std::filesystem::pa
     case SQLITE_CORRUPT:
       return corruption(file, had_log, sqlite3_errmsg(connection));
     case SQLITE_FULL:
-      return "the disk is full; what was committed before is safe, free space and try again";
+      return fmt::format("{}; what was committed before is safe, free space and try again",
+                         disk_full_text);
     case SQLITE_BUSY:
       return fmt::format("is locked by another program for more than {} s", busy_timeout_ms / 1000);
     case SQLITE_INTERRUPT:

@@ -6,6 +6,7 @@
 #include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/client_codec.hpp"
 #include "tests/test.hpp"
@@ -186,6 +187,12 @@ TEST(ServerPaths, AreInNoReply) {
   proto::ReplyEnvelope error = wire::error_reply("file = served/b.db (locked)");
   paths.hide_in(error);
   EXPECT_EQ(error.error().text(), "file = b.db (locked)");
+  error = wire::error_reply(
+      "campaign database = served/.answers/copy-1.db (the disk is full; free space and try again)");
+  paths.hide_in(error);
+  EXPECT_EQ(error.error().text(), "disk of the coordinator's host " + wire::host_name() +
+                                      " = full (what was stored before is safe; free space there "
+                                      "and try again)");
 }
 
 using std::chrono::hours;
