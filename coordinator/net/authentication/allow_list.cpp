@@ -65,6 +65,13 @@ AllowedKeys read_allow_list(const std::filesystem::path& file, wire::Domain doma
   return parse_allow_list(text, domain, file);
 }
 
+std::size_t num_only_in(const AllowedKeys& keys, const AllowedKeys& others) {
+  return static_cast<std::size_t>(std::ranges::count_if(keys, [&](const auto& item) {
+    const auto found = others.find(item.first);
+    return found == others.end() || found->second != item.second;
+  }));
+}
+
 }  // namespace
 
 AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
@@ -109,7 +116,12 @@ std::optional<std::string> AllowList::refresh(TimePoint now) {
   stamp_ = is_settled(stamp) ? std::optional(stamp) : std::nullopt;
   try {
     if (stamp.error == 0 && stamp.size == 0) refuse(file_, "is empty");
+    const AllowedKeys former = keys_;
     take(read_allow_list(file_, domain_), now);
+    if (keys_ != former || !reported_.empty()) {
+      change_ = {.num_added = num_only_in(keys_, former),
+                 .num_removed = num_only_in(former, keys_)};
+    }
     reported_.clear();
     return std::nullopt;
   } catch (const Error& error) {

@@ -57,6 +57,18 @@ class AllowList {
   /// As refresh(), but at most once a second.
   [[nodiscard]] std::optional<std::string> refresh_if_due(TimePoint now);
 
+  /// How the list was last read again.
+  struct Change {
+    std::size_t num_added = 0;
+    std::size_t num_removed = 0;
+  };
+
+  /// The change since the last call: if keys, or what they may do, changed, or if the file can be
+  /// read after it could not.
+  [[nodiscard]] std::optional<Change> take_change() { return std::exchange(change_, {}); }
+
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
   /// The key's owner; null if the key is not on the list.
   [[nodiscard]] const AllowedKey* owner_of(std::string_view public_key) const;
 
@@ -78,6 +90,7 @@ class AllowList {
   wire::Domain domain_;
   std::optional<Stamp> stamp_;  ///< None if the file must be read again in any case.
   std::string reported_;
+  std::optional<Change> change_;
   std::optional<TimePoint> looked_at_;
   AllowedKeys keys_;
   /// Without the keys that the last look did not find any more, and the time of that look.

@@ -108,7 +108,9 @@ void Authenticator::on_event(Domain domain, const wire::SocketEvent& event, Time
 }
 
 void Authenticator::serve(TimePoint now) {
-  for (AllowList* const list : {&workers_, &clients_}) report(list->refresh_if_due(now));
+  for (AllowList* const list : {&workers_, &clients_}) {
+    report(*list, list->refresh_if_due(now));
+  }
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;
@@ -123,7 +125,7 @@ void Authenticator::serve(TimePoint now) {
 }
 
 bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimePoint now) {
-  report(list_of(domain).refresh_if_due(now));
+  report(list_of(domain), list_of(domain).refresh_if_due(now));
   return list_of(domain).owner_of(public_key) != nullptr;
 }
 
@@ -155,7 +157,7 @@ std::string_view Authenticator::refusal(const Handshake& handshake, TimePoint no
   }
   if (!domain) return "no such domain";
   if (handshake.public_key.empty()) return "without a key";
-  report(list_of(*domain).refresh(now));
+  report(list_of(*domain), list_of(*domain).refresh(now));
   if (list_of(*domain).owner_of(handshake.public_key) != nullptr) return {};
   const Domain other = *domain == Domain::workers ? Domain::clients : Domain::workers;
   if (list_of(other).owner_of(handshake.public_key) == nullptr) return "unknown key";
@@ -173,7 +175,14 @@ void Authenticator::reply(std::string_view id, const Answer& answer) {
   }
 }
 
-void Authenticator::report(const std::optional<std::string>& what_is_wrong) const {
+void Authenticator::report(AllowList& list, const std::optional<std::string>& what_is_wrong) const {
+  if (const auto change = list.take_change()) {
+    log_({.severity = Severity::info,
+          .kind = "allow_list_read",
+          .fields = {{"file", list.file().string()},
+                     {"added", change->num_added},
+                     {"removed", change->num_removed}}});
+  }
   if (!what_is_wrong) return;
   log_({.severity = Severity::error,
         .kind = "allow_list_unreadable",

@@ -35,7 +35,7 @@ class Authenticator {
   /// Must be made before any socket of the context is bound.
   ///
   /// @param directory  With authorized_workers and authorized_clients.
-  /// @param log        Refusals, and lists that cannot be read.
+  /// @param log        Refusals, and lists that changed or cannot be read.
   /// @throws Error if a list cannot be read, or if the context has an authenticator.
   Authenticator(zmq::context_t& context, const std::filesystem::path& directory, Log log);
   ~Authenticator();
@@ -71,7 +71,7 @@ class Authenticator {
   /// Why the peer is refused; empty if it is admitted.
   [[nodiscard]] std::string_view refusal(const Handshake& handshake, TimePoint now);
   void reply(std::string_view id, const Answer& answer);
-  void report(const std::optional<std::string>& what_is_wrong) const;
+  void report(AllowList& list, const std::optional<std::string>& what_is_wrong) const;
 
   Log log_;
   RefusalLog refusals_;

@@ -1,5 +1,6 @@
 #include "coordinator/net/authentication/allow_list.hpp"
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include "coordinator/net/authentication/refusal_log.hpp"
@@ -182,6 +183,25 @@ TEST_F(AllowListFile, ThatIsWrongOrGoneLeavesTheListStanding) {
 
   write("nonsense\n");
   EXPECT_TRUE(look(list));  // Again, as it was right in between.
+}
+
+TEST_F(AllowListFile, TellsOfChangesAndThatItCanBeReadAgain) {
+  write(one_ + " a\n");
+  AllowList list(file_, wire::Domain::workers);
+  const auto change = [&] {
+    (void)look(list);
+    const auto seen = list.take_change();
+    return seen ? fmt::format("{} {}", seen->num_added, seen->num_removed) : "none";
+  };
+  EXPECT_EQ(change(), "none");
+  write(two_ + " a\n");
+  EXPECT_EQ(change(), "1 0");
+  EXPECT_EQ(change(), "0 1");
+  write("wrong\n");
+  EXPECT_EQ(change(), "none");
+  write(two_ + " a\n");
+  EXPECT_EQ(change(), "0 0");
+  EXPECT_EQ(change(), "none");
 }
 
 TEST_F(AllowListFile, IsLookedAtOnceASecond) {
