@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -73,7 +74,10 @@ std::string worker_command(const FactoryOptions& options) {
                          options.factory.name, walltime.count());
   command += fmt::format(" --idle-timeout {}s", options.idle_timeout_s);
   if (!options.worker_keys.empty()) {
-    command += " --keys " + wire::shell_word(checked_line("worker-keys", options.worker_keys));
+    command +=
+        " --keys " +
+        wire::shell_word(
+            std::filesystem::absolute(checked_line("worker-keys", options.worker_keys)).string());
   }
   if (const auto num_processors = options.factory.num_processors) {
     command += fmt::format(" --threads {}", *num_processors);
