@@ -227,6 +227,11 @@ std::filesystem::path CampaignFolder::archive(const std::filesystem::path& file)
   return place;
 }
 
+bool CampaignFolder::has_archived(const std::string& campaign) const {
+  std::error_code ignored;
+  return std::filesystem::exists(directory_ / "archived" / (campaign + ".db"), ignored);
+}
+
 // A known file may have come from elsewhere, under any name.
 ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan,
                                     const Asker& asker,

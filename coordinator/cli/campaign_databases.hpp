@@ -64,6 +64,7 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
   [[nodiscard]] ServedCampaign load(const std::filesystem::path& file) const override;
   /// To the directory `archived` below this one.
   [[nodiscard]] std::filesystem::path archive(const std::filesystem::path& file) const override;
+  [[nodiscard]] bool has_archived(const std::string& campaign) const override;
   /// A directory for files that last no longer than this process. It is not there at first: a full
   /// disk must not keep a coordinator from starting.
   [[nodiscard]] std::filesystem::path answers() const { return directory_ / ".answers"; }

@@ -98,6 +98,9 @@ class CampaignDirectory {
   /// @return Where it is now.
   /// @throws Error if that is impossible or a file is there already.
   [[nodiscard]] virtual std::filesystem::path archive(const std::filesystem::path& file) const = 0;
+
+  /// True if a campaign of this name was moved there, `archived/NAME.db`.
+  [[nodiscard]] virtual bool has_archived(const std::string& campaign) const = 0;
 };
 
 }  // namespace proofmass::coordinator

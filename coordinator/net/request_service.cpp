@@ -87,7 +87,7 @@ void require_own_file(const CampaignRecord& campaign) {
 }  // namespace
 
 RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
-    : context_(context), campaigns_(campaigns), began_at_(context.now()), answers_(context) {}
+    : context_(context), campaigns_(campaigns), answers_(context) {}
 
 proto::StatusReply RequestService::service_status() const {
   const State& state = context_.state;
@@ -95,7 +95,7 @@ proto::StatusReply RequestService::service_status() const {
   proto::StatusReply reply;
   reply.set_version(context_.config.version);
   reply.set_model_version(std::string(built_in_model().version()));
-  reply.set_uptime_s(seconds(std::chrono::steady_clock::now() - began_at_));  // With stalls.
+  reply.set_uptime_s(seconds(std::chrono::steady_clock::now() - began_at_));
   reply.set_num_workers(state.workers.size());
   reply.set_num_slots(state.num_slots);
   reply.set_num_campaigns(campaigns_.num_campaigns());
@@ -114,6 +114,13 @@ proto::StatusReply RequestService::service_status() const {
   return reply;
 }
 
+void RequestService::refuse_as_not_served(const std::string& campaign) const {
+  const CampaignDirectory* const directory = context_.config.directory;
+  const bool is_archived = directory != nullptr && directory->has_archived(campaign);
+  throw Error(fmt::format("campaign = {} (is not served{})", campaign,
+                          is_archived ? fmt::format(": it is archived/{}.db", campaign) : ""));
+}
+
 void RequestService::control(const proto::ControlRequest& request, const Asker& asker,
                              const Respond& respond) {
   const std::string& name = request.campaign();
@@ -121,7 +128,7 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
   const auto campaign = campaigns_.find(name);
   if (!campaign) {
     require_right(asker, Right::submit);
-    throw Error(fmt::format("campaign = {} (is not served)", name));
+    refuse_as_not_served(name);
   }
   require_control(asker, name, campaign->status.owner());
   require_possible(campaign->status, action);
@@ -170,7 +177,10 @@ proto::ReplyEnvelope RequestService::workers(const proto::WorkersRequest& reques
 
 proto::ReplyEnvelope RequestService::release_host(const std::string& host) {
   if (!on_release_host(context_.state, host, context_.now(), context_.outbox)) {
-    throw Error(fmt::format("host = {} (is not in quarantine)", host));
+    const std::set<std::string> others = quarantined_hosts(context_.state);
+    throw Error(fmt::format(
+        "host = {} (is not in quarantine; {})", host,
+        others.empty() ? "no host is" : fmt::format("there is {}", fmt::join(others, ", "))));
   }
   return wire::done_reply(fmt::format("host {}: runs are lent to its workers again", host));
 }
@@ -178,7 +188,7 @@ proto::ReplyEnvelope RequestService::release_host(const std::string& host) {
 void RequestService::ask(const proto::AnswerRequest& request, const Asker& asker,
                          const Respond& respond) {
   const auto campaign = campaigns_.find(request.campaign());
-  if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign()));
+  if (!campaign) refuse_as_not_served(request.campaign());
   require_own_file(*campaign);
   answers_.ask(request, campaign->file, asker, respond);
 }

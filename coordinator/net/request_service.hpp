@@ -82,6 +82,7 @@ class RequestService {
                  const std::optional<CampaignRecord>& closed, UnderWay under_way, Respond respond);
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs, if its owner
   /// may have it unfinished.
+  [[noreturn]] void refuse_as_not_served(const std::string& campaign) const;
   void reopen(const CampaignRecord& campaign, wire::ControlAction action, Respond respond);
   void reopen_measured(const CampaignRecord& campaign, wire::ControlAction action,
                        std::uint64_t size, Respond respond);
@@ -98,7 +99,8 @@ class RequestService {
   const ServiceContext& context_;
   CampaignService& campaigns_;
   FactoryReports factories_;
-  TimePoint began_at_;
+  /// Of the clock itself, as that of the context leaves out the time that the process was stopped.
+  std::chrono::steady_clock::time_point began_at_ = std::chrono::steady_clock::now();
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
   Answers answers_;

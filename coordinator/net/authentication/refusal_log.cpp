@@ -77,7 +77,7 @@ const int failed_handshakes =
 std::string_view reason_of(const wire::SocketEvent& event) {
   if (event.kind == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) return protocol_reason(event.value);
   return event.value == EAGAIN ? "handshake takes too long"
-                               : "ends during the handshake, as one without a key does";
+                               : "leaves during the handshake: it ended, or has no key";
 }
 
 }  // namespace proofmass::coordinator

@@ -43,6 +43,10 @@ class PlainDirectory final : public coordinator::CampaignDirectory {
     return place;
   }
 
+  [[nodiscard]] bool has_archived(const std::string& campaign) const override {
+    return std::filesystem::exists(directory_ / (campaign + ".archived"));
+  }
+
   /// Called before a file is opened; may throw.
   void set_before_load(std::function<void(const std::filesystem::path&)> before_load) {
     const std::lock_guard lock(mutex_);
