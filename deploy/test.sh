@@ -5,7 +5,8 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-selection=(--label-exclude '^long$')
+# These wait for their processes more than they compute; some long ones must not be disturbed.
+selection=(--label-exclude '^long$' --parallel 4)
 targets=(all)
 if [[ ${1:-} == --all ]]; then
   selection=()
