@@ -72,15 +72,12 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     if (is_test(session) || !session.excitations.empty() || is_monitored_before(i)) continue;
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
-}
-
-void RunParts::know_windows() const {
-  for (std::size_t i = 0; i < tests.size(); ++i) regressors_.push_back(nominal_regressors(i));
+  for (std::size_t i = 0; i < tests.size(); ++i) regressors.push_back(nominal_regressors(i));
   if (campaign.scenario.gaps.lose_data()) return;
   // The windows of every run are those of the first.
   for (std::size_t i = 0; i < tests.size(); ++i) {
-    const std::vector<WindowRegressors> of_windows = std::move(regressors_[i]);
-    noise_of_complete_.push_back(
+    const std::vector<WindowRegressors> of_windows = std::move(regressors[i]);
+    noise_of_complete.push_back(
         weights_of_windows.noise_products(window_weights(i, RunIndex{0}), of_windows));
   }
 }
@@ -94,9 +91,8 @@ std::vector<float> RunParts::window_weights(std::size_t i, RunIndex run) const {
 }
 
 RegressorProducts RunParts::window_noise(std::size_t i, RunIndex run) const {
-  std::call_once(are_windows_known_, [this] { know_windows(); });
-  if (!noise_of_complete_.empty()) return noise_of_complete_[i];
-  return weights_of_windows.noise_products(window_weights(i, run), regressors_[i]);
+  if (!noise_of_complete.empty()) return noise_of_complete[i];
+  return weights_of_windows.noise_products(window_weights(i, run), regressors[i]);
 }
 
 std::vector<WindowRegressors> RunParts::nominal_regressors(std::size_t i) const {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -76,14 +75,14 @@ struct RunParts {
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
   std::vector<TestSetup> tests;  ///< Of each session; of use where it is a test.
   WindowWeights weights_of_windows;
+  /// Of each session; none unless it tests and loses data.
+  std::vector<std::vector<WindowRegressors>> regressors;
+  std::vector<RegressorProducts> noise_of_complete;  ///< Of each session, if none loses data.
 
   /// Whether the masses of any session feel stiffness.
   [[nodiscard]] bool has_stiffness() const;
 
  private:
-  /// Fills the two below, which takes seconds for a thousand orbits: for the first run that ends.
-  void know_windows() const;
-
   /// The regressors of a test in the attitude that it is to have.
   [[nodiscard]] std::vector<WindowRegressors> nominal_regressors(std::size_t i) const;
 
@@ -92,12 +91,6 @@ struct RunParts {
 
   /// True if the loops of a session without excitation are those of one before, which tells enough.
   [[nodiscard]] bool is_monitored_before(std::size_t i) const;
-
-  mutable std::once_flag are_windows_known_;
-  /// Of each session; none unless it tests and loses data.
-  mutable std::vector<std::vector<WindowRegressors>> regressors_;
-  /// Of each session, if none loses data.
-  mutable std::vector<RegressorProducts> noise_of_complete_;
 };
 
 }  // namespace proofmass
