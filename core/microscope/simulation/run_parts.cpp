@@ -99,11 +99,13 @@ std::vector<WindowRegressors> RunParts::nominal_regressors(std::size_t i) const 
   const Session& session = campaign.scenario.sessions[i];
   std::vector<WindowRegressors> of_windows;
   if (!is_test(session)) return of_windows;
-  SessionSignals signals(campaign.scenario, session, orbit, environment);
-  for (std::int64_t n = 0; n < signals.num_settling(); ++n) (void)signals.next();
-  for (std::size_t n = 0; n < tests[i].num_blocks * test_block_size; ++n) {
+  Scenario of_blocks = campaign.scenario;  // A sample at the beginning of each block.
+  of_blocks.simulation.sample_period_s *= static_cast<double>(test_block_size);
+  of_blocks.simulation.settling_s = 0.0;
+  SessionSignals signals(of_blocks, session, orbit, environment);
+  for (std::size_t block = 0; block < tests[i].num_blocks; ++block) {
     const SharedSample sample = signals.next();
-    if (n == 0 || n % test_block_size != 0) continue;  // A window's middle is between two blocks.
+    if (block == 0) continue;  // A window's middle is between two blocks.
     const Vector3<double>& radial_S = sample.radial_R;
     const double gradient = 3.0 * sample.gradient_s2 * radial_S.x;
     of_windows.push_back({-tests[i].gravity_m_s2(sample) * radial_S.x, gradient * radial_S.x,
