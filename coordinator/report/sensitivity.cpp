@@ -119,8 +119,7 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
 std::string note_of_p(std::size_t num_inputs, std::size_t num_quantities) {
   return fmt::format(
       "p: that chance alone makes one of {} inputs look so influential on one of {} errors or "
-      "their "
-      "magnitudes (Kruskal-Wallis, Holm)",
+      "their magnitudes (Kruskal-Wallis, Holm)",
       num_inputs, num_quantities);
 }
 

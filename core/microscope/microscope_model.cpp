@@ -102,7 +102,7 @@ std::string loops_note(const Scenario& scenario) {
 
 /// The band-pass lets no drift through, but answers its beginning.
 std::string drift_note(const Scenario& scenario) {
-  constexpr double num_decays = 7.0;
+  constexpr double num_decays = 7.0;  // e⁻⁷ is a thousandth.
   if (!scenario.realism || estimation_method(scenario.estimation.method).has_standard_errors)
     return {};
   const auto& drifts = scenario.realism->bias_drift_m_s3;
@@ -115,9 +115,9 @@ std::string drift_note(const Scenario& scenario) {
   const double least_s = num_decays * longest_s;
   if (scenario.estimation.transient_s >= least_s) return {};
   return fmt::format(
-      "biases drift, and the filter's answer to the beginning of a record is not over after "
-      "estimation.transient_s = {} s: estimates may be off by several objectives; {:.0f} s would "
-      "do",
+      "biases drift, and with estimation.transient_s = {} s the filter's answer to the beginning "
+      "of "
+      "a record is in the estimates; after {:.0f} s a thousandth of it is left",
       scenario.estimation.transient_s, std::ceil(least_s));
 }
 

@@ -231,8 +231,7 @@ AllocationRule checked_rule(const PlanOptions& options, const PlanStudy& study) 
   if (options.minimum < least_of_method) {
     throw UsageError(
         fmt::format("--minimum = {} (must be {} or more: less the transient at its beginning, a "
-                    "shorter session "
-                    "is too short for the method {})",
+                    "shorter session is too short for the method {})",
                     options.minimum, least_of_method, study.scope().method));
   }
   const std::vector<int>& of_file = study.scope().num_steps;
