@@ -10,7 +10,7 @@
 namespace proofmass {
 namespace {
 
-constexpr std::size_t num_runs = batch_lanes;
+constexpr std::size_t num_drawn_runs = batch_lanes;
 
 /// The paper's campaign in sessions of two orbits, which cost a seventh.
 MicroscopeCampaign short_campaign() {
@@ -22,7 +22,7 @@ MicroscopeCampaign short_campaign() {
 
 std::vector<RunResult> simulate(const MicroscopeCampaign& campaign) {
   campaign.validate();
-  return test::simulated(RunPlan(campaign), num_runs);
+  return test::simulated(RunPlan(campaign), num_drawn_runs);
 }
 
 /// Multiplies the gain of every thruster axis.
@@ -43,11 +43,11 @@ class Stability : public testing::Test {
     silent() = simulate(campaign);
     for (std::size_t p = 0; p < num_parameters; ++p) {
       double squares = 0.0;
-      for (std::size_t i = 0; i < num_runs; ++i) {
+      for (std::size_t i = 0; i < num_drawn_runs; ++i) {
         const double noise = noisy[i].estimate[p] - silent()[i].estimate[p];
         squares += noise * noise;
       }
-      deviation()[p] = std::sqrt(squares / num_runs);
+      deviation()[p] = std::sqrt(squares / num_drawn_runs);
     }
   }
 
@@ -82,7 +82,7 @@ class Stability : public testing::Test {
     std::size_t num_completed = 0;
     const std::vector<RunResult> results = simulate(campaign);
     const ShiftBounds bounds(campaign.scenario);
-    for (std::size_t i = 0; i < num_runs; ++i) {
+    for (std::size_t i = 0; i < num_drawn_runs; ++i) {
       const RunResult& result = results[i];
       if (result.status == RunStatus::lost) {
         EXPECT_NE(result.loss.cause, static_cast<std::uint32_t>(LossCause::none));
@@ -115,7 +115,7 @@ class Stability : public testing::Test {
       return expect_explained(campaign, name + " = " + std::to_string(value));
     };
     for (const double value : harmless) {
-      EXPECT_EQ(num_completed_at(value), num_runs) << name << " = " << value;
+      EXPECT_EQ(num_completed_at(value), num_drawn_runs) << name << " = " << value;
     }
     for (const double value : between) num_completed_at(value);
     for (const double value : absurd)

@@ -9,20 +9,21 @@
 namespace proofmass {
 namespace {
 
-constexpr std::uint64_t seed = 7;
+constexpr std::uint64_t design_seed = 7;
 constexpr std::size_t num_dimensions = 60;
 constexpr SamplingDesign latin{.kind = DesignKind::latin_hypercube, .points = 32};
 constexpr SamplingDesign net{.kind = DesignKind::sobol, .points = 32};
 constexpr SamplingDesign random_draws{};
 
 std::uint64_t stratum(const SamplingDesign& design, std::size_t dimension, std::uint64_t run,
-                      std::uint64_t of_seed = seed) {
+                      std::uint64_t of_seed = design_seed) {
   return stratum_of(design, dimension, of_seed, RunIndex{run}).index;
 }
 
 double coordinate(const SamplingDesign& design, std::size_t dimension, std::uint64_t run) {
-  const RandomStream stream(seed, RunIndex{run}, stream_id("test/" + std::to_string(dimension)));
-  return uniform_in(stratum_of(design, dimension, seed, RunIndex{run}), stream.block(0));
+  const RandomStream stream(design_seed, RunIndex{run},
+                            stream_id("test/" + std::to_string(dimension)));
+  return uniform_in(stratum_of(design, dimension, design_seed, RunIndex{run}), stream.block(0));
 }
 
 /// The multiples of 2⁻¹⁰ by the recurrence of [JoeKuo2008] Eq. (2), from a line of its table.
@@ -104,10 +105,10 @@ TEST(SamplingDesign, KeepsNumbersWithinTheirStratum) {
 }
 
 TEST(SamplingDesign, LeavesIndependentDrawsAsTheyWere) {
-  const RandomStream stream(seed, RunIndex{3}, 17);
+  const RandomStream stream(design_seed, RunIndex{3}, 17);
   for (std::uint32_t i = 0; i < 100; ++i) {
     const double number =
-        uniform_in(stratum_of(random_draws, 5, seed, RunIndex{3}), stream.block(i));
+        uniform_in(stratum_of(random_draws, 5, design_seed, RunIndex{3}), stream.block(i));
     EXPECT_EQ(std::bit_cast<std::uint64_t>(number),
               std::bit_cast<std::uint64_t>(uniform(stream.block(i))));
   }
@@ -184,7 +185,7 @@ TEST(SamplingDesign, RandomisesReplicatesPointsAndDimensionsIndependently) {
       ++strata[own];
       ++dimensions[own * 8 + stratum(design, 3, run)];
       ++replicates[own * 8 + stratum(design, 2, run + 8)];
-      ++seeds[own * 8 + stratum(design, 2, run, seed + 1)];
+      ++seeds[own * 8 + stratum(design, 2, run, design_seed + 1)];
       ++points[own * 8 + stratum(design, 2, run - 1)];
     }
     EXPECT_LT(excess_of(strata, 8), 4.0);

@@ -1,5 +1,6 @@
 #include "core/signal/band_pass.hpp"
 
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -8,7 +9,6 @@ namespace {
 using Complex = std::complex<long double>;
 
 constexpr long double pi = std::numbers::pi_v<long double>;
-constexpr double period_s = 0.25;
 
 /// s/ω_c of the bilinear transform that keeps the corner: i tan(πfT)/tan(πf_cT).
 Complex warped(double frequency_hz, double corner_hz) {

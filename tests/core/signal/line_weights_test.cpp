@@ -3,13 +3,11 @@
 #include <Eigen/Dense>
 
 #include "core/error.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-constexpr double period_s = 0.25;
 
 /// Cosine and sine amplitude of each fit line, as the weights give them.
 std::vector<double> weighted_amplitudes(const LineWeights& weights,

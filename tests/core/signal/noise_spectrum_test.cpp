@@ -2,12 +2,12 @@
 #include "core/microscope/simulation/sample_noise.hpp"
 #include "core/signal/noise_shape.hpp"
 #include "tests/support/averaged_spectrum.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
 
-constexpr double period_s = 0.25;
 constexpr std::size_t segment_length = 1 << 18;  // 18 hours: bins of 1.5e-5 Hz.
 constexpr std::size_t num_runs = 8;
 constexpr std::uint64_t seed = 2013;

@@ -63,17 +63,17 @@ class Uniforms {
   std::uint32_t index_ = 0;
 };
 
-constexpr std::uint64_t num_repetitions = 2000;
+constexpr std::uint64_t num_campaigns = 2000;
 // A share of 95 % has a standard error of 0.5 %: four of them.
 constexpr double lowest = 0.93, highest = 0.97;
 
-struct Coverage {
+struct Hits {
   std::uint64_t count = 0;
   void add(const std::optional<Interval>& interval, double truth) {
     if (interval && interval->lower <= truth && truth <= interval->upper) ++count;
   }
   [[nodiscard]] double share() const {
-    return static_cast<double>(count) / static_cast<double>(num_repetitions);
+    return static_cast<double>(count) / static_cast<double>(num_campaigns);
   }
 };
 
@@ -95,9 +95,9 @@ std::vector<double> noise_of(Within law, std::size_t size, Uniforms& random) {
 }
 
 /// Coverage of the mean and of the share of the variance within, for groups of four.
-std::pair<Coverage, Coverage> coverage_of(Within law, std::size_t num_groups, double between) {
-  std::pair<Coverage, Coverage> coverage;
-  for (std::uint64_t i = 0; i < num_repetitions; ++i) {
+std::pair<Hits, Hits> coverage_of(Within law, std::size_t num_groups, double between) {
+  std::pair<Hits, Hits> coverage;
+  for (std::uint64_t i = 0; i < num_campaigns; ++i) {
     Uniforms random(i);
     GroupedValues values(4);
     for (std::size_t group = 0; group < num_groups; ++group) {
@@ -174,8 +174,8 @@ double hit_coverage(std::size_t num_groups, std::uint64_t size, double probabili
                     double correlation) {
   const std::vector<double> probabilities = group_probabilities(probability, correlation);
   const double truth = compensated_sum(probabilities) / static_cast<double>(probabilities.size());
-  Coverage coverage;
-  for (std::uint64_t i = 0; i < num_repetitions; ++i) {
+  Hits coverage;
+  for (std::uint64_t i = 0; i < num_campaigns; ++i) {
     Uniforms random(i);
     GroupedHits hits(size);
     for (std::size_t group = 0; group < num_groups; ++group) {

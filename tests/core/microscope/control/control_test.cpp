@@ -1,11 +1,10 @@
 #include "core/microscope/control/control_loops.hpp"
 #include "core/microscope/control/star_tracker.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double period_s = 0.25;
 
 TEST(Resonator, PassesEverythingWithoutDamping) {
   const ResonatorGains gains = resonator_gains(0.0, 0.02, period_s);
@@ -47,8 +46,6 @@ TEST(DragFreeLoop, IsStableWithAResonatorUpToHalfOfItsBandwidth) {
     }
   }
 }
-
-constexpr Vector3<double> zero{};
 
 /// Angle about X and acceleration that leads from each sample to the next under constant
 /// acceleration.

@@ -6,15 +6,13 @@
 
 #include "core/error.hpp"
 #include "core/microscope/control/margins.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
 
 using Complex = std::complex<double>;
-
-constexpr double period_s = 0.25;
-constexpr double pi = std::numbers::pi;
 
 ControllerConfig some_controller() {
   ControllerConfig config;

@@ -6,33 +6,33 @@
 namespace proofmass {
 namespace {
 
-constexpr double period_s = 5950.0;
-const KeplerOrbit orbit({.period_s = period_s, .eccentricity = 5e-3});
+constexpr double orbit_period_s = 5950.0;
+const KeplerOrbit orbit({.period_s = orbit_period_s, .eccentricity = 5e-3});
 const EnvironmentTable no_table;
 
 ExternalAcceleration value_at(const Environment& environment, double time_s) {
   return environment.at(time_s, orbit.at(time_s));
 }
 
-void expect_vector(const Vector3<double>& actual, const std::array<double, 3>& expected,
-                   double tolerance) {
+void expect_components(const Vector3<double>& actual, const std::array<double, 3>& expected,
+                       double tolerance) {
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_NEAR(actual[i], expected[i], tolerance) << "axis " << i;
 }
 
 // The nominal environment of the model, written out. Rounding: 1e-15 of 2e-8.
 TEST(HarmonicEnvironment, IsTheNominalOneByDefault) {
-  const Environment environment(EnvironmentConfig{}, no_table, period_s);
+  const Environment environment(EnvironmentConfig{}, no_table, orbit_period_s);
   for (int k = -100; k < 100; ++k) {
     const double t = 71.3 * k;
-    const double m = 2.0 * std::numbers::pi * t / period_s;
+    const double m = 2.0 * std::numbers::pi * t / orbit_period_s;
     const ExternalAcceleration value = value_at(environment, t);
-    expect_vector(value.linear_m_s2,
-                  {5e-9 + 1e-8 * std::cos(m) + 3e-9 * std::cos(2 * m + 0.3), 3e-9 * std::sin(m),
-                   1e-8 * std::sin(m) + 3e-9 * std::sin(2 * m)},
-                  1e-22);
+    expect_components(value.linear_m_s2,
+                      {5e-9 + 1e-8 * std::cos(m) + 3e-9 * std::cos(2 * m + 0.3), 3e-9 * std::sin(m),
+                       1e-8 * std::sin(m) + 3e-9 * std::sin(2 * m)},
+                      1e-22);
     const double angular = 1e-8 * std::cos(m);
-    expect_vector(value.angular_rad_s2, {angular, angular, angular}, 1e-22);
+    expect_components(value.angular_rad_s2, {angular, angular, angular}, 1e-22);
   }
 }
 
@@ -46,9 +46,9 @@ TEST(HarmonicEnvironment, FollowsEachAxisOfItsConfiguration) {
     const auto x = static_cast<double>(i + 1);
     *axes[i] = {0.1 * x, 1.0 * x, 0.3 * x, 2.0 * x, -0.7 * x};
   }
-  const Environment environment(config, no_table, period_s);
+  const Environment environment(config, no_table, orbit_period_s);
   for (const double t : {-4000.0, 0.0, 1.0, 1000.0, 5000.0, 23800.25}) {
-    const double m = 2.0 * std::numbers::pi * t / period_s;
+    const double m = 2.0 * std::numbers::pi * t / orbit_period_s;
     const ExternalAcceleration value = value_at(environment, t);
     for (std::size_t i = 0; i < axes.size(); ++i) {
       const HarmonicAxis& axis = *axes[i];
@@ -79,7 +79,7 @@ EnvironmentConfig from_file(double scale = 1.0) {
 
 TEST(TabulatedEnvironment, IsLinearBetweenItsRows) {
   const EnvironmentTable rows = table(0.0, 6000.0);
-  const Environment environment(from_file(3.0), rows, period_s);
+  const Environment environment(from_file(3.0), rows, orbit_period_s);
   for (std::size_t k = 0; k + 2 < rows.size(); ++k) {
     for (const double part : {0.0, 0.125, 0.5, 0.995}) {
       const ExternalAcceleration value = value_at(environment, rows[k].time_s + 50.0 * part);
@@ -105,26 +105,27 @@ void expect_equal(const ExternalAcceleration& a, const ExternalAcceleration& b) 
 // The first orbit repeats, although the table goes on for another half.
 TEST(TabulatedEnvironment, RepeatsItsFirstOrbitIfItEndsBeforeTheSession) {
   const EnvironmentTable rows = table(0.0, 9000.0);
-  Environment environment(from_file(), rows, period_s);
+  Environment environment(from_file(), rows, orbit_period_s);
   EXPECT_TRUE(environment.is_periodic(59500.0));
   environment.begin_session(59500.0);
   for (const double t : {0.0, 12.5, 3000.0, 5949.75}) {
     const ExternalAcceleration first = value_at(environment, t);
     for (const int orbits : {1, 2, 9}) {
-      expect_equal(value_at(environment, t + orbits * period_s), first);
+      expect_equal(value_at(environment, t + orbits * orbit_period_s), first);
     }
   }
 }
 
 TEST(TabulatedEnvironment, IsFollowedToItsEndIfItCoversTheSession) {
   const EnvironmentTable rows = table(0.0, 12000.0);
-  Environment environment(from_file(), rows, period_s);
+  Environment environment(from_file(), rows, orbit_period_s);
   EXPECT_FALSE(environment.is_periodic(11900.0));
   EXPECT_FALSE(environment.is_periodic(12000.0));
   EXPECT_TRUE(environment.is_periodic(12000.25));
   environment.begin_session(11900.0);
   EXPECT_EQ(value_at(environment, 10000.0).linear_m_s2.x, rows[200].linear_m_s2[0]);
-  EXPECT_NE(rows[200].linear_m_s2[0], value_at(environment, 10000.0 - period_s).linear_m_s2.x);
+  EXPECT_NE(rows[200].linear_m_s2[0],
+            value_at(environment, 10000.0 - orbit_period_s).linear_m_s2.x);
   // Beyond the last row, its values stay.
   EXPECT_EQ(value_at(environment, 12001.0).linear_m_s2.x, rows.back().linear_m_s2[0]);
 }
@@ -133,18 +134,18 @@ TEST(TabulatedEnvironment, IsFollowedToItsEndIfItCoversTheSession) {
 // before is the first one.
 TEST(TabulatedEnvironment, HasValuesBeforeTheSession) {
   const EnvironmentTable from_zero = table(0.0, 12000.0);
-  Environment wrapped(from_file(), from_zero, period_s);
+  Environment wrapped(from_file(), from_zero, orbit_period_s);
   wrapped.begin_session(11900.0);
-  expect_equal(value_at(wrapped, -4000.0), value_at(wrapped, period_s - 4000.0));
+  expect_equal(value_at(wrapped, -4000.0), value_at(wrapped, orbit_period_s - 4000.0));
 
   const EnvironmentTable from_before = table(-5000.0, 12000.0);
-  Environment followed(from_file(), from_before, period_s);
+  Environment followed(from_file(), from_before, orbit_period_s);
   followed.begin_session(11900.0);
   EXPECT_EQ(value_at(followed, -4000.0).linear_m_s2.x, from_before[20].linear_m_s2[0]);
 }
 
 TEST(HarmonicEnvironment, IsNeverCalledPeriodicByItsTable) {
-  const Environment environment(EnvironmentConfig{}, no_table, period_s);
+  const Environment environment(EnvironmentConfig{}, no_table, orbit_period_s);
   EXPECT_FALSE(environment.is_periodic(1e9));
 }
 
@@ -163,7 +164,7 @@ TEST(EnvironmentTable, IsReadWhereTheOrbitBeginsAnew) {
 EnvironmentTable valid_table() { return {{0.0, {}, {}}, {3000.0, {}, {}}, {5950.0, {}, {}}}; }
 
 std::string refusal(const EnvironmentTable& table) {
-  return test::message_of<ConfigError>([&] { validate_environment_table(table, period_s); });
+  return test::message_of<ConfigError>([&] { validate_environment_table(table, orbit_period_s); });
 }
 
 TEST(EnvironmentTable, MayCoverJustOneOrbitAndStartBeforeTheSession) {

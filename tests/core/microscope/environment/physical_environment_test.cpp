@@ -1,11 +1,11 @@
 #include "core/microscope/environment/physical_environment.hpp"
 
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 const OrbitConfig circular{.period_s = 5950.0, .eccentricity = 0.0};
 const OrbitConfig elliptic{.period_s = 5950.0, .eccentricity = 0.3};
 

@@ -6,12 +6,13 @@
 #include <Eigen/Dense>
 
 #include "core/microscope/instrument/noise_config.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
 
-constexpr double period_s = 0.25, window_s = 4.0;
+constexpr double window_s = 4.0;
 
 std::vector<SensorNoise> noises() {
   return {NoiseConfig{}.linear_x,

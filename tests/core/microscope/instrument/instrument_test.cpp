@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 
 #include "core/microscope/instrument/sensor_model.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -107,7 +108,6 @@ TEST(TrueParameters, FollowTheirDefinitions) {
   EXPECT_DOUBLE_EQ(at(Parameter::a_d12), 0.0);
 }
 
-constexpr Vector3<double> zero{};
 const Matrix3<double> identity{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
 
 SensorModel<double> perfect_model() {

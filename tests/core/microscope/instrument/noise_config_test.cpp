@@ -2,12 +2,11 @@
 
 #include "core/microscope/simulation/sample_noise.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double period_s = 0.25;
 
 // A spring of stiffness k with structural losses 1/Q has the impedance Re Z = k/(Q ω), whose force
 // noise is 4 k_B T Re Z.

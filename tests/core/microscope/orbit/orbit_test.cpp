@@ -2,12 +2,11 @@
 
 #include "core/microscope/orbit/gradient.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 const std::vector<double>& eccentricities() {
   static const std::vector<double> values{0.0, 1e-6, 5e-3, 0.05, 0.3, 0.7};

@@ -3,16 +3,11 @@
 #include "core/microscope/environment/environment.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/session_record.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double period_s = 0.25;
-constexpr double two_pi = 2.0 * std::numbers::pi;
-constexpr Vector3<double> zero{};
-
-Instrument perfect_instrument() { return make_instrument({}); }
 
 Scenario silent_scenario() {
   Scenario scenario;
@@ -84,7 +79,7 @@ TEST(LoopRotation, FollowsATurningAxis) {
 double measured_rejection(double frequency_hz, const ResonatorGains& resonance_gains = {}) {
   const Scenario scenario = silent_scenario();
   const LoopConstants<double> constants =
-      make_loop_constants(perfect_instrument(), scenario, quiet_session());
+      make_loop_constants(make_instrument({}), scenario, quiet_session());
   const DragFreeGains drag_free = drag_free_gains(scenario.drag_free, period_s);
   const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
   const int samples = static_cast<int>(std::lround(1.0 / (frequency_hz * period_s)));
@@ -153,7 +148,7 @@ TEST(Loop, RejectsALineAltogetherWithAResonator) {
 TEST(Loop, FollowsTheSessionsCommand) {
   const Scenario scenario = silent_scenario();
   const LoopConstants<double> constants =
-      make_loop_constants(perfect_instrument(), scenario, quiet_session());
+      make_loop_constants(make_instrument({}), scenario, quiet_session());
   const DragFreeGains drag_free = drag_free_gains(scenario.drag_free, period_s);
   const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
   Loop<double> loop;
@@ -174,7 +169,7 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
   scenario.orbit.eccentricity = 0.0;
   Session session = quiet_session();
   session.spin_rate_rad_s = 4.7552e-3;  // 4.5 turns an orbit.
-  Instrument instrument = perfect_instrument();
+  Instrument instrument = make_instrument({});
   instrument.offcentring_S_m = {20e-6, 0.0, 0.0};
   const LoopConstants<double> constants = make_loop_constants(instrument, scenario, session);
   const KeplerOrbit orbit(scenario.orbit);
@@ -209,7 +204,7 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
 TEST(LoopConstants, PutTheUnitAtItsPlace) {
   Scenario scenario = silent_scenario();
   scenario.sensor.position_m = {0.5, 0.25, -0.5};
-  Instrument instrument = perfect_instrument();
+  Instrument instrument = make_instrument({});
   instrument.centre_offset_S_m = {0.0, 0.125, 0.0};
   instrument.offcentring_S_m = {0.0, 0.0, 0.25};
   const LoopConstants<double> constants =
@@ -232,7 +227,7 @@ TEST(Loop, MeasuresTheForceOfStiffElectrodes) {
   session.target = SessionTarget::a_c12;
   session.excitations = {{ExcitationKind::test_mass, Axis::y, 1e-5, 9.88e-3}};
   const LoopConstants<double> constants =
-      make_loop_constants(perfect_instrument(), scenario, session);
+      make_loop_constants(make_instrument({}), scenario, session);
   const KeplerOrbit orbit(scenario.orbit);
   const EnvironmentTable no_table;
   SessionSignals signals(scenario, session, orbit,
@@ -267,7 +262,7 @@ TEST(GroundSignals, SeeTheTrueAttitudeUnderACommandedSwing) {
   SessionSignals signals(scenario, session, orbit,
                          Environment(scenario.environment, no_table, orbit.period_s()));
   const LoopConstants<double> constants =
-      make_loop_constants(perfect_instrument(), scenario, session);
+      make_loop_constants(make_instrument({}), scenario, session);
   const DragFreeGains drag_free = drag_free_gains(scenario.drag_free, period_s);
   const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
   Loop<double> loop;

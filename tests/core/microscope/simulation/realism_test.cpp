@@ -6,13 +6,11 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-constexpr Vector3<double> zero{};
 
 Scenario scenario_with(const RealismConfig& config) {
   Scenario scenario;

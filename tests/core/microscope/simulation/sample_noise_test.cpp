@@ -1,11 +1,11 @@
 #include "core/microscope/simulation/sample_noise.hpp"
 
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
 
-constexpr double period_s = 0.25;
 constexpr std::size_t num_samples = 100;
 
 /// The 18 channels of a sample.

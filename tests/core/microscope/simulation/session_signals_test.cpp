@@ -4,13 +4,11 @@
 
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/environment/environment.hpp"
+#include "tests/support/constants.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-constexpr double period_s = 0.25;
 
 const EnvironmentTable no_table;
 
