@@ -10,7 +10,7 @@
 
 #include "core/campaign/definition.hpp"
 #include "proto/link/descriptor.hpp"
-#include "proto/text/byte_order_mark.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -12,7 +12,6 @@
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 #include "proto/model_program/model_choice.hpp"
 
 namespace proofmass::coordinator {

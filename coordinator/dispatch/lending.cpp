@@ -1,14 +1,10 @@
-#include "coordinator/dispatch/lending.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <iterator>
 #include <limits>
 #include <utility>
 
-#include "coordinator/dispatch/blame.hpp"
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/shares.hpp"
+#include "coordinator/dispatch/detail.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/conversions.hpp"

@@ -1,11 +1,9 @@
-#include "coordinator/dispatch/shares.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
-#include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/detail.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/workers.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,11 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/blame.hpp"
-#include "coordinator/dispatch/heartbeat.hpp"
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/detail.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/conversions.hpp"

@@ -18,7 +18,6 @@
 #include "core/error.hpp"
 #include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {

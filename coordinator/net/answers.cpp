@@ -26,7 +26,6 @@
 #include "core/error.hpp"
 #include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/wire/client_codec.hpp"

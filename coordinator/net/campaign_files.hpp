@@ -1,16 +1,20 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <system_error>
 #include <vector>
 
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/stop_rule.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -24,15 +28,23 @@ struct ServedCampaign {
 };
 
 /// Removes a database that was made for nothing, if it can be. @pre It is closed.
-void remove_made(const std::filesystem::path& file);
+inline void remove_made(const std::filesystem::path& file) {
+  std::error_code ignored;
+  std::filesystem::remove(file, ignored);
+  (void)wire::synchronise_directory_of(file);
+}
 
 /// The number of runs that a campaign is to have for now. With a stop rule it is the next at which
 /// the rule is checked, so that the stopping point does not depend on workers and their order.
 ///
 /// @param num_runs_wanted  Asked for; with a stop rule, at most.
 /// @param num_runs_now     In the file; 0 for a new one.
-[[nodiscard]] std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
-                                       std::uint64_t num_runs_now);
+[[nodiscard]] inline std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
+                                              std::uint64_t num_runs_now) {
+  if (plan.stop_rule.empty() || num_runs_wanted < num_runs_now) return num_runs_wanted;
+  const std::uint64_t num_before = num_runs_now == 0 ? 0 : num_runs_now - 1;
+  return std::min(next_stop_check(num_before), num_runs_wanted);
+}
 
 /// How runs are treated that crashed workers of an earlier coordinator.
 enum class GivenUpRuns : std::uint8_t {

@@ -10,13 +10,13 @@
 #include <iterator>
 #include <map>
 #include <optional>
-#include <random>
 #include <string>
 #include <utility>
 
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"
@@ -165,13 +165,6 @@ FileLook opened(const CampaignDirectory& directory, const std::filesystem::path&
   return prepare(std::move(campaign), GivenUpRuns::keep, start);
 }
 
-wire::Epoch random_epoch() {
-  std::random_device device;
-  wire::Epoch epoch;
-  while (epoch.value == 0) epoch.value = (std::uint64_t{device()} << 32) | device();
-  return epoch;
-}
-
 }  // namespace
 
 void KnownCampaigns::add(const CampaignRecord& campaign) {
@@ -222,7 +215,7 @@ std::vector<FileLook> look_at_all(const CampaignDirectory& directory, KnownCampa
 }
 
 CoordinatorStart coordinator_start(const std::string& version) {
-  return {.epoch = random_epoch(),
+  return {.epoch = {wire::random_number()},
           .host = wire::host_name(),
           .process_id = static_cast<std::uint64_t>(getpid()),
           .version = version};

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <utility>
 
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/store_error.hpp"

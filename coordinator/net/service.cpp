@@ -8,17 +8,14 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/request_service.hpp"
 #include "coordinator/net/server_paths.hpp"
-#include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_sockets.hpp"
-#include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/error.hpp"
 #include "proto/link/faults.hpp"

@@ -21,6 +21,8 @@
 
 namespace proofmass::coordinator {
 
+class Background;
+
 /// How a service is asked to end; set by signal handlers.
 enum class StopRequest : std::uint8_t {
   none,
@@ -84,6 +86,17 @@ struct ServiceConfig {
   WriterConfig writer;
   /// Descriptors that the process needs for something else than workers, clients and files.
   std::uint64_t num_descriptors_reserved = 0;
+};
+
+/// What the parts of a service have in common. They keep references to it: it outlives them.
+struct ServiceContext {
+  const ServiceConfig& config;
+  CoordinatorStart start;
+  State& state;
+  StoreWriter& writer;
+  Background& background;
+  Outbox& outbox;
+  std::function<TimePoint()> now;
 };
 
 /// Threads of a service, to be required before it is made: ZeroMQ's, and those that write, answer,

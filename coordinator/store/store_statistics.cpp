@@ -3,10 +3,8 @@
 #include <array>
 #include <span>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store.hpp"
 

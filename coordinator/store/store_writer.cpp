@@ -29,8 +29,7 @@ constexpr std::size_t entries_per_commit_max = 8192;
 /// Something that the caller waits for, after all that was handed over for its file.
 struct Request {
   wire::CampaignId campaign;  // 0: all files.
-  std::function<void()> action;
-  std::promise<void> done;
+  std::packaged_task<void()> action;
 };
 
 using Files = std::map<wire::CampaignId, OpenFile>;
@@ -142,8 +141,8 @@ bool StoreWriter::Impl::add(OpenFile& open_file, Entry entry) {
 }
 
 void StoreWriter::Impl::wait_for(wire::CampaignId campaign, std::function<void()> action) {
-  Request request{.campaign = campaign, .action = std::move(action), .done = {}};
-  std::future<void> done = request.done.get_future();
+  Request request{.campaign = campaign, .action = std::packaged_task<void()>(std::move(action))};
+  std::future<void> done = request.action.get_future();
   {
     const std::lock_guard lock(mutex);
     requests.push_back(std::move(request));
@@ -180,12 +179,7 @@ void StoreWriter::Impl::serve_request(Lock& lock) {
     write_all(campaign, lock);
   }
   lock.unlock();
-  try {
-    request.action();
-    request.done.set_value();
-  } catch (...) {
-    request.done.set_exception(std::current_exception());
-  }
+  request.action();  // What it throws is thrown to the caller.
   lock.lock();
 }
 

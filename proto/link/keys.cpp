@@ -11,7 +11,7 @@
 
 #include "core/error.hpp"
 #include "proto/link/whole_file.hpp"
-#include "proto/text/byte_order_mark.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 namespace {

@@ -37,8 +37,8 @@ constexpr int linger_of_dealer = 2000;
 // ZeroMQ 4.3.4 stop reading from the connection, and abort the process if the peer hangs up then
 // and a ZMTP heartbeat, ours or the peer's, is handled afterwards (stream_engine_base.cpp,
 // out_event(): `!_io_error`). No queue can be full that has no limit in messages. What bounds them
-// is the coordinator's limit on its memory (coordinator/net/memory_guard.hpp), in bytes and for all
-// connections together.
+// is the coordinator's limit on its memory (coordinator/net/service_sockets.hpp), in bytes and for
+// all connections together.
 constexpr int unread_count_max = 0;
 // Messages that wait to be sent to one peer. A worker may be told of many ranges and results at a
 // time; a peer that does not read them loses them, and the protocol repeats what matters.

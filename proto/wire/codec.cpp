@@ -17,19 +17,9 @@
 namespace proofmass::wire {
 namespace {
 
-/// The largest batch of results has 40,000.
-constexpr std::size_t fields_max = 65536;
-
-bool has_few_fields(std::string_view bytes) {
-  // A field takes two bytes or more, so that a short message cannot have too many. Counting takes
-  // as long as parsing.
-  return bytes.size() / 2 <= fields_max ||
-         detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max);
-}
-
-std::string too_large(std::size_t size) {
-  return fmt::format("message size = {} bytes (must be at most {})", size, message_size_max);
-}
+/// The largest batch of results has 40,000 fields.
+constexpr detail::Form message_form{
+    .name = "message", .kind = "an envelope", .size_max = message_size_max, .fields_max = 65536};
 
 using detail::checked_id;
 using detail::checked_magnitude;
@@ -297,34 +287,17 @@ void check(const proto::Envelope& envelope) {
 
 /// Why the bytes are not a message, if so.
 std::optional<DecodeError> read(std::string_view bytes, proto::Envelope& envelope) {
-  detail::silence_protobuf();
-  if (bytes.size() > message_size_max) {
-    return DecodeError{DecodeFault::too_large, too_large(bytes.size())};
-  }
-  const bool is_parsed = has_few_fields(bytes) &&
-                         envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!is_parsed) {
-    return DecodeError{DecodeFault::unparsable,
-                       fmt::format("message = {} bytes (must be an envelope of at most {} fields)",
-                                   bytes.size(), fields_max)};
-  }
-  if (envelope.protocol_version() != protocol_version) {
-    return DecodeError{DecodeFault::wrong_version,
-                       fmt::format("protocol_version = {} (must be {})",
-                                   envelope.protocol_version(), protocol_version)};
-  }
-  if (!is_of_worker(envelope) && !is_of_coordinator(envelope)) {
-    return DecodeError{DecodeFault::empty, "message = none (must be of a known kind)"};
-  }
-  try {
+  return detail::read(bytes, message_form, envelope, [&]() -> std::optional<DecodeError> {
+    const bool is_empty = !is_of_worker(envelope) && !is_of_coordinator(envelope);
+    const auto fault =
+        detail::fault_of_envelope(message_form, envelope.protocol_version(), is_empty);
+    if (fault) return fault;
     check(envelope);
-  } catch (const Error& error) {
-    return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
-  }
-  if (envelope.has_reject()) {
-    envelope.mutable_reject()->set_text(detail::printable(envelope.reject().text()));
-  }
-  return std::nullopt;
+    if (envelope.has_reject()) {
+      envelope.mutable_reject()->set_text(detail::printable(envelope.reject().text()));
+    }
+    return std::nullopt;
+  });
 }
 
 }  // namespace
@@ -343,10 +316,7 @@ std::variant<const proto::Envelope*, DecodeError> decode(std::string_view bytes,
 }
 
 std::string encode(proto::Envelope envelope) {
-  envelope.set_protocol_version(protocol_version);
-  const std::size_t size = envelope.ByteSizeLong();
-  if (size > message_size_max) throw InvalidArgument(too_large(size));
-  return envelope.SerializeAsString();
+  return detail::envelope_bytes(envelope, message_form);
 }
 
 }  // namespace proofmass::wire

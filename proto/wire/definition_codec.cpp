@@ -14,8 +14,11 @@
 namespace proofmass::wire {
 namespace {
 
-/// Tables and columns have at most some thousands; an array of numbers is one.
-constexpr std::size_t definition_fields_max = 4096;
+/// Tables and columns have at most some thousands of fields.
+constexpr detail::Form definition_form{.name = "definition",
+                                       .kind = "a definition",
+                                       .size_max = definition_size_max,
+                                       .fields_max = 4096};
 
 using Values = google::protobuf::RepeatedField<double>;
 
@@ -37,11 +40,6 @@ void check_table(const proto::DataTable& message) {
 }
 
 std::vector<double> vector_of(const Values& values) { return {values.begin(), values.end()}; }
-
-std::string size_text(std::size_t size) {
-  return fmt::format("definition size = {} bytes (must be at most {})", size, definition_size_max);
-}
-
 }  // namespace
 
 namespace detail {
@@ -91,32 +89,18 @@ Definition read_definition(const proto::Definition& message) {
 std::string encode_definition(const Definition& definition) {
   proto::Definition message;
   detail::write_definition(definition, message);
-  const std::size_t size = message.ByteSizeLong();
-  if (size > definition_size_max) throw InvalidArgument(size_text(size));
-  return message.SerializeAsString();
+  return detail::bytes_of(message, definition_form);
 }
 
 std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) {
-  detail::silence_protobuf();
-  if (bytes.size() > definition_size_max) {
-    return DecodeError{DecodeFault::too_large, size_text(bytes.size())};
-  }
   proto::Definition message;
-  const bool is_parsed =
-      detail::has_fields_at_most(bytes, *proto::Definition::descriptor(), definition_fields_max) &&
-      message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!is_parsed) {
-    return DecodeError{
-        DecodeFault::unparsable,
-        fmt::format("definition = {} bytes (must be a definition of at most {} fields)",
-                    bytes.size(), definition_fields_max)};
-  }
-  try {
-    detail::check_definition(message);
-    return detail::read_definition(message);
-  } catch (const Error& error) {
-    return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
-  }
+  const auto fault =
+      detail::read(bytes, definition_form, message, [&]() -> std::optional<DecodeError> {
+        detail::check_definition(message);
+        return std::nullopt;
+      });
+  if (fault) return *fault;
+  return detail::read_definition(message);
 }
 
 EncodedDefinition::EncodedDefinition(std::string bytes)

@@ -435,14 +435,12 @@ void Conversation::set_aside(wire::CampaignId campaign, std::span<const RunRange
 
 std::vector<RunKey> Conversation::keep_finished(TimePoint now) {
   std::vector<RunKey> runs;
-  for (FinishedRun& finished : execution_.take_finished()) {
+  for (wire::LeasedResult& finished : execution_.take_finished()) {
     const RunKey key{finished.campaign, finished.computed.result.run};
     const auto found = unfinished_.find(key);
     PROOFMASS_EXPECT(found != unfinished_.end());
-    unacknowledged_.add({.campaign = finished.campaign,
-                         .attempt = found->second,
-                         .computed = std::move(finished.computed)},
-                        now);
+    finished.attempt = found->second;
+    unacknowledged_.add(std::move(finished), now);
     unfinished_.erase(found);
     runs.push_back(key);
   }

@@ -36,8 +36,6 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
-#include "proto/link/surroundings.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/text/visible_text.hpp"
 

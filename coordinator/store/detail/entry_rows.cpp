@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/entry_rows.hpp"
-
 #include <fmt/format.h>
 
 #include <ctime>
@@ -7,7 +5,7 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/wire/names.hpp"
 

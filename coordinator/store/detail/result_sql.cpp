@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "coordinator/store/detail/result_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"

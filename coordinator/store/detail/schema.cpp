@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/model_program/described_model.hpp"
 

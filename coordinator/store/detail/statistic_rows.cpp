@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/statistic_rows.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "coordinator/store/detail/rows.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -73,7 +73,7 @@ class ServiceLimits : public test::ServiceTest {
 
   const std::string too_many =
       "error: campaigns = 2 (must be at most 1 unfinished ones of the key anna)";
-  const Asker anna{.name = "anna", .rights = Rights::usual()};
+  const Asker anna{.name = "anna", .rights = usual_rights};
   const wire::KeyPair coordinator_keys = wire::make_key_pair();
   const wire::KeyPair client_keys = wire::make_key_pair();
   std::filesystem::path keys;
