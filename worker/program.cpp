@@ -22,7 +22,6 @@
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"

@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "core/campaign/definition.hpp"
-#include "proto/link/descriptor.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {

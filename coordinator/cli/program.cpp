@@ -23,7 +23,6 @@
 #include "core/campaign/definition.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "coordinator/dispatch/detail.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

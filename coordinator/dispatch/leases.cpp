@@ -7,7 +7,7 @@
 
 #include "coordinator/dispatch/detail.hpp"
 #include "core/error.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {

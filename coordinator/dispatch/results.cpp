@@ -11,7 +11,7 @@
 #include "coordinator/dispatch/detail.hpp"
 #include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -9,7 +9,7 @@
 #include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {

@@ -24,7 +24,6 @@
 
 #include "coordinator/store/sha256.hpp"
 #include "core/error.hpp"
-#include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/model_program/model_choice.hpp"

@@ -19,7 +19,6 @@
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/store_writer.hpp"

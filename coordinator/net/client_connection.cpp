@@ -12,7 +12,6 @@
 #include <zmq.hpp>
 
 #include "core/error.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/endpoint.hpp"

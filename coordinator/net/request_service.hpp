@@ -14,7 +14,6 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 

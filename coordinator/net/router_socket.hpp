@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/keys.hpp"
+#include "proto/link/socket.hpp"
 
 namespace zmq {
 class context_t;

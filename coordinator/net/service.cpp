@@ -10,9 +10,9 @@
 
 #include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/background.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/request_service.hpp"
 #include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_sockets.hpp"

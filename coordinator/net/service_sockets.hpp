@@ -17,8 +17,8 @@
 #include "coordinator/net/authentication/authenticator.hpp"
 #include "coordinator/net/router_socket.hpp"
 #include "coordinator/net/service.hpp"
-#include "proto/link/descriptor.hpp"
 #include "proto/link/socket.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 

@@ -10,7 +10,6 @@
 #include "core/error.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/codec.hpp"
-#include "proto/wire/conversions.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/query/functions.hpp"
+#include "coordinator/query/aggregates.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store_error.hpp"

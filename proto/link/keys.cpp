@@ -101,15 +101,8 @@ std::filesystem::path key_file(const std::filesystem::path& directory, KeyRole r
 }  // namespace
 
 std::string_view to_text(KeyRole role) {
-  switch (role) {
-    case KeyRole::coordinator:
-      return "coordinator";
-    case KeyRole::worker:
-      return "worker";
-    case KeyRole::client:
-      return "client";
-  }
-  return "";
+  constexpr std::array<std::string_view, 3> names{"coordinator", "worker", "client"};
+  return names.at(static_cast<std::size_t>(role));
 }
 
 std::optional<PublicKey> PublicKey::parse(std::string_view text) {

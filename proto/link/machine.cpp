@@ -37,7 +37,7 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "proto/link/descriptor.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/wire/names.hpp"
 
 extern char** environ;

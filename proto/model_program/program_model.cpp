@@ -27,9 +27,9 @@
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/random/stream.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/model.hpp"
-#include "proto/link/descriptor.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/model_program/described_model.hpp"
 
 namespace proofmass::wire {

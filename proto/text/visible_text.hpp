@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdio>
 #include <string>
 #include <string_view>
 
@@ -41,5 +42,14 @@ struct Character {
   constexpr std::string_view mark = "\xEF\xBB\xBF";
   return text.starts_with(mark) ? text.substr(mark.size()) : text;
 }
+
+/// Tells the user on standard error, as visible_lines(): the text may quote a file or a peer. A
+/// failure to write, on a full disk or to a closed terminal, is ignored: answers go to standard
+/// output.
+void say(std::string_view text) noexcept;
+
+/// Writes to a stream as it is: for displays, which move the cursor.
+/// @pre What the text quotes of files and peers has been made visible.
+void say_on(std::FILE* stream, std::string_view text) noexcept;
 
 }  // namespace proofmass::wire

@@ -12,7 +12,7 @@
 #include "core/math/hash.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/runs.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 #include "core/runs.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 

@@ -20,9 +20,9 @@
 #include <zmq.hpp>
 
 #include "core/error.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/link/socket.hpp"
 #include "proto/wire/codec.hpp"
 #include "worker/spool/spool.hpp"
 #include "worker/supervision/supervisor.hpp"

@@ -5,9 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "proto/link/descriptor.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/net/conversation.hpp"

@@ -13,7 +13,6 @@
 #include "core/math/hash.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/codec.hpp"
-#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -16,7 +16,7 @@
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -34,7 +34,6 @@
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/text/visible_text.hpp"

@@ -12,8 +12,8 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/authentication/rights.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/keys.hpp"
+#include "proto/link/socket.hpp"
 
 namespace zmq {
 class context_t;

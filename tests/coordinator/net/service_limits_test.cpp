@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "coordinator/net/directory_look.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/link/keys.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"

@@ -1,4 +1,4 @@
-#include "coordinator/net/directory_look.hpp"
+#include "coordinator/net/campaign_files.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -185,8 +185,7 @@ FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const Coordinato
   FileLook look{.record = store.record(),
                 .stored = stored_campaign_of(campaign, given_up),
                 .plan = store.stop_plan(),
-                .num_failures = store.num_without_estimate(),
-                .sessions = store.attached_sessions()};
+                .num_failures = store.num_without_estimate()};
   look.record.file = campaign.file;
   look.record.status.set_name(campaign.definition->name);
   require_shown(campaign.file, look.record.status);
@@ -238,7 +237,10 @@ std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
 
 std::set<SessionId> sessions_of(const std::vector<FileLook>& looks) {
   std::set<SessionId> sessions;
-  for (const FileLook& look : looks) sessions.insert(look.sessions.begin(), look.sessions.end());
+  for (const FileLook& look : looks) {
+    if (look.store)
+      std::ranges::copy(look.store->attached_sessions(), std::inserter(sessions, sessions.end()));
+  }
   return sessions;
 }
 
