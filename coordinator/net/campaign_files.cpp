@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "coordinator/store/campaign_record.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"

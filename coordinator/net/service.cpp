@@ -386,13 +386,7 @@ std::optional<WorkerId> Service::worker_of(std::uint64_t process_id) const {
   return std::nullopt;
 }
 
-std::string Service::runs_held_text(WorkerId worker) const {
-  return coordinator::runs_held_text(impl_->state_, worker);
-}
-
-bool Service::is_quarantined(const std::string& host) const {
-  return coordinator::is_quarantined(impl_->state_, host);
-}
+const State& Service::state() const { return impl_->state_; }
 
 bool Service::has_crashing_campaign() const {
   return std::ranges::any_of(impl_->state_.campaigns, [&](const auto& item) {

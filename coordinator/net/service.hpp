@@ -139,9 +139,8 @@ class Service {
 
   /// Number of the worker with this process on this machine; nothing if it is not registered.
   [[nodiscard]] std::optional<WorkerId> worker_of(std::uint64_t process_id) const;
-  [[nodiscard]] std::string runs_held_text(WorkerId worker) const;  ///< For people.
-  /// True if runs are not lent to workers of that host any more: too many crashed there.
-  [[nodiscard]] bool is_quarantined(const std::string& host) const;
+  /// What its dispatch knows.
+  [[nodiscard]] const State& state() const;
   /// True if a campaign crashes at all workers that have its model.
   [[nodiscard]] bool has_crashing_campaign() const;
 

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/error.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "proto/text/event.hpp"
@@ -16,6 +18,15 @@
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
+
+/// What a StoreError says first of a file that nothing more can be written to.
+inline constexpr std::string_view disk_full_text = "the disk is full";
+
+/// A campaign database cannot be used as asked; reads `campaign database = path (what is wrong)`.
+class StoreError : public Error {
+ public:
+  using Error::Error;
+};
 
 // What goes into a campaign database, and what comes back when a coordinator starts.
 

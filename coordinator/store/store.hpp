@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "coordinator/store/records.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"

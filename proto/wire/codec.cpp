@@ -390,7 +390,8 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   message.set_is_by_card(computed.is_by_card);
 }
 
-void ResultBatches::add(CampaignId campaign, Attempt attempt, const ComputedRun& computed) {
+void ResultBatches::add(const LeasedResult& result) {
+  const auto& [campaign, attempt, computed] = result;
   proto::ResultBatch& batch = open_[{campaign, attempt}];
   batch.set_campaign(campaign.value);
   batch.set_attempt(attempt.value);

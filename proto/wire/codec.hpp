@@ -70,7 +70,7 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message);
 /// Results as messages, each of one campaign and attempt.
 class ResultBatches {
  public:
-  void add(CampaignId campaign, Attempt attempt, const ComputedRun& computed);
+  void add(const LeasedResult& result);
   /// Full ones first. @pre Is called once, at the end.
   [[nodiscard]] std::vector<proto::ResultBatch> take();
 

@@ -159,10 +159,6 @@ void Conversation::on_message(const proto::Envelope& message, TimePoint now) {
   const bool is_about_registration = message.has_reject() || message.has_welcome();
   // What another coordinator process has said before it ended means nothing to the present one.
   if (!is_about_registration && message.epoch() != epoch_.value) return;
-  handle(message, now);
-}
-
-void Conversation::handle(const proto::Envelope& message, TimePoint now) {
   switch (message.from_coordinator_case()) {
     case proto::Envelope::kWelcome:
       return on_welcome(message, now);

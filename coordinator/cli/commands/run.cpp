@@ -30,7 +30,7 @@
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"

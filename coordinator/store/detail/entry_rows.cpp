@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "coordinator/store/detail/rows.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -11,9 +11,9 @@
 
 #include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/records.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 
