@@ -72,7 +72,8 @@ class RateMeter {
     for (const Count& count : counts_) {
       if (count.began_at >= from) num_runs += count.num_runs;
     }
-    return now > from ? static_cast<double>(num_runs) / seconds(now - from) : 0.0;
+    const double elapsed_s = std::chrono::duration<double>(now - from).count();
+    return elapsed_s > 0.0 ? static_cast<double>(num_runs) / elapsed_s : 0.0;
   }
 
  private:

@@ -137,10 +137,9 @@ void require_count(int count, std::uint64_t minimum, std::uint64_t maximum,
                     fmt::format("must be in [{}, {}]", minimum, maximum));
 }
 
-std::string checked_name(const std::string& name, std::string_view field) {
+void require_name(const std::string& name, std::string_view field) {
   // The name itself is not repeated: it may hold anything.
   require(is_name(name), field, fmt::format("{} bytes", name.size()), is_name_rule);
-  return name;
 }
 
 void require_cards(const std::string& cards) {
@@ -148,14 +147,15 @@ void require_cards(const std::string& cards) {
   require(printable(cards) == cards, "cards", printable(cards), "must be printable ASCII");
 }
 
-double checked_magnitude(double value, std::string_view field) {
-  if (std::isfinite(value) && value >= 0.0) return value;
-  throw ConfigError(field, fmt::format("{}", value), "must be >= 0");
+void require_magnitude(double value, std::string_view field, double maximum) {
+  if (value >= 0.0 && value <= maximum) return;
+  const bool is_too_large = value > maximum && std::isfinite(value);
+  throw ConfigError(field, fmt::format("{}", value),
+                    is_too_large ? fmt::format("must be <= {}", maximum) : "must be >= 0");
 }
 
-std::uint64_t checked_id(std::uint64_t id, std::string_view field) {
+void require_id(std::uint64_t id, std::string_view field) {
   require(id != 0, field, "0", "must not be 0");
-  return id;
 }
 
 std::string printable(std::string_view text) {

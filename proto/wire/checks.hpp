@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -60,18 +61,19 @@ void require_in(std::uint64_t value, std::uint64_t minimum, std::uint64_t maximu
 /// @throws ConfigError unless a list has `minimum` to `maximum` entries.
 void require_count(int count, std::uint64_t minimum, std::uint64_t maximum, std::string_view field);
 
-/// The name. @throws ConfigError unless is_name() holds.
-[[nodiscard]] std::string checked_name(const std::string& name, std::string_view field);
+/// @throws ConfigError unless is_name() holds.
+void require_name(const std::string& name, std::string_view field);
 
 /// @throws ConfigError unless the names of cards are printable ASCII of cards_text_size_max bytes
 /// at most.
 void require_cards(const std::string& cards);
 
-/// The value. @throws ConfigError unless it is finite and ≥ 0.
-[[nodiscard]] double checked_magnitude(double value, std::string_view field);
+/// @throws ConfigError unless the value is finite and in [0, maximum].
+void require_magnitude(double value, std::string_view field,
+                       double maximum = std::numeric_limits<double>::max());
 
-/// The number. @throws ConfigError if it is 0.
-[[nodiscard]] std::uint64_t checked_id(std::uint64_t id, std::string_view field);
+/// @throws ConfigError if it is 0.
+void require_id(std::uint64_t id, std::string_view field);
 
 /// The text, cut to 400 bytes, with `?` for all but printable ASCII: for logs and for the peer, as
 /// parts may come from that peer.

@@ -85,11 +85,11 @@ void cut_counts(proto::CampaignStatus& campaign) {
   campaign.set_num_done(std::min(campaign.num_done(), num_runs - num_given_up));
 }
 
-using detail::checked_magnitude;
-using detail::checked_name;
 using detail::require;
 using detail::require_count;
 using detail::require_in;
+using detail::require_magnitude;
+using detail::require_name;
 
 /// A reply with 4096 workers has 37,000.
 constexpr std::size_t envelope_fields_max = std::size_t{1} << 16;
@@ -134,7 +134,7 @@ void check(const proto::SubmitRequest& message) {
 
 void check(const proto::ControlRequest& message) {
   check_enumerator(message.action(), proto::ControlAction_MAX, "action");
-  (void)checked_name(message.campaign(), "campaign");
+  require_name(message.campaign(), "campaign");
   check_priority(message.priority());
 }
 
@@ -158,7 +158,7 @@ void check_argument(const std::string& text, std::size_t size_max, std::string_v
 }
 
 void check(const proto::AnswerRequest& message) {
-  (void)checked_name(message.campaign(), "campaign");
+  require_name(message.campaign(), "campaign");
   check_enumerator(message.question(), proto::Question_MAX, "question");
   require_count(message.options_size(), 0, answer_options_max, "options");
   for (const std::string& option : message.options()) {
@@ -181,39 +181,39 @@ void check_text(const std::string& text, std::string_view field) {
 }
 
 void check_owner(const std::string& owner) {
-  if (!owner.empty()) (void)checked_name(owner, "owner");
+  if (!owner.empty()) require_name(owner, "owner");
 }
 
 void check(const proto::FactoryReport& message) {
   require_in(message.interval_s(), 1, factory_interval_s_max, "interval_s");
-  (void)checked_name(message.name(), "name");
-  (void)checked_name(message.batch_system(), "batch_system");
+  require_name(message.name(), "name");
+  require_name(message.batch_system(), "batch_system");
   check_enumerator(message.phase(), proto::FactoryPhase_MAX, "phase");
-  (void)checked_magnitude(message.wait_s(), "wait_s");
+  require_magnitude(message.wait_s(), "wait_s");
   check_text(message.reason(), "reason");
 }
 
 void check(const proto::FactoryStatus& message) {
   check(message.report());
   check_owner(message.owner());
-  (void)checked_magnitude(message.silent_s(), "silent_s");
+  require_magnitude(message.silent_s(), "silent_s");
 }
 
 void check(const proto::CampaignStatus& message) {
   require_in(message.num_runs(), 1, num_runs_max, "num_runs");
   require_in(message.num_given_up(), 0, message.num_runs(), "num_given_up");
   require_in(message.num_done(), 0, message.num_runs() - message.num_given_up(), "num_done");
-  (void)checked_name(message.name(), "name");
+  require_name(message.name(), "name");
   check_enumerator(message.phase(), proto::CampaignPhase_MAX, "phase");
   check_priority(message.priority());
-  (void)checked_magnitude(message.rate_hz(), "rate_hz");
-  (void)checked_magnitude(message.remaining_s(), "remaining_s");
+  require_magnitude(message.rate_hz(), "rate_hz");
+  require_magnitude(message.remaining_s(), "remaining_s");
   check_text(message.storage_failure(), "storage_failure");
   if (!message.missing_model().empty()) {
-    (void)checked_name(message.missing_model(), "missing_model");
+    require_name(message.missing_model(), "missing_model");
   }
   if (!message.model_version().empty()) {
-    (void)checked_name(message.model_version(), "model_version");
+    require_name(message.model_version(), "model_version");
   }
   check_owner(message.owner());
 }
@@ -224,44 +224,44 @@ void check(const proto::StatusReply& message) {
   require_count(message.quarantined_hosts_size(), 0, quarantined_hosts_per_reply_max,
                 "quarantined_hosts");
   require_count(message.factories_size(), 0, factories_max, "factories");
-  (void)checked_name(message.version(), "version");
-  (void)checked_name(message.model_version(), "model_version");
-  (void)checked_magnitude(message.uptime_s(), "uptime_s");
+  require_name(message.version(), "version");
+  require_name(message.model_version(), "model_version");
+  require_magnitude(message.uptime_s(), "uptime_s");
   for (const proto::CampaignStatus& campaign : message.campaigns()) check(campaign);
   for (const proto::UnservedFile& file : message.unserved_files()) {
     check_text(file.file(), "file");
     check_text(file.reason(), "reason");
   }
   for (const std::string& host : message.quarantined_hosts()) {
-    (void)checked_name(host, "quarantined_hosts");
+    require_name(host, "quarantined_hosts");
   }
   for (const proto::FactoryStatus& factory : message.factories()) check(factory);
   check_text(message.last_refusal(), "last_refusal");
-  (void)checked_magnitude(message.last_refusal_s(), "last_refusal_s");
+  require_magnitude(message.last_refusal_s(), "last_refusal_s");
 }
 
 void check(const proto::WorkersReply& message) {
   require_count(message.workers_size(), 0, workers_per_reply_max, "workers");
   for (const proto::WorkerStatus& worker : message.workers()) {
-    (void)detail::checked_id(worker.worker_id(), "worker_id");
-    (void)checked_name(worker.name(), "name");
-    (void)checked_name(worker.host(), "host");
-    (void)checked_magnitude(worker.silent_s(), "silent_s");
+    detail::require_id(worker.worker_id(), "worker_id");
+    require_name(worker.name(), "name");
+    require_name(worker.host(), "host");
+    require_magnitude(worker.silent_s(), "silent_s");
     detail::require_cards(worker.cards());
-    (void)checked_magnitude(worker.card_rate_hz(), "card_rate_hz");
+    require_magnitude(worker.card_rate_hz(), "card_rate_hz");
   }
 }
 
 void check(const proto::AnswerReply& message) {
   require_in(message.offset(), 0, message.size(), "offset");
   require_in(message.exit_code(), 0, 255, "exit_code");
-  (void)detail::checked_id(message.answer_id(), "answer_id");
+  detail::require_id(message.answer_id(), "answer_id");
   check_sha256(message.sha256(), "sha256");
   check_text(message.error_text(), "error_text");
 }
 
 void check(const proto::RequestEnvelope& envelope) {
-  (void)detail::checked_id(envelope.request_id(), "request_id");
+  detail::require_id(envelope.request_id(), "request_id");
   switch (envelope.request_case()) {
     case proto::RequestEnvelope::kSubmit:
       return check(envelope.submit());
@@ -273,11 +273,11 @@ void check(const proto::RequestEnvelope& envelope) {
     case proto::RequestEnvelope::kPart:
       return check(envelope.part());
     case proto::RequestEnvelope::kReleaseHost:
-      return (void)checked_name(envelope.release_host().host(), "host");
+      return require_name(envelope.release_host().host(), "host");
     case proto::RequestEnvelope::kAnswer:
       return check(envelope.answer());
     case proto::RequestEnvelope::kAnswerPart:
-      return (void)detail::checked_id(envelope.answer_part().answer_id(), "answer_id");
+      return detail::require_id(envelope.answer_part().answer_id(), "answer_id");
     case proto::RequestEnvelope::kFactoryReport:
       return check(envelope.factory_report());
     case proto::RequestEnvelope::REQUEST_NOT_SET:

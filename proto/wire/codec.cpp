@@ -21,20 +21,16 @@ namespace {
 constexpr detail::Form message_form{
     .name = "message", .kind = "an envelope", .size_max = message_size_max, .fields_max = 65536};
 
-using detail::checked_id;
-using detail::checked_magnitude;
-using detail::checked_name;
 using detail::require;
 using detail::require_count;
+using detail::require_id;
 using detail::require_in;
+using detail::require_magnitude;
+using detail::require_name;
 
-void check_campaign(std::uint64_t id) { (void)checked_id(id, "campaign"); }
-void check_attempt(std::uint32_t attempt) { (void)checked_id(attempt, "attempt"); }
+void check_campaign(std::uint64_t id) { require_id(id, "campaign"); }
+void check_attempt(std::uint32_t attempt) { require_id(attempt, "attempt"); }
 void check_run(std::uint64_t run) { require_in(run, 0, num_runs_max - 1, "run"); }
-void check_name(const std::string& name, std::string_view field) {
-  (void)checked_name(name, field);
-}
-
 void check_ranges(const Ranges& ranges) {
   require_count(ranges.size(), 1, ranges_per_message_max, "ranges");
   for (const proto::Range& range : ranges) {
@@ -61,19 +57,19 @@ void check(const proto::Hello& hello) {
   require_in(hello.num_slots(), 1, slots_max, "num_slots");
   require_in(hello.num_card_slots(), 0, hello.num_slots() - 1, "num_card_slots");
   detail::require_cards(hello.cards());
-  check_name(hello.worker_name(), "worker_name");
-  check_name(hello.host(), "host");
-  check_name(hello.model_version(), "model_version");
-  check_name(hello.build(), "build");
+  require_name(hello.worker_name(), "worker_name");
+  require_name(hello.host(), "host");
+  require_name(hello.model_version(), "model_version");
+  require_name(hello.build(), "build");
   require_in(hello.slots_per_thread(), 0, hello.num_slots() - hello.num_card_slots(),
              "slots_per_thread");
   require_count(hello.other_models_size(), 0, other_models_max, "other_models");
   for (const proto::OtherModel& other : hello.other_models()) {
-    check_name(other.version(), "other_models.version");
+    require_name(other.version(), "other_models.version");
   }
   if (!hello.has_former()) return;
   require_in(hello.former().signal(), 0, signal_max, "former signal");
-  (void)checked_id(hello.former().session(), "former session");
+  require_id(hello.former().session(), "former session");
   check_reason(hello.former().reason(),
                {LossReason::crashed, LossReason::out_of_memory, LossReason::preempted});
 }
@@ -83,7 +79,7 @@ void check(const proto::Welcome& welcome) {
   require(interval_s > 0.0 && interval_s <= heartbeat_interval_s_max, "heartbeat_interval_s",
           fmt::format("{}", interval_s),
           fmt::format("must be in (0, {}]", heartbeat_interval_s_max));
-  (void)checked_id(welcome.worker_id(), "worker_id");
+  require_id(welcome.worker_id(), "worker_id");
 }
 
 void check(const proto::Reject& reject) {
@@ -163,11 +159,6 @@ void check_values(const Values& values, bool have_meaning, double least, double 
   }
 }
 
-void check_time(double time_s, std::string_view field) {
-  if (checked_magnitude(time_s, field) <= run_time_s_max) return;
-  throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", run_time_s_max));
-}
-
 void check_loss(std::uint32_t position, bool is_lost, std::string_view field) {
   constexpr std::uint64_t positions_max = 255;
   require_in(position, is_lost ? 1 : 0, is_lost ? positions_max : 0, field);
@@ -190,8 +181,8 @@ void check(const proto::ComputedRun& run) {
   check_values(run.correlation(), has_errors, -1.0, 1.0, "correlation");
   check_loss(run.loss_cause(), result.status == RunStatus::lost, "loss_cause");
   check_loss(run.loss_session(), result.status == RunStatus::lost, "loss_session");
-  check_time(run.compute_s(), "compute_s");
-  check_time(run.elapsed_s(), "elapsed_s");
+  require_magnitude(run.compute_s(), "compute_s", run_time_s_max);
+  require_magnitude(run.elapsed_s(), "elapsed_s", run_time_s_max);
 }
 
 void check(const proto::ResultBatch& batch) {
@@ -279,7 +270,7 @@ void check_of_coordinator(const proto::Envelope& envelope) {
 /// their limits, enumerators are known, names are names, lists have as many entries as others say.
 /// @throws ConfigError reading `field = value (rule)`.
 void check(const proto::Envelope& envelope) {
-  (void)checked_id(envelope.session(), "session");
+  require_id(envelope.session(), "session");
   require(!is_of_worker(envelope) || !is_of_coordinator(envelope), "message", "two", "must be one");
   check_of_worker(envelope);
   check_of_coordinator(envelope);

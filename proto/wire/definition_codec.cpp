@@ -35,7 +35,7 @@ void check_table(const proto::DataTable& message) {
   detail::require(size % message.num_columns() == 0, "definition.tables.values",
                   fmt::format("{} entries", size),
                   fmt::format("must be rows of {}", message.num_columns()));
-  (void)detail::checked_name(message.key(), "definition.tables.key");
+  detail::require_name(message.key(), "definition.tables.key");
   check_finite(message.values(), "definition.tables.values");
 }
 
@@ -61,7 +61,7 @@ void write_definition(const Definition& definition, proto::Definition& message) 
 void check_definition(const proto::Definition& message) {
   require_in(message.text().size(), 1, definition_text_size_max, "definition.text size");
   if (!message.model_version().empty()) {
-    (void)checked_name(message.model_version(), "definition.model_version");
+    require_name(message.model_version(), "definition.model_version");
   }
   require_count(message.tables_size(), 0, definition_tables_max, "definition.tables");
   require_count(message.table_columns_size(), 0, table_columns_max, "definition.table_columns");

@@ -109,7 +109,7 @@ class FakeExecution final : public Execution {
   }
   void finish(wire::CampaignId campaign, const std::vector<RunRange>& ranges) {
     for (const RunIndex run : indices_of(ranges)) {
-      wire::LeasedResult done{.campaign = campaign, .computed = {}};
+      wire::LeasedResult done{.campaign = campaign, .attempt = {}, .computed = {}};
       done.computed.result = test::zero_result({.run = run});
       finished.push_back(done);
     }
