@@ -149,8 +149,8 @@ bool StoreWriter::add(OpenFile& open_file, Entry entry) {
 }
 
 void StoreWriter::wait_for(wire::CampaignId campaign, std::function<void()> action) {
-  Request request{.campaign = campaign, .action = std::packaged_task<void()>(std::move(action))};
-  std::future<void> done = request.action.get_future();
+  Request request{.campaign = campaign, .action = std::move(action), .done = {}};
+  std::future<void> done = request.done.get_future();
   {
     const std::lock_guard lock(mutex_);
     requests_.push_back(std::move(request));
@@ -187,7 +187,12 @@ void StoreWriter::serve_request(Lock& lock) {
     write_all(campaign, lock);
   }
   lock.unlock();
-  request.action();  // What it throws is thrown to the caller.
+  try {
+    request.action();
+    request.done.set_value();
+  } catch (...) {
+    request.done.set_exception(std::current_exception());
+  }
   lock.lock();
 }
 

@@ -186,7 +186,8 @@ class StoreWriter {
   /// Something that the caller waits for, after all that was handed over for its file.
   struct Request {
     wire::CampaignId campaign;  // 0: all files.
-    std::packaged_task<void()> action;
+    std::function<void()> action;
+    std::promise<void> done;
   };
 
   /// What came of one attempt to write.

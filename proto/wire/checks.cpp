@@ -58,10 +58,7 @@ bool count_down(Stream& stream, const Descriptor& type, std::size_t& count_left)
   return stream.ConsumedEntireMessage();
 }
 
-/// A field takes two bytes or more, so that a short message cannot have too many. Counting takes as
-/// long as parsing.
 bool has_fields_at_most(std::string_view bytes, const Descriptor& type, std::size_t count_max) {
-  if (bytes.size() / 2 <= count_max) return true;
   Stream stream(reinterpret_cast<const std::uint8_t*>(bytes.data()),
                 static_cast<int>(bytes.size()));
   return count_down(stream, type, count_max);
@@ -80,8 +77,12 @@ std::optional<DecodeError> read(std::string_view bytes, const Form& form,
                                 const std::function<std::optional<DecodeError>()>& check) {
   silence_protobuf();
   if (bytes.size() > form.size_max) return too_large(form, bytes.size());
-  const bool is_parsed = has_fields_at_most(bytes, *message.GetDescriptor(), form.fields_max) &&
-                         message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  // A field takes two bytes or more, so that a short message cannot have too many.
+  const bool is_counted = form.is_always_counted || bytes.size() / 2 > form.fields_max;
+  const bool has_few =
+      !is_counted || has_fields_at_most(bytes, *message.GetDescriptor(), form.fields_max);
+  const bool is_parsed =
+      has_few && message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!is_parsed) {
     return DecodeError{DecodeFault::unparsable,
                        fmt::format("{} = {} bytes (must be {} of at most {} fields)", form.name,

@@ -26,6 +26,7 @@ struct Form {
   /// some hundred bytes of memory a field, and a field may take two bytes: without this, a message
   /// within its limit of size could cost fifty times that limit.
   std::size_t fields_max;
+  bool is_always_counted = true;  ///< Counting takes as long as parsing.
 };
 
 /// Decodes any bytes.

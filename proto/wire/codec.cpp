@@ -18,8 +18,11 @@ namespace proofmass::wire {
 namespace {
 
 /// The largest batch of results has 40,000 fields.
-constexpr detail::Form message_form{
-    .name = "message", .kind = "an envelope", .size_max = message_size_max, .fields_max = 65536};
+constexpr detail::Form message_form{.name = "message",
+                                    .kind = "an envelope",
+                                    .size_max = message_size_max,
+                                    .fields_max = 65536,
+                                    .is_always_counted = false};
 
 using detail::require;
 using detail::require_count;
