@@ -19,7 +19,6 @@
 #include "core/math/instruction_set.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

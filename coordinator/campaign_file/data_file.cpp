@@ -9,8 +9,8 @@
 #include <cstring>
 
 #include "core/campaign/definition.hpp"
-#include "proto/link/descriptor.hpp"
-#include "proto/text/byte_order_mark.hpp"
+#include "proto/link/whole_file.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -13,7 +13,7 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "proto/link/descriptor.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 

@@ -15,7 +15,6 @@
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"

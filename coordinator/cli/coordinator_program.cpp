@@ -26,10 +26,8 @@
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
-#include "proto/link/init_system.hpp"
 #include "proto/link/log.hpp"
-#include "proto/link/start_program.hpp"
-#include "proto/link/surroundings.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"
 
 namespace proofmass::coordinator {

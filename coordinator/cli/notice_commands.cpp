@@ -6,7 +6,6 @@
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 
 extern char** environ;
 

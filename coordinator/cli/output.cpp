@@ -16,7 +16,6 @@
 #include "coordinator/report/status_json.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 

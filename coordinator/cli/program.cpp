@@ -23,8 +23,7 @@
 #include "core/campaign/definition.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
-#include "proto/link/surroundings.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

@@ -8,7 +8,6 @@
 
 #include "coordinator/cli/output.hpp"
 #include "coordinator/report/status_notes.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

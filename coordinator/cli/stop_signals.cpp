@@ -6,8 +6,8 @@
 #include <stop_token>
 
 #include "coordinator/cli/program.hpp"
-#include "coordinator/store/store_error.hpp"
-#include "proto/command_line/standard_error.hpp"
+#include "coordinator/store/records.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -12,7 +12,6 @@
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 #include "proto/model_program/model_choice.hpp"
 
 namespace proofmass::coordinator {
@@ -112,7 +111,7 @@ void LocalWorkers::replace_dead() {
 
 void LocalWorkers::replace(const WorkerProcesses::Exit& exit) {
   const auto worker = service_.worker_of(static_cast<std::uint64_t>(exit.process_id));
-  const std::string runs = worker ? service_.runs_held_text(*worker) : "none";
+  const std::string runs = worker ? runs_held_text(service_.state(), *worker) : "none";
   if (worker) service_.worker_ended(*worker, exit.reason);
   check(exit, runs);
   display_.note(fmt::format("worker {} (pid {}) ended: {}; it held runs {}; starting another",
@@ -131,7 +130,7 @@ void LocalWorkers::check(const WorkerProcesses::Exit& exit, const std::string& r
       exit.reason == LossReason::crashed || exit.reason == LossReason::out_of_memory;
   const bool is_accounted_for = is_blamed && runs != "none";
   const bool is_hopeless = !is_accounted_for && num_failures_ >= failures_in_a_row_max;
-  if (!is_hopeless && !service_.is_quarantined(host_)) return;
+  if (!is_hopeless && !is_quarantined(service_.state(), host_)) return;
   throw Error(
       fmt::format("{} workers in a row ended without a finished run; the last, {}: {}, "
                   "holding runs {}",

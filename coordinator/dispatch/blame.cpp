@@ -1,9 +1,7 @@
-#include "coordinator/dispatch/blame.hpp"
-
 #include <algorithm>
 #include <utility>
 
-#include "coordinator/dispatch/shares.hpp"
+#include "coordinator/dispatch/detail.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

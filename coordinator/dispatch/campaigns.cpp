@@ -1,14 +1,10 @@
-#include "coordinator/dispatch/campaigns.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "coordinator/dispatch/blame.hpp"
-#include "coordinator/dispatch/heartbeat.hpp"
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/detail.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 

@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/heartbeat.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -8,10 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/blame.hpp"
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/lending.hpp"
-#include "proto/wire/conversions.hpp"
+#include "coordinator/dispatch/detail.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

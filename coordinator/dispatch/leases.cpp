@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/leases.hpp"
-
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
@@ -7,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/blame.hpp"
+#include "coordinator/dispatch/detail.hpp"
 #include "core/error.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/results.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,11 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/detail.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -5,8 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/detail.hpp"
 #include "core/math/hash.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "coordinator/dispatch/leases.hpp"
+#include "coordinator/dispatch/detail.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 #include "core/model.hpp"

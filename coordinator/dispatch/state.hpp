@@ -327,7 +327,7 @@ class LentSlots {
 };
 
 /// All that the dispatch knows. Only the events change it: the functions
-/// on_...() of campaigns.hpp, results.hpp and workers.hpp.
+/// on_...() of events.hpp.
 struct State {
   DispatchConfig config;
   std::map<CampaignId, CampaignState> campaigns;

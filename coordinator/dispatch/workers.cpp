@@ -1,5 +1,3 @@
-#include "coordinator/dispatch/workers.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,14 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/blame.hpp"
-#include "coordinator/dispatch/heartbeat.hpp"
-#include "coordinator/dispatch/leases.hpp"
-#include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/detail.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {

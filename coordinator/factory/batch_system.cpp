@@ -16,9 +16,8 @@
 
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
-#include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -24,9 +24,7 @@
 
 #include "coordinator/store/sha256.hpp"
 #include "core/error.hpp"
-#include "proto/link/descriptor.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -182,17 +180,12 @@ void limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) 
   if (prlimit(process_id, resource, &wanted, nullptr) != 0 && errno != ESRCH) fail("limits");
 }
 
-struct Pipe {
-  Pipe() {
-    std::array<int, 2> ends{};
-    if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
-    reading = Descriptor(ends[0]);
-    writing = Descriptor(ends[1]);
-  }
-
-  Descriptor reading;
-  Descriptor writing;
-};
+/// A pipe: the end to read, and the end to write.
+std::pair<Descriptor, Descriptor> make_pipe() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
+  return {Descriptor(ends[0]), Descriptor(ends[1])};
+}
 
 /// A process that answers a question, from its start to its end.
 class AnswerProcess {
@@ -202,10 +195,10 @@ class AnswerProcess {
     const Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
     process_id_ = wire::start_program(
         {.arguments = order.arguments,
-         .descriptors = {nothing.number(), output_.writing.number(), errors_.writing.number()},
+         .descriptors = {nothing.number(), output_.second.number(), errors_.second.number()},
          .environment = wire::environment_without_settings()});
-    output_.writing = Descriptor();
-    errors_.writing = Descriptor();
+    output_.second = Descriptor();
+    errors_.second = Descriptor();
   }
   ~AnswerProcess() {
     if (process_id_ == 0) return;
@@ -226,14 +219,14 @@ class AnswerProcess {
   /// Waits for the end. @returns What waitpid() says of it; nothing if it was ended before.
   /// @throws Error if the answer is too large or cannot be written.
   std::optional<int> follow(Clock::time_point deadline, const std::atomic<bool>& is_cancelled) {
-    std::array<pollfd, 2> items{pollfd{output_.reading.number(), POLLIN, 0},
-                                pollfd{errors_.reading.number(), POLLIN, 0}};
+    std::array<pollfd, 2> items{pollfd{output_.first.number(), POLLIN, 0},
+                                pollfd{errors_.first.number(), POLLIN, 0}};
     while (items[0].fd >= 0 || items[1].fd >= 0) {
       if (is_cancelled || Clock::now() > deadline) return std::nullopt;
       if (poll(items.data(), items.size(), look_interval_ms) <= 0) continue;
       for (pollfd& item : items) {
         if (item.revents == 0) continue;
-        const bool is_output = item.fd == output_.reading.number();
+        const bool is_output = item.fd == output_.first.number();
         const std::optional<std::string_view> bytes = read_some(item.fd);
         if (bytes) is_output ? take_output(*bytes) : take_errors(*bytes);
         if (!bytes) item.fd = -1;
@@ -271,8 +264,8 @@ class AnswerProcess {
   int wait() { return wire::wait_for_end(std::exchange(process_id_, 0)); }
 
   const UnnamedFile& answer_;
-  Pipe output_;
-  Pipe errors_;
+  std::pair<Descriptor, Descriptor> output_ = make_pipe();
+  std::pair<Descriptor, Descriptor> errors_ = make_pipe();
   pid_t process_id_ = 0;
   std::uint64_t num_written_ = 0;
   std::vector<char> bytes_ = std::vector<char>(std::size_t{64} << 10);

@@ -12,8 +12,8 @@
 #include <string_view>
 
 #include "coordinator/net/authentication/rights.hpp"
-#include "coordinator/net/outcome.hpp"
-#include "coordinator/net/service_context.hpp"
+#include "coordinator/net/background.hpp"
+#include "coordinator/net/service.hpp"
 
 namespace proofmass::coordinator {
 

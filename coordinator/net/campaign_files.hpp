@@ -1,16 +1,25 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
+#include <system_error>
 #include <vector>
 
+#include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/authentication/rights.hpp"
+#include "coordinator/store/campaign_record.hpp"
+#include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/stop_rule.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -24,15 +33,23 @@ struct ServedCampaign {
 };
 
 /// Removes a database that was made for nothing, if it can be. @pre It is closed.
-void remove_made(const std::filesystem::path& file);
+inline void remove_made(const std::filesystem::path& file) {
+  std::error_code ignored;
+  std::filesystem::remove(file, ignored);
+  (void)wire::synchronise_directory_of(file);
+}
 
 /// The number of runs that a campaign is to have for now. With a stop rule it is the next at which
 /// the rule is checked, so that the stopping point does not depend on workers and their order.
 ///
 /// @param num_runs_wanted  Asked for; with a stop rule, at most.
 /// @param num_runs_now     In the file; 0 for a new one.
-[[nodiscard]] std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
-                                       std::uint64_t num_runs_now);
+[[nodiscard]] inline std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
+                                              std::uint64_t num_runs_now) {
+  if (plan.stop_rule.empty() || num_runs_wanted < num_runs_now) return num_runs_wanted;
+  const std::uint64_t num_before = num_runs_now == 0 ? 0 : num_runs_now - 1;
+  return std::min(next_stop_check(num_before), num_runs_wanted);
+}
 
 /// How runs are treated that crashed workers of an earlier coordinator.
 enum class GivenUpRuns : std::uint8_t {
@@ -102,5 +119,62 @@ class CampaignDirectory {
   /// True if a campaign of this name was moved there, `archived/NAME.db`.
   [[nodiscard]] virtual bool has_archived(const std::string& campaign) const = 0;
 };
+
+// What a service must know of a campaign database before it serves it. Reading that takes as long
+// as the disk does, so it is done before the service begins or in a background thread.
+
+/// What a look at a campaign database found.
+struct FileLook {
+  CampaignRecord record = {};
+  bool is_copy = false;  ///< It is not served as another file of its campaign is.
+  // Of a campaign that is to be served. One that has ended has neither store nor what follows.
+  std::optional<Store> store = {};
+  StoredCampaign stored = {};  ///< For the dispatch.
+  StopPlan plan = {};
+  std::uint64_t num_failures = 0;  ///< Finished runs without an estimate.
+};
+
+/// Finds out whether a service has a file, or the campaign of a file, already.
+struct KnownCampaigns {
+  std::set<std::filesystem::path> files;
+  std::set<CampaignId> ids;
+  std::set<std::string> names;
+
+  void add(const CampaignRecord& campaign);
+  void remove(const CampaignRecord& campaign);
+};
+
+/// Reads what the service must know, and writes down that a coordinator begins.
+/// @throws StoreError, Error.
+[[nodiscard]] FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up,
+                               const CoordinatorStart& start);
+
+/// Looks at the files of a directory that are not known and adds their campaigns to those that are.
+/// Lists them in the order in which the campaigns were made. Opens a file only if something is
+/// left to do with it: a campaign that has ended costs no lock, no descriptor and no write.
+/// @throws Error if the directory cannot be read.
+[[nodiscard]] std::vector<FileLook> look_at_all(const CampaignDirectory& directory,
+                                                KnownCampaigns& known,
+                                                const CoordinatorStart& start);
+
+/// A coordinator that starts now in this process.
+/// @param version  Of the program, for people.
+[[nodiscard]] CoordinatorStart coordinator_start(const std::string& version);
+
+/// Reads what must be known of the campaigns that are handed over, which come first, and of those
+/// in the directory.
+/// @param directory  Null if there is none.
+/// @throws Error, StoreError if a campaign that is handed over cannot be served, or the directory
+///         cannot be read.
+[[nodiscard]] std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
+                                                       GivenUpRuns given_up,
+                                                       const CampaignDirectory* directory,
+                                                       const CoordinatorStart& start);
+
+/// Workers that may come back to any of the campaigns.
+[[nodiscard]] std::set<SessionId> sessions_of(const std::vector<FileLook>& looks);
+
+/// Bytes that the tables of a campaign take.
+[[nodiscard]] std::uint64_t definition_size(const Campaign& campaign);
 
 }  // namespace proofmass::coordinator

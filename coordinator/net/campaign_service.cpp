@@ -7,8 +7,7 @@
 #include <exception>
 #include <utility>
 
-#include "coordinator/dispatch/campaigns.hpp"
-#include "coordinator/net/outcome.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <future>
@@ -14,16 +17,77 @@
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/directory_look.hpp"
-#include "coordinator/net/outcome.hpp"
-#include "coordinator/net/service_context.hpp"
+#include "coordinator/net/service.hpp"
 #include "coordinator/net/service_snapshot.hpp"
-#include "coordinator/net/timing.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
+
+/// The time in which this process was awake. A process that was stopped or waited for a disk has
+/// not heard its workers meanwhile, and that must not count as their silence.
+class WakingTime {
+ public:
+  /// @param began_at  Of the steady clock, as all times here.
+  explicit WakingTime(TimePoint began_at) : asked_at_(began_at) {}
+
+  /// The time. What exceeds `gap_max` between two calls is left out.
+  /// @param steady  Not before the one of any earlier call.
+  [[nodiscard]] TimePoint at(TimePoint steady) {
+    const Duration gap = steady - asked_at_;
+    if (gap > gap_max) slept_ += gap - gap_max;
+    asked_at_ = steady;
+    return steady - slept_;
+  }
+
+  /// Several times the longest time between two calls of a process that is awake.
+  static constexpr std::chrono::milliseconds gap_max{500};
+
+ private:
+  TimePoint asked_at_;
+  Duration slept_{};
+};
+
+/// How fast runs have been stored lately: over the last two minutes, or since the meter began.
+class RateMeter {
+ public:
+  explicit RateMeter(TimePoint began_at) : began_at_(began_at) {}
+
+  /// More runs are stored.
+  /// @param now  Not before any earlier one.
+  void add(std::uint64_t num_runs, TimePoint now) {
+    if (counts_.empty() || now - counts_.back().began_at >= std::chrono::seconds(1)) {
+      counts_.push_back({.began_at = now, .num_runs = 0});
+    }
+    counts_.back().num_runs += num_runs;
+    while (now - counts_.front().began_at > window_) counts_.pop_front();
+  }
+
+  /// Runs per second; 0 if none was stored lately.
+  [[nodiscard]] double rate_hz(TimePoint now) const {
+    const TimePoint from = std::max(began_at_, now - window_);
+    std::uint64_t num_runs = 0;
+    for (const Count& count : counts_) {
+      if (count.began_at >= from) num_runs += count.num_runs;
+    }
+    const double elapsed_s = std::chrono::duration<double>(now - from).count();
+    return elapsed_s > 0.0 ? static_cast<double>(num_runs) / elapsed_s : 0.0;
+  }
+
+ private:
+  static constexpr std::chrono::seconds window_{120};
+
+  /// What was stored in a second from `began_at` on.
+  struct Count {
+    TimePoint began_at;
+    std::uint64_t num_runs = 0;
+  };
+
+  TimePoint began_at_;
+  std::deque<Count> counts_;
+};
 
 /// The campaigns of a coordinator, from the first look at a file to the archive. Keeps in the files
 /// what must outlive the process. Status comes from memory alone; what may wait for a disk is done

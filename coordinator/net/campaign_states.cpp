@@ -10,9 +10,8 @@
 #include <set>
 #include <utility>
 
-#include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/campaign_service.hpp"
-#include "coordinator/net/outcome.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"

@@ -12,9 +12,8 @@
 #include <zmq.hpp>
 
 #include "core/error.hpp"
-#include "proto/link/connection_monitor.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/link/socket.hpp"
-#include "proto/link/surroundings.hpp"
 #include "proto/wire/endpoint.hpp"
 
 namespace proofmass::coordinator {

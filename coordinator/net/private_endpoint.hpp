@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "proto/link/descriptor.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 

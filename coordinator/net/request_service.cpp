@@ -12,10 +12,10 @@
 #include <string_view>
 #include <utility>
 
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/campaign_record.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/client_codec.hpp"

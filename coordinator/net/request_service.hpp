@@ -10,12 +10,12 @@
 
 #include "coordinator/net/answers.hpp"
 #include "coordinator/net/authentication/rights.hpp"
+#include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/directory_look.hpp"
-#include "coordinator/net/factory_reports.hpp"
-#include "coordinator/net/service_context.hpp"
+#include "coordinator/net/service.hpp"
+#include "coordinator/net/service_snapshot.hpp"
 
 namespace proofmass::coordinator {
 

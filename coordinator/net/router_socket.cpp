@@ -10,7 +10,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "coordinator/net/authentication/refusal_log.hpp"
+#include "coordinator/net/authentication/authenticator.hpp"
 #include "core/error.hpp"
 #include "proto/link/socket.hpp"
 

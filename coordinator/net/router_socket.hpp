@@ -7,12 +7,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "coordinator/dispatch/state.hpp"
-#include "coordinator/net/peers.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/keys.hpp"
+#include "proto/link/socket.hpp"
 
 namespace zmq {
 class context_t;
@@ -20,6 +20,20 @@ class socket_t;
 }  // namespace zmq
 
 namespace proofmass::coordinator {
+
+/// Where a message came from, as the transport has it.
+struct Address {
+  std::string routing_id;  ///< Of the connection; another one after each reconnection.
+  std::string key;         ///< Public key in Z85; empty on a connection without keys.
+  /// For people: `10.0.0.7`, or `localhost:UID:GID:PID` on a Unix domain socket; may be empty.
+  std::string host;
+};
+
+/// A message as it comes out of a socket.
+struct Incoming {
+  Address from;
+  std::vector<std::string_view> frames;  ///< Valid while the message is handled.
+};
 
 /// The socket at one of a coordinator's addresses. It never waits.
 ///

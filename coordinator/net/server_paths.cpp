@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <system_error>
 
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {

@@ -8,17 +8,14 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/background.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/request_service.hpp"
 #include "coordinator/net/server_paths.hpp"
-#include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_sockets.hpp"
-#include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/error.hpp"
 #include "proto/link/faults.hpp"
@@ -389,13 +386,7 @@ std::optional<WorkerId> Service::worker_of(std::uint64_t process_id) const {
   return std::nullopt;
 }
 
-std::string Service::runs_held_text(WorkerId worker) const {
-  return coordinator::runs_held_text(impl_->state_, worker);
-}
-
-bool Service::is_quarantined(const std::string& host) const {
-  return coordinator::is_quarantined(impl_->state_, host);
-}
+const State& Service::state() const { return impl_->state_; }
 
 bool Service::has_crashing_campaign() const {
   return std::ranges::any_of(impl_->state_.campaigns, [&](const auto& item) {

@@ -21,6 +21,8 @@
 
 namespace proofmass::coordinator {
 
+class Background;
+
 /// How a service is asked to end; set by signal handlers.
 enum class StopRequest : std::uint8_t {
   none,
@@ -86,6 +88,17 @@ struct ServiceConfig {
   std::uint64_t num_descriptors_reserved = 0;
 };
 
+/// What the parts of a service have in common. They keep references to it: it outlives them.
+struct ServiceContext {
+  const ServiceConfig& config;
+  CoordinatorStart start;
+  State& state;
+  StoreWriter& writer;
+  Background& background;
+  Outbox& outbox;
+  std::function<TimePoint()> now;
+};
+
 /// Threads of a service, to be required before it is made: ZeroMQ's, and those that write, answer,
 /// guard and wait.
 inline constexpr int num_service_threads = 8;
@@ -126,9 +139,8 @@ class Service {
 
   /// Number of the worker with this process on this machine; nothing if it is not registered.
   [[nodiscard]] std::optional<WorkerId> worker_of(std::uint64_t process_id) const;
-  [[nodiscard]] std::string runs_held_text(WorkerId worker) const;  ///< For people.
-  /// True if runs are not lent to workers of that host any more: too many crashed there.
-  [[nodiscard]] bool is_quarantined(const std::string& host) const;
+  /// What its dispatch knows.
+  [[nodiscard]] const State& state() const;
   /// True if a campaign crashes at all workers that have its model.
   [[nodiscard]] bool has_crashing_campaign() const;
 

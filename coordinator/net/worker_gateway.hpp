@@ -6,16 +6,84 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <unordered_map>
+#include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
-#include "coordinator/net/peers.hpp"
+#include "coordinator/net/router_socket.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/definition_codec.hpp"
 
 namespace proofmass::coordinator {
+
+/// `address=10.0.0.7 key=...`, for logs.
+[[nodiscard]] wire::Fields fields_of(const Address& address);
+
+/// Connects the session of a worker process with its number in the dispatch, and with the
+/// connection on which it was heard last.
+class Peers {
+ public:
+  /// Limits of what is kept about peers.
+  struct Limits {
+    std::size_t peers_max = 65536;
+    std::size_t closed_out_max = 65536;
+  };
+
+  Peers() = default;
+  explicit Peers(Limits limits) : limits_(limits) {}
+
+  /// The worker of a session, which is reached at this address from now on; a new one if the
+  /// session has not been seen.
+  ///
+  /// @param sequence  Of the message: one from a connection that was left changes no address.
+  /// @return Nothing if the session belongs to another key, or the connection to another session.
+  [[nodiscard]] std::optional<wire::WorkerId> meet(wire::SessionId session, std::uint64_t sequence,
+                                                   const Address& address);
+
+  /// The worker of a connection.
+  [[nodiscard]] std::optional<wire::WorkerId> worker_at(const std::string& routing_id) const;
+
+  /// Null if the peer has been forgotten.
+  [[nodiscard]] const Address* address_of(wire::WorkerId worker) const;
+
+  /// Nothing if the peer has been forgotten.
+  [[nodiscard]] std::optional<wire::WorkerId> worker_of(wire::SessionId session) const;
+
+  /// All whose addresses are known.
+  [[nodiscard]] std::vector<wire::WorkerId> workers() const;
+
+  /// Addresses the next message to a known worker: writes its session and an ascending number.
+  /// @pre address_of(worker) is not null.
+  void address(wire::WorkerId worker, proto::Envelope& message);
+
+  void forget(wire::WorkerId worker);
+
+  /// Ignores the connection from now on.
+  void close_out(const std::string& routing_id);
+  [[nodiscard]] bool is_closed_out(const std::string& routing_id) const;
+
+  /// Forgets strangers, once there are too many peers.
+  void limit(const std::function<bool(wire::WorkerId)>& is_registered);
+
+ private:
+  struct Peer {
+    wire::SessionId session;
+    Address address;
+    std::uint64_t newest_sequence = 0;  ///< Of what was heard.
+    std::uint64_t num_sent = 0;
+  };
+
+  Limits limits_;
+  std::uint64_t next_ = 1;
+  std::map<wire::WorkerId, Peer> peers_;
+  std::unordered_map<std::uint64_t, wire::WorkerId> by_session_;
+  std::unordered_map<std::string, wire::WorkerId> by_routing_id_;
+  std::set<std::string> closed_out_;
+};
 
 /// Encoded definitions of the campaigns that workers asked for last: each is encoded once for all
 /// of them, and again after the campaign was extended.

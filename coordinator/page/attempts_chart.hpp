@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/store/campaign_history.hpp"
+#include "coordinator/store/records.hpp"
 
 namespace proofmass::coordinator {
 

@@ -17,7 +17,7 @@
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/report/live_results.hpp"
-#include "coordinator/store/campaign_history.hpp"
+#include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {

@@ -11,6 +11,8 @@
 
 #include "core/statistics/interval.hpp"
 
+struct sqlite3;
+
 namespace proofmass::coordinator {
 
 /// Most rows that one aggregate collects: all |error| of three million runs, 268 MB a column.
@@ -97,5 +99,14 @@ inline constexpr std::array<std::string_view, 3> binomial_interval_arguments{"hi
 /// @throws InvalidArgument if an argument breaks its rule.
 [[nodiscard]] std::optional<Interval> binomial_interval(
     std::span<const std::optional<double>> arguments);
+
+/// Adds the tables draw(campaign), one row a run and drawn quantity, and
+/// definition_entry(campaign), one row a key of the campaign file (see README.md).
+/// @returns SQLite's result code.
+[[nodiscard]] int register_tables(sqlite3* connection);
+
+/// Adds all functions and tables of README.md to a connection.
+/// @returns SQLite's result code.
+[[nodiscard]] int register_functions(sqlite3* connection);
 
 }  // namespace proofmass::coordinator

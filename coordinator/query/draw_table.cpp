@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "coordinator/query/functions.hpp"
+#include "coordinator/query/aggregates.hpp"
 #include "coordinator/query/virtual_table-inl.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"

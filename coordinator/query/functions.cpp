@@ -1,5 +1,3 @@
-#include "coordinator/query/functions.hpp"
-
 #include <sqlite3ext.h>
 
 #include <array>

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/query/functions.hpp"
+#include "coordinator/query/aggregates.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -9,7 +9,7 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/figures.hpp"
-#include "proto/link/start_program.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <system_error>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "proto/wire/names.hpp"

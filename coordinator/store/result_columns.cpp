@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <span>
-
-#include "core/error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -42,31 +39,6 @@ std::vector<ValueColumn> value_columns(const ResultSchema& schema) {
   return columns;
 }
 
-namespace {
-
-/// The list that has the value; empty if the run's status leaves it without a meaning.
-std::span<const double> values_in(const RunResult& result, ValueKind kind) {
-  switch (kind) {
-    case ValueKind::truth:
-      if (!result.has_truth()) return {};
-      return result.truth;
-    case ValueKind::estimate:
-    case ValueKind::error:
-      if (!result.has_estimate()) return {};
-      return result.estimate;
-    case ValueKind::standard_error:
-      return result.standard_error;
-    case ValueKind::fit:
-      return result.fit;
-    case ValueKind::health:
-      return result.health;
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
-}
-
-}  // namespace
-
 std::string_view name_of(ValueKind kind) {
   constexpr std::array<std::string_view, 6> names{"truth",          "estimate", "error",
                                                   "standard_error", "fit",      "health"};
@@ -74,7 +46,12 @@ std::string_view name_of(ValueKind kind) {
 }
 
 std::optional<double> ValueColumn::value_in(const RunResult& result) const {
-  const std::span<const double> values = values_in(result, kind);
+  const bool is_of_estimate = kind == ValueKind::estimate || kind == ValueKind::error;
+  if (kind == ValueKind::truth && !result.has_truth()) return std::nullopt;
+  if (is_of_estimate && !result.has_estimate()) return std::nullopt;
+  const std::array lists{&result.truth,          &result.estimate, &result.estimate,
+                         &result.standard_error, &result.fit,      &result.health};
+  const std::vector<double>& values = *lists.at(static_cast<std::size_t>(kind));
   if (index >= values.size()) return std::nullopt;
   return kind == ValueKind::error ? result.error(index) : values[index];
 }

@@ -8,14 +8,10 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/result_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
-#include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "core/model.hpp"
 #include "proto/link/faults.hpp"

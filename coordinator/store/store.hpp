@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "coordinator/store/records.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
@@ -31,10 +30,6 @@ class Database;
 namespace proofmass::coordinator {
 
 struct CampaignRecord;
-struct EndCount;
-struct GivenUpRecord;
-struct RecentAttempts;
-struct StoredEvent;
 
 /// Results of a campaign database, one after the other, of one state of the file. The Store that
 /// made it outlives it.
@@ -183,7 +178,6 @@ class Store {
   /// Losses by reason, the one with the most runs first.
   [[nodiscard]] std::vector<LossCount> losses() const;
 
-  // What is in campaign_history.hpp.
   /// The newest `count_max` events after the one with this id, in order.
   [[nodiscard]] std::vector<StoredEvent> events_after(std::uint64_t id,
                                                       std::size_t count_max) const;

@@ -9,12 +9,8 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/entry_rows.hpp"
-#include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/result_rows.hpp"
-#include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store.hpp"
 

@@ -5,6 +5,7 @@
 #include <deque>
 #include <exception>
 #include <future>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -12,10 +13,71 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/open_file.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
+
+namespace detail {
+namespace {
+
+// What somebody waits for. The rest is history, which shares the next commit.
+bool is_urgent(const Entry& entry) {
+  return is_result(entry) || std::holds_alternative<CampaignControl>(entry);
+}
+
+// What the history of a campaign can do without.
+bool is_record(const Entry& entry) {
+  return std::holds_alternative<ReturnedRuns>(entry) || std::holds_alternative<EventEntry>(entry);
+}
+
+}  // namespace
+
+bool is_result(const Entry& entry) {
+  return std::holds_alternative<Delivery>(entry) || std::holds_alternative<SecondDelivery>(entry);
+}
+
+void WaitingEntries::add(Entry entry, TimePoint now) {
+  if (is_record(entry) && num_records_ >= num_records_max_) {
+    ++num_dropped_;
+    return;
+  }
+  if (is_result(entry)) ++num_results_;
+  if (is_record(entry)) ++num_records_;
+  if (is_urgent(entry) && num_urgent_++ == 0) urgent_since_ = now;
+  if (entries_.empty()) waiting_since_ = now;
+  entries_.push_back(std::move(entry));
+}
+
+void WaitingEntries::take(std::size_t num_max, std::vector<Entry>& entries, TimePoint now) {
+  const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(std::min(num_max, size()));
+  num_results_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_result));
+  num_urgent_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_urgent));
+  num_records_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_record));
+  std::move(entries_.begin(), end, std::back_inserter(entries));
+  entries_.erase(entries_.begin(), end);
+  if (num_results_ == 0) is_hurried_ = false;
+  waiting_since_ = entries_.empty() ? std::nullopt : std::optional(now);
+  urgent_since_ = num_urgent_ == 0 ? std::nullopt : std::optional(now);
+  if (num_dropped_ == 0) return;
+  entries.push_back(
+      entry_of({.kind = "records_dropped",
+                .fields = {{"losses_and_events", std::exchange(num_dropped_, 0)},
+                           wire::Field::remark("(the disk did not take them for too long)")}}));
+}
+
+std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config) {
+  if (file.retry_at) return file.retry_at;
+  const std::optional<TimePoint> since = file.waiting.waiting_since();
+  if (!since) return file.rest_at;
+  const TimePoint due = *since + config.record_after;
+  const std::optional<TimePoint> urgent_since = file.waiting.urgent_since();
+  if (!urgent_since) return due;
+  const bool is_complete = file.waiting.num_results() >= config.commit_runs_max;
+  if (is_complete || file.waiting.is_hurried()) return urgent_since;
+  return std::min(due, *urgent_since + config.commit_after);
+}
+
+}  // namespace detail
 
 using detail::OpenFile;
 using detail::TimePoint;
@@ -25,15 +87,6 @@ namespace {
 // Entries of one transaction: enough that its cost is shared, few enough that the first of them
 // does not wait long for the last.
 constexpr std::size_t entries_per_commit_max = 8192;
-
-/// Something that the caller waits for, after all that was handed over for its file.
-struct Request {
-  wire::CampaignId campaign;  // 0: all files.
-  std::function<void()> action;
-  std::promise<void> done;
-};
-
-using Files = std::map<wire::CampaignId, OpenFile>;
 
 bool is_written_out(const OpenFile& file) {
   return file.writing.empty() && file.waiting.size() == 0;
@@ -51,15 +104,19 @@ void note_worker(OpenFile& file, const Entry& entry) {
   if (const auto* ended = std::get_if<WorkerEnded>(&entry)) file.known.erase(ended->session);
 }
 
-/// What came of one attempt to write.
-struct Attempted {
-  CommitSummary summary;
-  std::optional<std::string> failure;
-  std::uint64_t log_size = 0;  // Afterwards.
-};
+/// Tries to fold the log in; returns why it is still needed.
+std::optional<std::string> try_to_rest(Store& store) {
+  try {
+    return store.rest();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+}  // namespace
 
 /// Tries to write what `writing` holds, to a file that has its name before and afterwards.
-Attempted try_to_write(OpenFile& file) {
+StoreWriter::Attempted StoreWriter::try_to_write(OpenFile& file) {
   Attempted attempted;
   try {
     if (file.writing.empty()) {
@@ -74,88 +131,38 @@ Attempted try_to_write(OpenFile& file) {
   return attempted;
 }
 
-/// Tries to fold the log in; returns why it is still needed.
-std::optional<std::string> try_to_rest(Store& store) {
-  try {
-    return store.rest();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-}
-
-}  // namespace
-
-struct StoreWriter::Impl {
-  Impl(std::function<void()> wake_caller, const WriterConfig& writer_config)
-      : config(writer_config), wake(std::move(wake_caller)), thread([this] { run(); }) {}
-
-  // Called by the service.
-  OpenFile& file(wire::CampaignId campaign);
-  [[nodiscard]] bool add(OpenFile& open_file, Entry entry);
-  void wait_for(wire::CampaignId campaign, std::function<void()> action);
-
-  // The thread.
-  using Lock = std::unique_lock<std::mutex>;
-  void run();
-  void serve_request(Lock& lock);
-  void write_due(Lock& lock);
-  void look_at_all(Lock& lock);
-  void write_all(wire::CampaignId campaign, Lock& lock);
-  void fold(wire::CampaignId campaign, Lock& lock);
-  bool write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock);
-  void finish_write(wire::CampaignId campaign, OpenFile& file, Attempted attempted);
-  void watch_log(wire::CampaignId campaign, OpenFile& file, std::uint64_t log_size);
-  [[nodiscard]] std::optional<TimePoint> next_due_time() const;
-  [[nodiscard]] std::vector<wire::CampaignId> ids() const;
-
-  const WriterConfig config;
-  const std::function<void()> wake;
-
-  std::mutex mutex;  // Guards all that follows; see OpenFile for what it does not.
-  std::condition_variable changed;
-  Files files;
-  std::deque<Request> requests;
-  std::vector<Completion> completions;
-  bool is_ending = false;
-  TimePoint look_at =
-      std::chrono::steady_clock::now() +
-      config.look_after;  // When to look at files of which nothing is to be written.
-
-  std::thread thread;  // Begins when all else is there.
-};
-
-OpenFile& StoreWriter::Impl::file(wire::CampaignId campaign) {
-  const auto found = files.find(campaign);
-  PROOFMASS_EXPECT(found != files.end());
+OpenFile& StoreWriter::file(wire::CampaignId campaign) {
+  const auto found = files_.find(campaign);
+  PROOFMASS_EXPECT(found != files_.end());
   return found->second;
 }
 
 /// True if the file is to be written to sooner than before. @pre The lock is held.
-bool StoreWriter::Impl::add(OpenFile& open_file, Entry entry) {
+bool StoreWriter::add(OpenFile& open_file, Entry entry) {
   const TimePoint now = std::chrono::steady_clock::now();
-  const std::optional<TimePoint> due_before = due_time(open_file, config);
+  const std::optional<TimePoint> due_before = due_time(open_file, config_);
   note_worker(open_file, entry);
   if (detail::is_result(entry)) open_file.is_rest_wanted = false;
   open_file.waiting.add(std::move(entry), now);
   open_file.rest_at = open_file.is_rest_wanted ? std::optional(now) : std::nullopt;
-  return due_time(open_file, config) != due_before;
+  return due_time(open_file, config_) != due_before;
 }
 
-void StoreWriter::Impl::wait_for(wire::CampaignId campaign, std::function<void()> action) {
+void StoreWriter::wait_for(wire::CampaignId campaign, std::function<void()> action) {
   Request request{.campaign = campaign, .action = std::move(action), .done = {}};
   std::future<void> done = request.done.get_future();
   {
-    const std::lock_guard lock(mutex);
-    requests.push_back(std::move(request));
+    const std::lock_guard lock(mutex_);
+    requests_.push_back(std::move(request));
   }
-  changed.notify_one();
+  changed_.notify_one();
   done.get();
 }
 
-void StoreWriter::Impl::run() {
-  Lock lock(mutex);
-  while (!is_ending || !requests.empty()) {
-    if (!requests.empty()) {
+void StoreWriter::run() {
+  Lock lock(mutex_);
+  while (!is_ending_ || !requests_.empty()) {
+    if (!requests_.empty()) {
       serve_request(lock);
       continue;
     }
@@ -164,17 +171,17 @@ void StoreWriter::Impl::run() {
       write_due(lock);
       look_at_all(lock);
     } else if (due) {
-      changed.wait_until(lock, *due);
+      changed_.wait_until(lock, *due);
     } else {
-      changed.wait(lock);
+      changed_.wait(lock);
     }
   }
   for (const wire::CampaignId campaign : ids()) write_all(campaign, lock);
 }
 
-void StoreWriter::Impl::serve_request(Lock& lock) {
-  Request request = std::move(requests.front());
-  requests.pop_front();
+void StoreWriter::serve_request(Lock& lock) {
+  Request request = std::move(requests_.front());
+  requests_.pop_front();
   const bool is_for_all = request.campaign == wire::CampaignId{};
   for (const wire::CampaignId campaign : is_for_all ? ids() : std::vector{request.campaign}) {
     write_all(campaign, lock);
@@ -189,10 +196,10 @@ void StoreWriter::Impl::serve_request(Lock& lock) {
   lock.lock();
 }
 
-void StoreWriter::Impl::write_due(Lock& lock) {
+void StoreWriter::write_due(Lock& lock) {
   const TimePoint now = std::chrono::steady_clock::now();
   for (const wire::CampaignId campaign : ids()) {
-    const std::optional<TimePoint> due = due_time(file(campaign), config);
+    const std::optional<TimePoint> due = due_time(file(campaign), config_);
     if (!due || *due > now) continue;
     if (!file(campaign).retry_at && is_written_out(file(campaign))) {
       fold(campaign, lock);
@@ -203,16 +210,16 @@ void StoreWriter::Impl::write_due(Lock& lock) {
 }
 
 /// Finds files that lost their name while nothing was to be written.
-void StoreWriter::Impl::look_at_all(Lock& lock) {
-  if (std::chrono::steady_clock::now() < look_at) return;
+void StoreWriter::look_at_all(Lock& lock) {
+  if (std::chrono::steady_clock::now() < look_at_) return;
   for (const wire::CampaignId campaign : ids()) {
     if (!file(campaign).retry_at) write_some(campaign, 0, lock);
   }
-  look_at = std::chrono::steady_clock::now() + config.look_after;
+  look_at_ = std::chrono::steady_clock::now() + config_.look_after;
 }
 
 /// Writes all that waits now, until something fails; not what is added meanwhile.
-void StoreWriter::Impl::write_all(wire::CampaignId campaign, Lock& lock) {
+void StoreWriter::write_all(wire::CampaignId campaign, Lock& lock) {
   std::size_t num_left = file(campaign).waiting.size();
   bool is_written = write_some(campaign, 0, lock);
   while (is_written && num_left > 0) {
@@ -224,7 +231,7 @@ void StoreWriter::Impl::write_all(wire::CampaignId campaign, Lock& lock) {
 }
 
 /// Brings a file of which nothing waits to rest.
-void StoreWriter::Impl::fold(wire::CampaignId campaign, Lock& lock) {
+void StoreWriter::fold(wire::CampaignId campaign, Lock& lock) {
   if (!write_some(campaign, 0, lock)) return;
   OpenFile& open_file = file(campaign);
   open_file.rest_at.reset();  // What is added meanwhile sets it again.
@@ -232,24 +239,24 @@ void StoreWriter::Impl::fold(wire::CampaignId campaign, Lock& lock) {
   const std::optional<std::string> reason = try_to_rest(open_file.store);
   lock.lock();
   if (reason && open_file.is_rest_wanted) {
-    open_file.rest_at = std::chrono::steady_clock::now() + config.retry_after;
+    open_file.rest_at = std::chrono::steady_clock::now() + config_.retry_after;
   }
   if (reason.has_value() == open_file.is_log_kept) return;
   open_file.is_log_kept = reason.has_value();
-  completions.emplace_back(
+  completions_.emplace_back(
       FileEvent{.campaign = campaign,
                 .event = reason ? wire::Event{.severity = wire::Severity::warning,
                                               .kind = "write_ahead_log_kept",
                                               .fields = {wire::Field::reason(*reason)}}
                                 : wire::Event{.kind = "write_ahead_log_folded"}});
   lock.unlock();
-  wake();
+  wake_();
   lock.lock();
 }
 
 /// Tries to write what failed before or, if nothing did, up to `num_max` more entries. The file
 /// stays: only the thread itself removes one.
-bool StoreWriter::Impl::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
+bool StoreWriter::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
   OpenFile& open_file = file(campaign);
   if (open_file.writing.empty() && num_max > 0) {
     open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
@@ -258,25 +265,25 @@ bool StoreWriter::Impl::write_some(wire::CampaignId campaign, std::size_t num_ma
   Attempted attempted = try_to_write(open_file);
   const bool is_written = !attempted.failure;
   lock.lock();
-  const std::size_t num_before = completions.size();
+  const std::size_t num_before = completions_.size();
   watch_log(campaign, open_file, attempted.log_size);
   finish_write(campaign, open_file, std::move(attempted));
-  const bool has_news = completions.size() > num_before;
+  const bool has_news = completions_.size() > num_before;
   lock.unlock();
-  if (has_news) wake();
+  if (has_news) wake_();
   lock.lock();
   return is_written;
 }
 
-void StoreWriter::Impl::finish_write(wire::CampaignId campaign, OpenFile& open_file,
-                                     Attempted attempted) {
+void StoreWriter::finish_write(wire::CampaignId campaign, OpenFile& open_file,
+                               Attempted attempted) {
   const bool has_failed_before = open_file.retry_at.has_value();
   if (attempted.failure) {
-    open_file.retry_at = std::chrono::steady_clock::now() + config.retry_after;
+    open_file.retry_at = std::chrono::steady_clock::now() + config_.retry_after;
     if (std::exchange(open_file.failure, *attempted.failure) == *attempted.failure) return;
-    completions.emplace_back(StoreFailed{.campaign = campaign,
-                                         .text = *attempted.failure,
-                                         .is_abandoned = open_file.store.is_abandoned()});
+    completions_.emplace_back(StoreFailed{.campaign = campaign,
+                                          .text = *attempted.failure,
+                                          .is_abandoned = open_file.store.is_abandoned()});
     return;
   }
   open_file.failure.clear();
@@ -287,17 +294,17 @@ void StoreWriter::Impl::finish_write(wire::CampaignId campaign, OpenFile& open_f
   }
   open_file.writing.clear();
   if (!runs.empty()) {
-    completions.emplace_back(Committed{.campaign = campaign, .runs = std::move(runs)});
+    completions_.emplace_back(Committed{.campaign = campaign, .runs = std::move(runs)});
   }
   for (const Comparison& comparison : attempted.summary.comparisons) {
-    completions.emplace_back(Compared{.campaign = campaign, .comparison = comparison});
+    completions_.emplace_back(Compared{.campaign = campaign, .comparison = comparison});
   }
-  if (has_failed_before) completions.emplace_back(StoreRecovered{.campaign = campaign});
+  if (has_failed_before) completions_.emplace_back(StoreRecovered{.campaign = campaign});
 }
 
-void StoreWriter::Impl::watch_log(wire::CampaignId campaign, OpenFile& open_file,
-                                  std::uint64_t log_size) {
-  const bool is_large = log_size > config.log_size_max;
+void StoreWriter::watch_log(wire::CampaignId campaign, OpenFile& open_file,
+                            std::uint64_t log_size) {
+  const bool is_large = log_size > config_.log_size_max;
   if (is_large == open_file.has_large_log) return;
   open_file.has_large_log = is_large;
   wire::Event event{.kind = "write_ahead_log_shrunk"};
@@ -307,69 +314,69 @@ void StoreWriter::Impl::watch_log(wire::CampaignId campaign, OpenFile& open_file
              .fields = {{"size_bytes", log_size},
                         wire::Field::remark("(somebody reads an old state of the file)")}};
   }
-  completions.emplace_back(FileEvent{.campaign = campaign, .event = std::move(event)});
+  completions_.emplace_back(FileEvent{.campaign = campaign, .event = std::move(event)});
 }
 
-std::optional<TimePoint> StoreWriter::Impl::next_due_time() const {
+std::optional<TimePoint> StoreWriter::next_due_time() const {
   std::optional<TimePoint> next;
-  if (!files.empty()) next = look_at;
-  for (const auto& [campaign, file] : files) {
-    const std::optional<TimePoint> due = due_time(file, config);
+  if (!files_.empty()) next = look_at_;
+  for (const auto& [campaign, file] : files_) {
+    const std::optional<TimePoint> due = due_time(file, config_);
     if (due && (!next || *due < *next)) next = due;
   }
   return next;
 }
 
-std::vector<wire::CampaignId> StoreWriter::Impl::ids() const {
+std::vector<wire::CampaignId> StoreWriter::ids() const {
   std::vector<wire::CampaignId> ids;
-  for (const auto& [campaign, file] : files) ids.push_back(campaign);
+  for (const auto& [campaign, file] : files_) ids.push_back(campaign);
   return ids;
 }
 
 StoreWriter::StoreWriter(std::function<void()> wake, const WriterConfig& config)
-    : impl_(std::make_unique<Impl>(std::move(wake), config)) {}
+    : config_(config), wake_(std::move(wake)), thread_([this] { run(); }) {}
 
 StoreWriter::~StoreWriter() {
   {
-    const std::lock_guard lock(impl_->mutex);
-    impl_->is_ending = true;
+    const std::lock_guard lock(mutex_);
+    is_ending_ = true;
   }
-  impl_->changed.notify_one();
-  impl_->thread.join();
+  changed_.notify_one();
+  thread_.join();
 }
 
 void StoreWriter::open(wire::CampaignId campaign, Store store) {
   const std::vector<wire::SessionId> attached = store.attached_sessions();
   {
-    const std::lock_guard lock(impl_->mutex);
+    const std::lock_guard lock(mutex_);
     OpenFile file{.store = std::move(store),
-                  .waiting = detail::WaitingEntries(impl_->config.num_records_max),
+                  .waiting = detail::WaitingEntries(config_.num_records_max),
                   .writing = {},
                   .retry_at = {},
                   .failure = {},
                   .known = {},
                   .rest_at = {}};
     for (const wire::SessionId session : attached) file.known.insert(session);
-    const bool is_new = impl_->files.emplace(campaign, std::move(file)).second;
+    const bool is_new = files_.emplace(campaign, std::move(file)).second;
     PROOFMASS_EXPECT(is_new);
   }
-  impl_->changed.notify_one();
+  changed_.notify_one();
 }
 
 Store StoreWriter::close(wire::CampaignId campaign) {
   std::optional<Store> store;
-  impl_->wait_for(campaign, [&] {
-    const std::lock_guard lock(impl_->mutex);
-    store = std::move(impl_->file(campaign).store);
-    impl_->files.erase(campaign);
+  wait_for(campaign, [&] {
+    const std::lock_guard lock(mutex_);
+    store = std::move(file(campaign).store);
+    files_.erase(campaign);
   });
   return std::move(*store);
 }
 
 void StoreWriter::access(wire::CampaignId campaign, const std::function<void(Store&)>& action) {
-  impl_->wait_for(campaign, [&] {
-    std::unique_lock lock(impl_->mutex);
-    Store& store = impl_->file(campaign).store;
+  wait_for(campaign, [&] {
+    std::unique_lock lock(mutex_);
+    Store& store = file(campaign).store;
     lock.unlock();
     action(store);
   });
@@ -378,43 +385,43 @@ void StoreWriter::access(wire::CampaignId campaign, const std::function<void(Sto
 void StoreWriter::write(wire::CampaignId campaign, Entry entry) {
   bool is_sooner = false;
   {
-    const std::lock_guard lock(impl_->mutex);
+    const std::lock_guard lock(mutex_);
     if (campaign != wire::CampaignId{}) {
-      is_sooner = impl_->add(impl_->file(campaign), std::move(entry));
+      is_sooner = add(file(campaign), std::move(entry));
     } else {
-      for (auto& [id, open_file] : impl_->files) {
-        if (concerns(entry, open_file)) is_sooner = impl_->add(open_file, entry) || is_sooner;
+      for (auto& [id, open_file] : files_) {
+        if (concerns(entry, open_file)) is_sooner = add(open_file, entry) || is_sooner;
       }
     }
   }
-  if (is_sooner) impl_->changed.notify_one();  // Otherwise the thread would wake for every result.
+  if (is_sooner) changed_.notify_one();  // Otherwise the thread would wake for every result.
 }
 
 void StoreWriter::rest(wire::CampaignId campaign) {
   {
-    const std::lock_guard lock(impl_->mutex);
-    OpenFile& open_file = impl_->file(campaign);
+    const std::lock_guard lock(mutex_);
+    OpenFile& open_file = file(campaign);
     open_file.is_rest_wanted = true;
     open_file.rest_at = std::chrono::steady_clock::now();
   }
-  impl_->changed.notify_one();
+  changed_.notify_one();
 }
 
 void StoreWriter::hurry(wire::CampaignId campaign) {
   {
-    const std::lock_guard lock(impl_->mutex);
-    impl_->file(campaign).waiting.hurry();
+    const std::lock_guard lock(mutex_);
+    file(campaign).waiting.hurry();
   }
-  impl_->changed.notify_one();
+  changed_.notify_one();
 }
 
 std::vector<Completion> StoreWriter::take_completions() {
-  const std::lock_guard lock(impl_->mutex);
-  return std::exchange(impl_->completions, {});
+  const std::lock_guard lock(mutex_);
+  return std::exchange(completions_, {});
 }
 
 void StoreWriter::flush() {
-  impl_->wait_for(wire::CampaignId{}, [] {});
+  wait_for(wire::CampaignId{}, [] {});
 }
 
 }  // namespace proofmass::coordinator

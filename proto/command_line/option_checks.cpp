@@ -16,7 +16,7 @@
 #include <system_error>
 
 #include "core/definition/definition_text.hpp"
-#include "proto/text/byte_order_mark.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 namespace {

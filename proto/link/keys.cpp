@@ -11,7 +11,7 @@
 
 #include "core/error.hpp"
 #include "proto/link/whole_file.hpp"
-#include "proto/text/byte_order_mark.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -101,15 +101,8 @@ std::filesystem::path key_file(const std::filesystem::path& directory, KeyRole r
 }  // namespace
 
 std::string_view to_text(KeyRole role) {
-  switch (role) {
-    case KeyRole::coordinator:
-      return "coordinator";
-    case KeyRole::worker:
-      return "worker";
-    case KeyRole::client:
-      return "client";
-  }
-  return "";
+  constexpr std::array<std::string_view, 3> names{"coordinator", "worker", "client"};
+  return names.at(static_cast<std::size_t>(role));
 }
 
 std::optional<PublicKey> PublicKey::parse(std::string_view text) {

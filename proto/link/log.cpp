@@ -5,6 +5,7 @@
 #include <spdlog/logger.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -16,15 +17,8 @@ namespace proofmass::wire {
 namespace {
 
 spdlog::level::level_enum level_of(Severity severity) {
-  switch (severity) {
-    case Severity::info:
-      return spdlog::level::info;
-    case Severity::warning:
-      return spdlog::level::warn;
-    case Severity::error:
-      break;
-  }
-  return spdlog::level::err;
+  constexpr std::array levels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
+  return levels.at(static_cast<std::size_t>(severity));
 }
 
 std::string_view name_of(Severity severity) {

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "proto/link/descriptor.hpp"
 
 namespace proofmass::wire {
 namespace {

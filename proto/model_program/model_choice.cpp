@@ -11,7 +11,7 @@
 
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/link/surroundings.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/model_program/program_model.hpp"
 #include "proto/wire/messages.hpp"
 

@@ -1,5 +1,3 @@
-#include "proto/model_program/program_description.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,6 +10,7 @@
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/law_reader.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {

@@ -1,14 +1,25 @@
 #include "proto/model_program/program_model.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
 #include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,10 +27,189 @@
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/random/stream.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
-#include "proto/model_program/program_process.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
+namespace {
+
+/// Two connected sockets, which are closed in programs that are started, but for what they are
+/// given.
+std::pair<Descriptor, Descriptor> connected_pair() {
+  std::array<int, 2> ends{};
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) {
+    return {Descriptor(ends[0]), Descriptor(ends[1])};
+  }
+  throw ModelProgramError(
+      fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
+}
+
+/// A pipe: its first end is told what the second one writes, and when that is closed.
+std::pair<Descriptor, Descriptor> new_pipe() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) == 0) return {Descriptor(ends[0]), Descriptor(ends[1])};
+  throw ModelProgramError(
+      fmt::format("model program: no pipe: {}", std::generic_category().message(errno)));
+}
+
+/// Has the kernel kill the group of processes as soon as nobody has the other end of the pipe: it
+/// then signals that there is something to read. A parent-death signal (PR_SET_PDEATHSIG) would
+/// come when the thread that started the program ends, and other threads go on using it.
+void kill_at_end_of(int pipe, pid_t group) {
+  fcntl(pipe, F_SETSIG, SIGKILL);
+  fcntl(pipe, F_SETOWN, -group);
+  fcntl(pipe, F_SETFL, O_ASYNC);
+}
+
+constexpr std::size_t first_errors_size_max = 65536;
+constexpr std::size_t last_errors_size_max = 4096;
+
+}  // namespace
+
+void ErrorOutput::take(std::string_view text) {
+  const std::size_t shown =
+      std::min(text.size(), first_errors_size_max - std::min(first_errors_size_max, size_));
+  say_on(stderr, text.substr(0, shown));
+  size_ += text.size();
+  last_ += text.substr(shown);
+  if (last_.size() > last_errors_size_max) last_.erase(0, last_.size() - last_errors_size_max);
+}
+
+void ErrorOutput::end(std::string_view program) {
+  const std::size_t shown = first_errors_size_max + last_.size();
+  if (size_ > shown) {
+    say(fmt::format("\n{}: {} bytes of its standard error are left out here\n", program,
+                    size_ - shown));
+  }
+  say_on(stderr, last_);
+}
+
+ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
+    : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
+  auto [questions, its_input] = connected_pair();
+  auto [answers, its_output] = connected_pair();
+  auto [errors, its_errors] = new_pipe();
+  auto [its_lifeline, lifeline] = new_pipe();
+  try {
+    process_id_ = start_program({.arguments = {name_},
+                                 .descriptors = {its_input.number(), its_output.number(),
+                                                 its_errors.number(), its_lifeline.number()},
+                                 .environment = environment_without_settings(),
+                                 .has_own_group = true});
+  } catch (const Error& error) {
+    throw ModelProgramError(fmt::format("model program = {}", error.what()));
+  }
+  kill_at_end_of(its_lifeline.number(), process_id_);
+  questions_ = std::move(questions);
+  answers_ = std::move(answers);
+  errors_ = std::move(errors);
+  lifeline_ = std::move(lifeline);
+  fcntl(errors_.number(), F_SETFL, O_NONBLOCK);
+  const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
+  const rlimit memory{memory_max, memory_max};
+  prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
+}
+
+ProgramProcess::~ProgramProcess() {
+  if (process_id_ != 0) {
+    kill(process_id_, SIGKILL);
+    (void)wait_for_end(process_id_);
+  }
+  pass_on_errors();
+  error_output_.end(name_);
+}
+
+std::string ProgramProcess::how_it_ended() {
+  // It has closed its output, which it does just before it ends unless it means to stay.
+  constexpr int attempts_max = 100;
+  for (int i = 0; i < attempts_max; ++i) {
+    if (const std::optional<int> status = status_if_ended(process_id_)) {
+      process_id_ = 0;
+      return end_text(*status);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return "it closed its output";
+}
+
+void ProgramProcess::fail(std::string_view reason) const {
+  throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
+}
+
+void ProgramProcess::write_some(std::string_view& text) const {
+  const ssize_t size =
+      send(questions_.number(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  if (size >= 0) {
+    text.remove_prefix(static_cast<std::size_t>(size));
+  } else if (errno != EAGAIN && errno != EINTR) {
+    text = {};  // It has closed its input; that it has ended is seen where it should answer.
+  }
+}
+
+void ProgramProcess::expect_silence() const {
+  char letter = 0;
+  if (recv(answers_.number(), &letter, 1, MSG_DONTWAIT | MSG_PEEK) > 0) {
+    fail("answers what it was not asked");
+  }
+}
+
+void ProgramProcess::read_some() {
+  std::array<char, 65536> part;  // NOLINT: recv() fills it.
+  const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT);
+  if (size > 0) {
+    received_.append(part.data(), static_cast<std::size_t>(size));
+  } else if (size == 0 || (errno != EAGAIN && errno != EINTR)) {
+    fail(fmt::format("gave no answer: {}", how_it_ended()));
+  }
+}
+
+void ProgramProcess::pass_on_errors() {
+  std::array<char, 65536> part;  // NOLINT: read() fills it.
+  // No more than once what a pipe holds: a program may print without an end.
+  const ssize_t size = read(errors_.number(), part.data(), part.size());
+  if (size > 0) error_output_.take({part.data(), static_cast<std::size_t>(size)});
+  if (size == 0) errors_ = Descriptor();  // It has closed it.
+}
+
+void ProgramProcess::ask(const std::vector<std::string>& questions,
+                         const std::function<void(std::string_view answer)>& on_answer) {
+  using Clock = std::chrono::steady_clock;
+  expect_silence();
+  std::string all;
+  for (const std::string& question : questions) all += question + '\n';
+  std::string_view unsent = all;
+  std::size_t num_answered = 0;
+  Clock::time_point deadline = Clock::now() + answer_time_max_;
+  while (num_answered < questions.size()) {
+    std::array<pollfd, 3> ends{{{answers_.number(), POLLIN, 0},
+                                {errors_.number(), POLLIN, 0},
+                                {questions_.number(), POLLOUT, 0}}};
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    if (left.count() <= 0) {
+      fail(fmt::format("no answer within {} s", answer_time_max_.count()));
+    }
+    poll(ends.data(), unsent.empty() ? 2 : 3, static_cast<int>(left.count()));
+    if (ends[2].revents != 0) write_some(unsent);
+    if (ends[1].revents != 0) pass_on_errors();
+    if (ends[0].revents != 0) read_some();
+    std::size_t begin = 0;
+    for (std::size_t end = 0; (end = received_.find('\n', begin)) != std::string::npos;) {
+      if (num_answered == questions.size()) break;
+      on_answer(std::string_view(received_).substr(begin, end - begin));
+      begin = end + 1;
+      ++num_answered;
+      deadline = Clock::now() + answer_time_max_;
+    }
+    received_.erase(0, begin);
+    if (received_.size() > answer_size_max) {
+      fail(fmt::format("answers with a line of more than {} bytes", answer_size_max));
+    }
+  }
+  if (!received_.empty()) fail("answers what it was not asked");
+}
+
 namespace {
 
 using Json = nlohmann::json;

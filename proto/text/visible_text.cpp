@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <exception>
 #include <span>
+#include <utility>
 
 namespace proofmass::wire {
 namespace {
@@ -102,27 +104,13 @@ std::string visible_lines(std::string_view text) {
 }
 
 std::string markup_text(std::string_view text) {
+  using Entity = std::pair<char, std::string_view>;
+  static constexpr std::array<Entity, 5> entities{
+      {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}}};
   std::string markup;
   for (const char character : visible_text(text)) {
-    switch (character) {
-      case '&':
-        markup += "&amp;";
-        break;
-      case '<':
-        markup += "&lt;";
-        break;
-      case '>':
-        markup += "&gt;";
-        break;
-      case '"':
-        markup += "&quot;";
-        break;
-      case '\'':
-        markup += "&#39;";
-        break;
-      default:
-        markup += character;
-    }
+    const auto* const entity = std::ranges::find(entities, character, &Entity::first);
+    markup += entity == entities.end() ? std::string(1, character) : std::string(entity->second);
   }
   return markup;
 }
@@ -149,6 +137,18 @@ std::string shortened(std::string_view text, std::size_t width) {
     if (taken < width) end_if_cut = end;
   }
   return std::string(text);
+}
+
+void say(std::string_view text) noexcept {
+  try {
+    say_on(stderr, visible_lines(text));
+  } catch (const std::exception&) {
+    // Without memory nothing can be made visible.
+  }
+}
+
+void say_on(std::FILE* stream, std::string_view text) noexcept {
+  (void)std::fwrite(text.data(), 1, text.size(), stream);
 }
 
 }  // namespace proofmass::wire

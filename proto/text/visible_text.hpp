@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdio>
 #include <string>
 #include <string_view>
 
@@ -35,5 +36,20 @@ struct Character {
 /// Visible text of at most `width` columns, the last a `…` if something is left out.
 /// @pre width ≥ 1.
 [[nodiscard]] std::string shortened(std::string_view text, std::size_t width);
+
+/// The text of a file without the mark with which Windows programs begin UTF-8.
+[[nodiscard]] inline std::string_view without_byte_order_mark(std::string_view text) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  return text.starts_with(mark) ? text.substr(mark.size()) : text;
+}
+
+/// Tells the user on standard error, as visible_lines(): the text may quote a file or a peer. A
+/// failure to write, on a full disk or to a closed terminal, is ignored: answers go to standard
+/// output.
+void say(std::string_view text) noexcept;
+
+/// Writes to a stream as it is: for displays, which move the cursor.
+/// @pre What the text quotes of files and peers has been made visible.
+void say_on(std::FILE* stream, std::string_view text) noexcept;
 
 }  // namespace proofmass::wire

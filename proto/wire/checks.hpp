@@ -2,24 +2,51 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "proto/wire/codec.hpp"
+#include "proto/wire/messages.hpp"
+
 namespace google::protobuf {
-class Descriptor;
+class Message;
 }  // namespace google::protobuf
 
 namespace proofmass::wire::detail {
 
-/// True if bytes that claim to be a message of this type hold at most `count_max` fields, those of
-/// the messages inside it included; false also if they cannot be parsed.
-///
-/// Parsing takes some hundred bytes of memory a field, and a field may take two bytes: without
-/// this, a message within its limit of size could cost fifty times that limit. An array of numbers
-/// is one field.
-[[nodiscard]] bool has_fields_at_most(std::string_view bytes,
-                                      const google::protobuf::Descriptor& type,
-                                      std::size_t count_max);
+/// What is encoded, and its limits.
+struct Form {
+  std::string_view name;  ///< For messages: `request`.
+  std::string_view kind;  ///< `an envelope`.
+  std::size_t size_max;   ///< Bytes.
+  /// Fields, those of the messages inside it included; an array of numbers is one. Parsing takes
+  /// some hundred bytes of memory a field, and a field may take two bytes: without this, a message
+  /// within its limit of size could cost fifty times that limit.
+  std::size_t fields_max;
+  bool is_always_counted = true;  ///< Counting takes as long as parsing.
+};
+
+/// Decodes any bytes.
+/// @param check  Looks at the message, which was parsed; what it throws is the fault `invalid`.
+/// @return Why the bytes are no such message, if so.
+[[nodiscard]] std::optional<DecodeError> read(
+    std::string_view bytes, const Form& form, google::protobuf::Message& message,
+    const std::function<std::optional<DecodeError>()>& check);
+/// What is wrong with an envelope, whatever it holds.
+[[nodiscard]] std::optional<DecodeError> fault_of_envelope(const Form& form, std::uint32_t version,
+                                                           bool is_empty);
+[[nodiscard]] DecodeError too_large(const Form& form, std::size_t size);
+
+/// @throws InvalidArgument if the message has more bytes than its form allows.
+[[nodiscard]] std::string bytes_of(const google::protobuf::Message& message, const Form& form);
+template <typename Envelope>
+[[nodiscard]] std::string envelope_bytes(Envelope& envelope, const Form& form) {
+  envelope.set_protocol_version(protocol_version);
+  return bytes_of(envelope, form);
+}
 
 // What decoders require of values that a peer sent. They throw; decode() and its like turn that
 // into a DecodeError.
@@ -35,24 +62,22 @@ void require_in(std::uint64_t value, std::uint64_t minimum, std::uint64_t maximu
 /// @throws ConfigError unless a list has `minimum` to `maximum` entries.
 void require_count(int count, std::uint64_t minimum, std::uint64_t maximum, std::string_view field);
 
-/// The name. @throws ConfigError unless is_name() holds.
-[[nodiscard]] std::string checked_name(const std::string& name, std::string_view field);
+/// @throws ConfigError unless is_name() holds.
+void require_name(const std::string& name, std::string_view field);
 
 /// @throws ConfigError unless the names of cards are printable ASCII of cards_text_size_max bytes
 /// at most.
 void require_cards(const std::string& cards);
 
-/// The value. @throws ConfigError unless it is finite and ≥ 0.
-[[nodiscard]] double checked_magnitude(double value, std::string_view field);
+/// @throws ConfigError unless the value is finite and in [0, maximum].
+void require_magnitude(double value, std::string_view field,
+                       double maximum = std::numeric_limits<double>::max());
 
-/// The number. @throws ConfigError if it is 0.
-[[nodiscard]] std::uint64_t checked_id(std::uint64_t id, std::string_view field);
+/// @throws ConfigError if it is 0.
+void require_id(std::uint64_t id, std::string_view field);
 
 /// The text, cut to 400 bytes, with `?` for all but printable ASCII: for logs and for the peer, as
 /// parts may come from that peer.
 [[nodiscard]] std::string printable(std::string_view text);
-
-/// From now on Protobuf does not write to standard error what is wrong with a peer's bytes.
-void silence_protobuf();
 
 }  // namespace proofmass::wire::detail

@@ -8,13 +8,12 @@
 
 #include "core/campaign/definition.hpp"
 #include "proto/client.pb.h"
-#include "proto/wire/client_messages.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace proofmass::wire {
 
 // What clients and coordinator exchange: the envelopes of client.proto, and their bytes. The limits
-// below, which the comments of client.proto name, and the checks in client_message_reader.cpp
+// below, which the comments of client.proto name, and the checks in client_codec.cpp
 // define what a peer may send.
 
 inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;   ///< Of a submission, bytes.

@@ -8,43 +8,32 @@
 #include <cstddef>
 #include <initializer_list>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/error.hpp"
 #include "proto/wire/checks.hpp"
-#include "proto/wire/conversions.hpp"
 
 namespace proofmass::wire {
 namespace {
 
-/// The largest batch of results has 40,000.
-constexpr std::size_t fields_max = 65536;
+/// The largest batch of results has 40,000 fields.
+constexpr detail::Form message_form{.name = "message",
+                                    .kind = "an envelope",
+                                    .size_max = message_size_max,
+                                    .fields_max = 65536,
+                                    .is_always_counted = false};
 
-bool has_few_fields(std::string_view bytes) {
-  // A field takes two bytes or more, so that a short message cannot have too many. Counting takes
-  // as long as parsing.
-  return bytes.size() / 2 <= fields_max ||
-         detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max);
-}
-
-std::string too_large(std::size_t size) {
-  return fmt::format("message size = {} bytes (must be at most {})", size, message_size_max);
-}
-
-using detail::checked_id;
-using detail::checked_magnitude;
-using detail::checked_name;
 using detail::require;
 using detail::require_count;
+using detail::require_id;
 using detail::require_in;
+using detail::require_magnitude;
+using detail::require_name;
 
-void check_campaign(std::uint64_t id) { (void)checked_id(id, "campaign"); }
-void check_attempt(std::uint32_t attempt) { (void)checked_id(attempt, "attempt"); }
+void check_campaign(std::uint64_t id) { require_id(id, "campaign"); }
+void check_attempt(std::uint32_t attempt) { require_id(attempt, "attempt"); }
 void check_run(std::uint64_t run) { require_in(run, 0, num_runs_max - 1, "run"); }
-void check_name(const std::string& name, std::string_view field) {
-  (void)checked_name(name, field);
-}
-
 void check_ranges(const Ranges& ranges) {
   require_count(ranges.size(), 1, ranges_per_message_max, "ranges");
   for (const proto::Range& range : ranges) {
@@ -71,19 +60,19 @@ void check(const proto::Hello& hello) {
   require_in(hello.num_slots(), 1, slots_max, "num_slots");
   require_in(hello.num_card_slots(), 0, hello.num_slots() - 1, "num_card_slots");
   detail::require_cards(hello.cards());
-  check_name(hello.worker_name(), "worker_name");
-  check_name(hello.host(), "host");
-  check_name(hello.model_version(), "model_version");
-  check_name(hello.build(), "build");
+  require_name(hello.worker_name(), "worker_name");
+  require_name(hello.host(), "host");
+  require_name(hello.model_version(), "model_version");
+  require_name(hello.build(), "build");
   require_in(hello.slots_per_thread(), 0, hello.num_slots() - hello.num_card_slots(),
              "slots_per_thread");
   require_count(hello.other_models_size(), 0, other_models_max, "other_models");
   for (const proto::OtherModel& other : hello.other_models()) {
-    check_name(other.version(), "other_models.version");
+    require_name(other.version(), "other_models.version");
   }
   if (!hello.has_former()) return;
   require_in(hello.former().signal(), 0, signal_max, "former signal");
-  (void)checked_id(hello.former().session(), "former session");
+  require_id(hello.former().session(), "former session");
   check_reason(hello.former().reason(),
                {LossReason::crashed, LossReason::out_of_memory, LossReason::preempted});
 }
@@ -93,7 +82,7 @@ void check(const proto::Welcome& welcome) {
   require(interval_s > 0.0 && interval_s <= heartbeat_interval_s_max, "heartbeat_interval_s",
           fmt::format("{}", interval_s),
           fmt::format("must be in (0, {}]", heartbeat_interval_s_max));
-  (void)checked_id(welcome.worker_id(), "worker_id");
+  require_id(welcome.worker_id(), "worker_id");
 }
 
 void check(const proto::Reject& reject) {
@@ -173,11 +162,6 @@ void check_values(const Values& values, bool have_meaning, double least, double 
   }
 }
 
-void check_time(double time_s, std::string_view field) {
-  if (checked_magnitude(time_s, field) <= run_time_s_max) return;
-  throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", run_time_s_max));
-}
-
 void check_loss(std::uint32_t position, bool is_lost, std::string_view field) {
   constexpr std::uint64_t positions_max = 255;
   require_in(position, is_lost ? 1 : 0, is_lost ? positions_max : 0, field);
@@ -200,8 +184,8 @@ void check(const proto::ComputedRun& run) {
   check_values(run.correlation(), has_errors, -1.0, 1.0, "correlation");
   check_loss(run.loss_cause(), result.status == RunStatus::lost, "loss_cause");
   check_loss(run.loss_session(), result.status == RunStatus::lost, "loss_session");
-  check_time(run.compute_s(), "compute_s");
-  check_time(run.elapsed_s(), "elapsed_s");
+  require_magnitude(run.compute_s(), "compute_s", run_time_s_max);
+  require_magnitude(run.elapsed_s(), "elapsed_s", run_time_s_max);
 }
 
 void check(const proto::ResultBatch& batch) {
@@ -289,7 +273,7 @@ void check_of_coordinator(const proto::Envelope& envelope) {
 /// their limits, enumerators are known, names are names, lists have as many entries as others say.
 /// @throws ConfigError reading `field = value (rule)`.
 void check(const proto::Envelope& envelope) {
-  (void)checked_id(envelope.session(), "session");
+  require_id(envelope.session(), "session");
   require(!is_of_worker(envelope) || !is_of_coordinator(envelope), "message", "two", "must be one");
   check_of_worker(envelope);
   check_of_coordinator(envelope);
@@ -297,34 +281,17 @@ void check(const proto::Envelope& envelope) {
 
 /// Why the bytes are not a message, if so.
 std::optional<DecodeError> read(std::string_view bytes, proto::Envelope& envelope) {
-  detail::silence_protobuf();
-  if (bytes.size() > message_size_max) {
-    return DecodeError{DecodeFault::too_large, too_large(bytes.size())};
-  }
-  const bool is_parsed = has_few_fields(bytes) &&
-                         envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!is_parsed) {
-    return DecodeError{DecodeFault::unparsable,
-                       fmt::format("message = {} bytes (must be an envelope of at most {} fields)",
-                                   bytes.size(), fields_max)};
-  }
-  if (envelope.protocol_version() != protocol_version) {
-    return DecodeError{DecodeFault::wrong_version,
-                       fmt::format("protocol_version = {} (must be {})",
-                                   envelope.protocol_version(), protocol_version)};
-  }
-  if (!is_of_worker(envelope) && !is_of_coordinator(envelope)) {
-    return DecodeError{DecodeFault::empty, "message = none (must be of a known kind)"};
-  }
-  try {
+  return detail::read(bytes, message_form, envelope, [&]() -> std::optional<DecodeError> {
+    const bool is_empty = !is_of_worker(envelope) && !is_of_coordinator(envelope);
+    const auto fault =
+        detail::fault_of_envelope(message_form, envelope.protocol_version(), is_empty);
+    if (fault) return fault;
     check(envelope);
-  } catch (const Error& error) {
-    return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
-  }
-  if (envelope.has_reject()) {
-    envelope.mutable_reject()->set_text(detail::printable(envelope.reject().text()));
-  }
-  return std::nullopt;
+    if (envelope.has_reject()) {
+      envelope.mutable_reject()->set_text(detail::printable(envelope.reject().text()));
+    }
+    return std::nullopt;
+  });
 }
 
 }  // namespace
@@ -343,10 +310,105 @@ std::variant<const proto::Envelope*, DecodeError> decode(std::string_view bytes,
 }
 
 std::string encode(proto::Envelope envelope) {
-  envelope.set_protocol_version(protocol_version);
-  const std::size_t size = envelope.ByteSizeLong();
-  if (size > message_size_max) throw InvalidArgument(too_large(size));
-  return envelope.SerializeAsString();
+  return detail::envelope_bytes(envelope, message_form);
+}
+
+std::vector<RunRange> ranges_of(const Ranges& ranges) {
+  std::vector<RunRange> values;
+  values.reserve(static_cast<std::size_t>(ranges.size()));
+  for (const proto::Range& range : ranges) {
+    values.push_back({.first = {range.first()}, .count = range.count()});
+  }
+  return values;
+}
+
+void add_ranges(std::span<const RunRange> ranges, Ranges& message) {
+  for (const RunRange& range : ranges) {
+    proto::Range& added = *message.Add();
+    added.set_first(range.first.value);
+    added.set_count(range.count);
+  }
+}
+
+RunRange runs_of(const proto::RunLease& lease) {
+  return {.first = {lease.first_run()}, .count = lease.num_runs()};
+}
+
+std::vector<RunIndex> runs_of(const proto::ResultAck& ack) {
+  std::vector<RunIndex> runs;
+  runs.reserve(static_cast<std::size_t>(ack.runs_size()));
+  for (const std::uint64_t run : ack.runs()) runs.push_back({run});
+  return runs;
+}
+
+ComputedRun computed_run(const proto::ComputedRun& message) {
+  RunResult result;
+  result.run = {message.run()};
+  result.status = static_cast<RunStatus>(message.status());
+  result.num_draws = message.num_draws();
+  result.num_rounds = message.num_rounds();
+  result.truth.assign(message.truth().begin(), message.truth().end());
+  result.estimate.assign(message.estimate().begin(), message.estimate().end());
+  result.standard_error.assign(message.standard_error().begin(), message.standard_error().end());
+  result.fit.assign(message.fit().begin(), message.fit().end());
+  result.correlations.assign(message.correlation().begin(), message.correlation().end());
+  result.health.assign(message.health().begin(), message.health().end());
+  result.loss = {.cause = message.loss_cause(), .session = message.loss_session()};
+  return {.result = std::move(result),
+          .compute_s = message.compute_s(),
+          .elapsed_s = message.elapsed_s(),
+          .is_by_card = message.is_by_card()};
+}
+
+void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
+  const RunResult& result = computed.result;
+  message.set_run(result.run.value);
+  message.set_status(static_cast<proto::RunStatus>(result.status));
+  message.set_num_draws(result.num_draws);
+  message.set_num_rounds(result.num_rounds);
+  if (result.has_truth()) {
+    message.mutable_truth()->Assign(result.truth.begin(), result.truth.end());
+    message.mutable_health()->Assign(result.health.begin(), result.health.end());
+  }
+  if (result.has_estimate()) {
+    message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());
+    message.mutable_standard_error()->Assign(result.standard_error.begin(),
+                                             result.standard_error.end());
+    message.mutable_fit()->Assign(result.fit.begin(), result.fit.end());
+    message.mutable_correlation()->Assign(result.correlations.begin(), result.correlations.end());
+  }
+  message.set_loss_cause(result.loss.cause);
+  message.set_loss_session(result.loss.session);
+  message.set_compute_s(computed.compute_s);
+  message.set_elapsed_s(computed.elapsed_s);
+  message.set_is_by_card(computed.is_by_card);
+}
+
+void ResultBatches::add(const LeasedResult& result) {
+  const auto& [campaign, attempt, computed] = result;
+  proto::ResultBatch& batch = open_[{campaign, attempt}];
+  batch.set_campaign(campaign.value);
+  batch.set_attempt(attempt.value);
+  proto::ComputedRun& run = *batch.add_results();
+  write_run(computed, run);
+  // Results of one campaign are about as large as each other; half of a message is left for that.
+  const std::size_t count_max = std::clamp(message_size_max / 2 / run.ByteSizeLong(),
+                                           std::size_t{1}, std::size_t{runs_per_lease_max});
+  if (static_cast<std::size_t>(batch.results_size()) < count_max) return;
+  full_.push_back(std::move(batch));
+  open_.erase({campaign, attempt});
+}
+
+std::vector<proto::ResultBatch> ResultBatches::take() {
+  for (auto& [key, batch] : open_) full_.push_back(std::move(batch));
+  return std::move(full_);
+}
+
+proto::Envelope rejection(proto::RejectReason reason, std::string_view text) {
+  proto::Envelope envelope;
+  envelope.mutable_reject()->set_reason(reason);
+  envelope.mutable_reject()->set_text(std::string(text));
+  return envelope;
 }
 
 }  // namespace proofmass::wire

@@ -14,8 +14,11 @@
 namespace proofmass::wire {
 namespace {
 
-/// Tables and columns have at most some thousands; an array of numbers is one.
-constexpr std::size_t definition_fields_max = 4096;
+/// Tables and columns have at most some thousands of fields.
+constexpr detail::Form definition_form{.name = "definition",
+                                       .kind = "a definition",
+                                       .size_max = definition_size_max,
+                                       .fields_max = 4096};
 
 using Values = google::protobuf::RepeatedField<double>;
 
@@ -32,16 +35,11 @@ void check_table(const proto::DataTable& message) {
   detail::require(size % message.num_columns() == 0, "definition.tables.values",
                   fmt::format("{} entries", size),
                   fmt::format("must be rows of {}", message.num_columns()));
-  (void)detail::checked_name(message.key(), "definition.tables.key");
+  detail::require_name(message.key(), "definition.tables.key");
   check_finite(message.values(), "definition.tables.values");
 }
 
 std::vector<double> vector_of(const Values& values) { return {values.begin(), values.end()}; }
-
-std::string size_text(std::size_t size) {
-  return fmt::format("definition size = {} bytes (must be at most {})", size, definition_size_max);
-}
-
 }  // namespace
 
 namespace detail {
@@ -63,7 +61,7 @@ void write_definition(const Definition& definition, proto::Definition& message) 
 void check_definition(const proto::Definition& message) {
   require_in(message.text().size(), 1, definition_text_size_max, "definition.text size");
   if (!message.model_version().empty()) {
-    (void)checked_name(message.model_version(), "definition.model_version");
+    require_name(message.model_version(), "definition.model_version");
   }
   require_count(message.tables_size(), 0, definition_tables_max, "definition.tables");
   require_count(message.table_columns_size(), 0, table_columns_max, "definition.table_columns");
@@ -91,32 +89,18 @@ Definition read_definition(const proto::Definition& message) {
 std::string encode_definition(const Definition& definition) {
   proto::Definition message;
   detail::write_definition(definition, message);
-  const std::size_t size = message.ByteSizeLong();
-  if (size > definition_size_max) throw InvalidArgument(size_text(size));
-  return message.SerializeAsString();
+  return detail::bytes_of(message, definition_form);
 }
 
 std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) {
-  detail::silence_protobuf();
-  if (bytes.size() > definition_size_max) {
-    return DecodeError{DecodeFault::too_large, size_text(bytes.size())};
-  }
   proto::Definition message;
-  const bool is_parsed =
-      detail::has_fields_at_most(bytes, *proto::Definition::descriptor(), definition_fields_max) &&
-      message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!is_parsed) {
-    return DecodeError{
-        DecodeFault::unparsable,
-        fmt::format("definition = {} bytes (must be a definition of at most {} fields)",
-                    bytes.size(), definition_fields_max)};
-  }
-  try {
-    detail::check_definition(message);
-    return detail::read_definition(message);
-  } catch (const Error& error) {
-    return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
-  }
+  const auto fault =
+      detail::read(bytes, definition_form, message, [&]() -> std::optional<DecodeError> {
+        detail::check_definition(message);
+        return std::nullopt;
+      });
+  if (fault) return *fault;
+  return detail::read_definition(message);
 }
 
 EncodedDefinition::EncodedDefinition(std::string bytes)

@@ -9,7 +9,7 @@
 #include "core/runs.hpp"
 
 // Values that messages between coordinator and workers carry, and the limits of messages. The
-// messages themselves are the classes of proto/proofmass.proto: conversions.hpp turns their parts
+// messages themselves are the classes of proto/proofmass.proto: codec.hpp turns their parts
 // into these values.
 
 namespace proofmass::wire {

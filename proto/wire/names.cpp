@@ -5,10 +5,18 @@
 #include <cstddef>
 
 #include "core/campaign/name.hpp"
-#include "core/error.hpp"
 #include "proto/client.pb.h"
 
 namespace proofmass::wire {
+namespace {
+
+/// Of an enumerator, which are numbered from 1 without a gap.
+template <std::size_t count>
+std::string_view name_in(const std::array<std::string_view, count>& names, auto value) {
+  return names.at(static_cast<std::size_t>(value) - 1);
+}
+
+}  // namespace
 
 std::string name_from(std::string_view text) {
   std::string name(text.substr(0, name_length_max));
@@ -20,35 +28,15 @@ std::string name_from(std::string_view text) {
 }
 
 std::string_view name_of(ControlAction action) {
-  switch (action) {
-    case ControlAction::pause:
-      return "pause";
-    case ControlAction::resume:
-      return "resume";
-    case ControlAction::cancel:
-      return "cancel";
-    case ControlAction::set_priority:
-      return "set-priority";
-    case ControlAction::archive:
-      return "archive";
-    case ControlAction::retry:
-      return "retry";
-  }
-  PROOFMASS_EXPECT(false);
+  static constexpr std::array<std::string_view, 6> names{"pause",        "resume", "cancel",
+                                                         "set-priority", "retry",  "archive"};
+  return name_in(names, action);
 }
 
 std::string_view name_of(CampaignPhase phase) {
-  switch (phase) {
-    case CampaignPhase::active:
-      return "active";
-    case CampaignPhase::paused:
-      return "paused";
-    case CampaignPhase::finished:
-      return "finished";
-    case CampaignPhase::cancelled:
-      return "cancelled";
-  }
-  PROOFMASS_EXPECT(false);
+  static constexpr std::array<std::string_view, 4> names{"active", "paused", "finished",
+                                                         "cancelled"};
+  return name_in(names, phase);
 }
 
 CampaignPhase phase_of(const proto::CampaignStatus& campaign) {
@@ -69,36 +57,15 @@ std::string_view phase_name(const proto::CampaignStatus& campaign) {
 }
 
 std::string_view name_of(proto::FactoryPhase phase) {
-  constexpr std::array<std::string_view, 3> names{"active", "waiting", "paused"};
-  return names.at(static_cast<std::size_t>(phase) - 1);
+  static constexpr std::array<std::string_view, 3> names{"active", "waiting", "paused"};
+  return name_in(names, phase);
 }
 
 std::string_view name_of(LossReason reason) {
-  switch (reason) {
-    case LossReason::silent:
-      return "silent";
-    case LossReason::crashed:
-      return "crashed";
-    case LossReason::out_of_memory:
-      return "out_of_memory";
-    case LossReason::hung:
-      return "hung";
-    case LossReason::drained:
-      return "drained";
-    case LossReason::walltime:
-      return "walltime";
-    case LossReason::preempted:
-      return "preempted";
-    case LossReason::retracted:
-      return "retracted";
-    case LossReason::never_arrived:
-      return "never_arrived";
-    case LossReason::protocol:
-      return "protocol";
-    case LossReason::failed:
-      return "failed";
-  }
-  PROOFMASS_EXPECT(false);
+  static constexpr std::array<std::string_view, 11> names{
+      "silent",    "crashed",   "out_of_memory", "hung",     "drained", "walltime",
+      "preempted", "retracted", "never_arrived", "protocol", "failed"};
+  return name_in(names, reason);
 }
 
 }  // namespace proofmass::wire

@@ -99,7 +99,7 @@ void NullExecution::abandon() {
   batches_.clear();
 }
 
-std::vector<worker::FinishedRun> NullExecution::take_finished() {
+std::vector<wire::LeasedResult> NullExecution::take_finished() {
   return std::exchange(finished_, {});
 }
 
@@ -126,6 +126,7 @@ void NullExecution::finish(const worker::TakenRuns& assignment, double elapsed_s
   for (const RunRequest& request : assignment.requests) {
     finished_.push_back(
         {.campaign = assignment.campaign,
+         .attempt = {},
          .computed = {.result = null_result(campaign, request.run), .elapsed_s = elapsed_s}});
   }
   num_steps_done_ += assignment.requests.size() * num_steps;

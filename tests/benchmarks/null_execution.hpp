@@ -45,7 +45,7 @@ class NullExecution final : public worker::Execution {
   [[nodiscard]] bool drop_batch(std::uint64_t number) override;
   void forget(wire::CampaignId campaign) override;
   void abandon() override;
-  [[nodiscard]] std::vector<worker::FinishedRun> take_finished() override;
+  [[nodiscard]] std::vector<wire::LeasedResult> take_finished() override;
   [[nodiscard]] std::vector<worker::RunningBatch> computing() const override;
   [[nodiscard]] std::optional<worker::Duration> usual_batch_time() const override { return {}; }
   [[nodiscard]] std::uint64_t num_steps_done() const override { return num_steps_done_; }
@@ -72,7 +72,7 @@ class NullExecution final : public worker::Execution {
   std::map<std::uint64_t, Batch> batches_;  ///< By number.
   std::uint64_t num_batches_ = 0;           ///< Begun.
   std::uint64_t num_steps_done_ = 0;        ///< Of all runs of batches that are finished.
-  std::vector<worker::FinishedRun> finished_;
+  std::vector<wire::LeasedResult> finished_;
 };
 
 }  // namespace proofmass::test

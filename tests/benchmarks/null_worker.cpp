@@ -15,6 +15,7 @@
 
 #include "core/microscope/simulation/run.hpp"
 #include "tests/benchmarks/null_result.hpp"
+#include "tests/support/prepared_campaign.hpp"
 #include "worker/program.hpp"
 
 namespace {
@@ -50,7 +51,7 @@ void pass_time(double run_time_s, const std::function<void(int)>& progress) {
   }
 }
 
-worker::PreparedCampaign prepare(const Campaign& definition, const NullOptions& options) {
+test::PreparedCampaign prepare(const Campaign& definition, const NullOptions& options) {
   std::shared_ptr<Campaign> campaign = definition.clone();
   campaign->num_runs = num_runs_max;  // It may be extended.
   return {.simulate =

@@ -5,7 +5,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/campaign_file/data_file.hpp"
-#include "coordinator/net/authentication/allow_list.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "core/definition/csv.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"

@@ -7,10 +7,8 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/campaigns.hpp"
-#include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/workers.hpp"
-#include "coordinator/net/factory_reports.hpp"
+#include "coordinator/dispatch/events.hpp"
+#include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"

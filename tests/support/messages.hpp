@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::proto {
 

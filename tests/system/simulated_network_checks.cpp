@@ -1,5 +1,4 @@
 #include "proto/wire/codec.hpp"
-#include "proto/wire/conversions.hpp"
 #include "tests/system/simulated_network_coordinator.hpp"
 #include "tests/test.hpp"
 

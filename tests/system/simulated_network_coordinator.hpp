@@ -11,9 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/campaigns.hpp"
-#include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "tests/system/simulated_network_execution.hpp"
 #include "tests/system/simulated_network_liar.hpp"

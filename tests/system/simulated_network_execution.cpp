@@ -144,7 +144,7 @@ PlayedExecution::Outcome PlayedExecution::advance() {
                                  .elapsed_s = 0.7,
                                  .is_by_card = batch->is_by_card};
       computed.result.truth = draw.truth;
-      finished_.push_back({.campaign = campaign, .computed = computed});
+      finished_.push_back({.campaign = campaign, .attempt = {}, .computed = computed});
     }
     outcome = Outcome::finished;
     batch = batches_.erase(batch);

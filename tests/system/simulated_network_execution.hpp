@@ -52,7 +52,7 @@ class PlayedExecution final : public worker::Execution {
   bool drop_batch(std::uint64_t number) override;
   void forget(wire::CampaignId campaign) override;
   void abandon() override;
-  std::vector<worker::FinishedRun> take_finished() override { return std::exchange(finished_, {}); }
+  std::vector<wire::LeasedResult> take_finished() override { return std::exchange(finished_, {}); }
   std::vector<worker::CrashedBatch> take_crashed() override { return std::exchange(crashed_, {}); }
   std::vector<worker::RunningBatch> computing() const override;
   std::optional<worker::Duration> usual_batch_time() const override { return std::nullopt; }
@@ -89,7 +89,7 @@ class PlayedExecution final : public worker::Execution {
   std::set<wire::CampaignId> defined_;
   std::deque<WaitingRun> waiting_;
   std::vector<Batch> batches_;
-  std::vector<worker::FinishedRun> finished_;
+  std::vector<wire::LeasedResult> finished_;
   std::vector<worker::CrashedBatch> crashed_;
   std::uint64_t next_batch_ = 1;
   std::uint64_t num_steps_done_ = 0;

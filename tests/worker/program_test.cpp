@@ -10,7 +10,6 @@
 #include "proto/command_line/option_checks.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
-#include "worker/options.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -144,8 +143,7 @@ struct Outcome {
   arguments.insert(arguments.begin(), "test-worker");
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
-  const Program program{.name = "test-worker",
-                        .prepare = [](const Campaign&) { return PreparedCampaign{}; }};
+  const Program program{.name = "test-worker"};
   _exit(run_worker(static_cast<int>(argv.size()), argv.data(), program));
 }
 

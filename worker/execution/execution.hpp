@@ -24,13 +24,6 @@ namespace proofmass::worker {
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::steady_clock::duration;
 
-/// A finished run and the campaign that it belongs to. The execution does not know under which
-/// attempt a run was lent: the attempt may change while the run is being computed.
-struct FinishedRun {
-  wire::CampaignId campaign;
-  wire::ComputedRun computed;
-};
-
 /// Runs whose simulation crashed, together, outside this process.
 struct CrashedBatch {
   wire::CampaignId campaign;
@@ -86,8 +79,9 @@ class Execution {
   /// Drops all runs that are not finished.
   virtual void abandon() = 0;
 
-  /// Finished runs, each handed out once, in the order in which they finished.
-  [[nodiscard]] virtual std::vector<FinishedRun> take_finished() = 0;
+  /// Finished runs, each handed out once, in the order in which they finished. Their attempt is not
+  /// known here: it may change while a run is being computed.
+  [[nodiscard]] virtual std::vector<wire::LeasedResult> take_finished() = 0;
   /// Crashed ones, each handed out once; none if all that simulates is within this process.
   [[nodiscard]] virtual std::vector<CrashedBatch> take_crashed() { return {}; }
   [[nodiscard]] virtual std::vector<RunningBatch> computing() const = 0;

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <map>
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
+#include "core/math/instruction_set.hpp"
 #include "core/runs.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -169,7 +172,7 @@ void Executor::forget(wire::CampaignId campaign) {
   const std::lock_guard lock(mutex_);
   queue_.drop(campaign);
   drop_batches([&](const Batch& batch) { return batch.assignment.campaign == campaign; });
-  std::erase_if(finished_, [&](const FinishedRun& run) { return run.campaign == campaign; });
+  std::erase_if(finished_, [&](const wire::LeasedResult& run) { return run.campaign == campaign; });
   std::erase_if(crashed_, [&](const CrashedBatch& batch) { return batch.campaign == campaign; });
   campaigns_.erase(campaign);
 }
@@ -180,7 +183,7 @@ void Executor::abandon() {
   drop_batches([](const Batch&) { return true; });
 }
 
-std::vector<FinishedRun> Executor::take_finished() {
+std::vector<wire::LeasedResult> Executor::take_finished() {
   const std::lock_guard lock(mutex_);
   return std::exchange(finished_, {});
 }
@@ -195,12 +198,12 @@ std::vector<RunningBatch> Executor::computing() const {
   std::vector<RunningBatch> running;
   for (const auto& [number, batch] : batches_) {
     const int num_done = batch->num_steps_done;
-    running.push_back(
-        {.number = number,
-         .campaign = batch->assignment.campaign,
-         .ranges = requested_ranges(batch->assignment.requests),
-         .num_steps_done = static_cast<std::uint32_t>(num_done),
-         .time_left = time_left(now() - batch->started_at, num_done, batch->prepared->num_steps)});
+    running.push_back({.number = number,
+                       .campaign = batch->assignment.campaign,
+                       .ranges = requested_ranges(batch->assignment.requests),
+                       .num_steps_done = static_cast<std::uint32_t>(num_done),
+                       .time_left = time_left(now() - batch->started_at, num_done,
+                                              batch->prepared->num_steps())});
   }
   return running;
 }
@@ -287,7 +290,7 @@ RunQueue::IsWanted Executor::wanted_by(Place place) const {
     const auto known = campaigns_.find(campaign);
     if (known == campaigns_.end() || known->second.prepared == nullptr) return false;
     const bool is_on_device =
-        is_for_cards && !config_.devices.empty() && known->second.prepared->simulate_on != nullptr;
+        is_for_cards && !config_.devices.empty() && known->second.prepared->runs_on_devices();
     return is_on_device == (place == Place::device);
   };
 }
@@ -304,7 +307,7 @@ void Executor::prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock) 
   campaigns_.at(id).is_preparing = true;
   const Counted counted(num_preparing_);  // Before anybody else has the lock.
   lock.unlock();
-  auto prepared = std::make_shared<const PreparedCampaign>(prepare_(*definition));
+  std::shared_ptr<const Plan> prepared = prepare_(*definition);
   lock.lock();
   // It may have been forgotten meanwhile, and even defined again.
   const auto found = campaigns_.find(id);
@@ -348,7 +351,8 @@ std::vector<RunResult> Executor::simulate(Batch& batch) {
     if (batch.is_dropped || is_ending_) throw Abandoned{};
     if (batch.expected.empty()) note_steps(batch, num_steps_now);
   };
-  std::vector<RunResult> results = batch.prepared->simulate(requests, on_progress);
+  std::vector<RunResult> results =
+      batch.prepared->simulate_batch(requests, best_instruction_set(), on_progress);
   PROOFMASS_EXPECT(results.size() == requests.size());
   return results;
 }
@@ -376,6 +380,7 @@ void Executor::finish(const Batch& batch, std::vector<RunResult> results,
     }
     for (RunResult& result : results) {
       finished_.push_back({.campaign = campaign,
+                           .attempt = {},
                            .computed = {.result = std::move(result),
                                         .compute_s = compute_s,
                                         .elapsed_s = elapsed_s,
@@ -383,6 +388,54 @@ void Executor::finish(const Batch& batch, std::vector<RunResult> results,
     }
   }
   on_change_();
+}
+
+// Runs flow through a device group by group, and the thread looks after it every few milliseconds.
+
+void Executor::compute_on(Device& device, const std::shared_ptr<Batch>& first) {
+  const std::unique_ptr<DeviceSimulation> simulation = first->prepared->simulation_on(device);
+  std::map<std::uint64_t, std::shared_ptr<Batch>> in_flight;
+  const auto add = [&](const std::shared_ptr<Batch>& batch) {
+    simulation->add(batch->number, batch->assignment.requests);
+    in_flight[batch->number] = batch;
+  };
+  add(first);
+  while (std::ranges::any_of(in_flight, [](const auto& b) { return !b.second->is_dropped; })) {
+    while (simulation->num_in_flight() + simulation->group_size <= simulation->capacity()) {
+      const std::shared_ptr<Batch> next = next_batch_like(*first);
+      if (next == nullptr) break;
+      add(next);
+    }
+    const std::size_t num_together = simulation->num_in_flight();
+    for (DeviceSimulation::Ended& ended : simulation->advance()) {
+      const std::shared_ptr<Batch> batch = in_flight.extract(ended.group).mapped();
+      check_some(*batch, ended.results);
+      note_steps(*batch, batch->prepared->num_steps());
+      finish(*batch, std::move(ended.results), num_together);
+    }
+    for (const auto& [number, batch] : in_flight) {
+      note_steps(*batch, simulation->num_steps_done(number));
+    }
+  }
+}
+
+void Executor::check_some(const Batch& batch, const std::vector<RunResult>& results) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      // As good as at random, and the same runs every time.
+      if (fraction_of(mixed(results[i].run.value)) >= config_.checked_fraction) continue;
+      const bool has_room = !checks_.empty() && checks_.back()->prepared == batch.prepared &&
+                            checks_.back()->expected.size() < config_.batch_size_max;
+      if (!has_room) {
+        checks_.push_back(std::make_shared<Batch>());
+        checks_.back()->prepared = batch.prepared;
+      }
+      checks_.back()->assignment.requests.push_back(batch.assignment.requests[i]);
+      checks_.back()->expected.push_back(results[i]);
+    }
+  }
+  changed_.notify_all();
 }
 
 }  // namespace proofmass::worker

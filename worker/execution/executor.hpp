@@ -19,24 +19,8 @@
 
 namespace proofmass::worker {
 
-/// Computes some runs together; their results are in the order of the requests. Calls `progress`
-/// now and then with the number of steps that each of the runs has done. Called by several threads
-/// at the same time.
-using Simulate = std::function<std::vector<RunResult>(std::span<const RunRequest> requests,
-                                                      const std::function<void(int)>& progress)>;
-
-/// Begins to compute runs on a device, for the thread that serves it.
-using SimulateOn = std::function<std::unique_ptr<DeviceSimulation>(Device&)>;
-
-/// A campaign whose runs can be computed.
-struct PreparedCampaign {
-  Simulate simulate;
-  int num_steps = 1;         ///< Of one run, all sessions together; at least 1.
-  SimulateOn simulate_on{};  ///< Empty if its runs are left to processors.
-};
-
 /// Prepares what the runs of a campaign share, which may take some time.
-using Prepare = std::function<PreparedCampaign(const Campaign& campaign)>;
+using Prepare = std::function<std::shared_ptr<const Plan>(const Campaign& campaign)>;
 
 /// How much an executor computes at a time.
 struct ExecutorConfig {
@@ -74,7 +58,7 @@ class Executor final : public Execution {
   [[nodiscard]] bool drop_batch(std::uint64_t number) override;
   void forget(wire::CampaignId campaign) override;
   void abandon() override;
-  [[nodiscard]] std::vector<FinishedRun> take_finished() override;
+  [[nodiscard]] std::vector<wire::LeasedResult> take_finished() override;
   [[nodiscard]] std::vector<CrashedBatch> take_crashed() override;
   [[nodiscard]] std::vector<RunningBatch> computing() const override;
   [[nodiscard]] std::optional<Duration> usual_batch_time() const override;
@@ -91,8 +75,7 @@ class Executor final : public Execution {
  private:
   struct KnownCampaign {
     std::shared_ptr<const Campaign> definition;  ///< Shared with the thread that prepares it.
-    std::shared_ptr<const PreparedCampaign>
-        prepared;  ///< Shared with its batches; null until then.
+    std::shared_ptr<const Plan> prepared;        ///< Shared with its batches; null until then.
     bool is_preparing = false;
     std::uint64_t used = 0;              ///< Grows with each use: the smallest is the longest ago.
     std::size_t largest_batch = 0;       ///< Runs of the largest batch so far.
@@ -106,7 +89,7 @@ class Executor final : public Execution {
   struct Batch {
     std::uint64_t number = 0;
     TakenRuns assignment;
-    std::shared_ptr<const PreparedCampaign> prepared;
+    std::shared_ptr<const Plan> prepared;
     TimePoint started_at;
     Place place = Place::processor;
     std::vector<RunResult> expected;  ///< What a device found. Empty if its results are wanted.
@@ -157,7 +140,7 @@ class Executor final : public Execution {
   RunQueue queue_;
   std::map<std::uint64_t, std::shared_ptr<Batch>> batches_;
   std::vector<std::shared_ptr<Batch>> checks_;  ///< Runs of devices that are to be computed again.
-  std::vector<FinishedRun> finished_;
+  std::vector<wire::LeasedResult> finished_;
   std::vector<CrashedBatch> crashed_;
   std::optional<std::string> failure_;
 

@@ -10,7 +10,7 @@
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 #include "core/runs.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -159,10 +159,6 @@ void Conversation::on_message(const proto::Envelope& message, TimePoint now) {
   const bool is_about_registration = message.has_reject() || message.has_welcome();
   // What another coordinator process has said before it ended means nothing to the present one.
   if (!is_about_registration && message.epoch() != epoch_.value) return;
-  handle(message, now);
-}
-
-void Conversation::handle(const proto::Envelope& message, TimePoint now) {
   switch (message.from_coordinator_case()) {
     case proto::Envelope::kWelcome:
       return on_welcome(message, now);
@@ -435,14 +431,12 @@ void Conversation::set_aside(wire::CampaignId campaign, std::span<const RunRange
 
 std::vector<RunKey> Conversation::keep_finished(TimePoint now) {
   std::vector<RunKey> runs;
-  for (FinishedRun& finished : execution_.take_finished()) {
+  for (wire::LeasedResult& finished : execution_.take_finished()) {
     const RunKey key{finished.campaign, finished.computed.result.run};
     const auto found = unfinished_.find(key);
     PROOFMASS_EXPECT(found != unfinished_.end());
-    unacknowledged_.add({.campaign = finished.campaign,
-                         .attempt = found->second,
-                         .computed = std::move(finished.computed)},
-                        now);
+    finished.attempt = found->second;
+    unacknowledged_.add(std::move(finished), now);
     unfinished_.erase(found);
     runs.push_back(key);
   }

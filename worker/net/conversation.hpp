@@ -130,8 +130,6 @@ class Conversation {
     std::optional<TimePoint> deadline;  ///< Nothing: as long as it takes.
   };
 
-  /// Does what a message of the present coordinator says.
-  void handle(const proto::Envelope& message, TimePoint now);
   void on_welcome(const proto::Envelope& message, TimePoint now);
   void on_reject(const proto::Envelope& message, TimePoint now);
   void on_definition_part(const proto::DefinitionPart& part, TimePoint now);

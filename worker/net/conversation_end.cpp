@@ -6,7 +6,7 @@
 
 #include "core/math/hash.hpp"
 #include "core/runs.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 #include "worker/net/conversation.hpp"
 
 // How a conversation ends. While it does, it takes no more runs.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 
@@ -40,10 +40,7 @@ std::size_t num_ranges(const HeldRunsList& held) {
 
 void UnacknowledgedResults::add(wire::LeasedResult result, TimePoint due_at) {
   const RunKey key{result.campaign, result.computed.result.run};
-  results_[key] = {.attempt = result.attempt,
-                   .computed = std::move(result.computed),
-                   .due_at = due_at,
-                   .resend_after = resend_after_};
+  results_[key] = {.result = std::move(result), .due_at = due_at, .resend_after = resend_after_};
 }
 
 UnacknowledgedResults::Results::iterator UnacknowledgedResults::drop(Results::iterator result) {
@@ -101,7 +98,7 @@ std::vector<proto::ResultBatch> UnacknowledgedResults::take(std::span<const RunK
   wire::ResultBatches batches;
   for (const RunKey& run : runs) {
     Kept& kept = results_.at(run);
-    batches.add(run.first, kept.attempt, kept.computed);
+    batches.add(kept.result);
     kept.due_at = now + kept.resend_after;
     kept.resend_after = std::min(2 * kept.resend_after, resend_after_max_);
   }
@@ -110,16 +107,14 @@ std::vector<proto::ResultBatch> UnacknowledgedResults::take(std::span<const RunK
 
 std::vector<wire::LeasedResult> UnacknowledgedResults::all() const {
   std::vector<wire::LeasedResult> results;
-  for (const auto& [key, kept] : results_) {
-    results.push_back({key.first, kept.attempt, kept.computed});
-  }
+  for (const auto& [key, kept] : results_) results.push_back(kept.result);
   return results;
 }
 
 void UnacknowledgedResults::list(std::vector<HeldRun>& held,
                                  std::vector<HeldRun>& set_aside) const {
   for (const auto& [key, kept] : results_) {
-    (kept.is_set_aside ? set_aside : held).push_back({key.first, kept.attempt, key.second});
+    (kept.is_set_aside ? set_aside : held).push_back({key.first, kept.result.attempt, key.second});
   }
 }
 

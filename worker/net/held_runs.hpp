@@ -76,8 +76,7 @@ class UnacknowledgedResults {
 
  private:
   struct Kept {
-    wire::Attempt attempt;
-    wire::ComputedRun computed;
+    wire::LeasedResult result;
     TimePoint due_at;       ///< When to send it (again).
     Duration resend_after;  ///< From then on.
     bool is_set_aside = false;

@@ -1,17 +1,49 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/net/conversation.hpp"
-#include "worker/net/stop_signals.hpp"
 
 namespace proofmass::worker {
+
+/// Who asks a worker to end, and by which signals.
+enum class SignalSource : std::uint8_t {
+  anyone,      ///< SIGTERM and SIGINT: the first drains, the second ends at once.
+  supervisor,  ///< handed_on_signal(), with how often; SIGTERM and SIGINT drain, as they may come
+               ///< in addition.
+  campaign,    ///< SIGTERM ends at once; SIGINT is ignored: the campaign deals with it.
+};
+
+/// What signals have asked for so far.
+enum class EndRequest : std::uint8_t { none, drain, abandon };
+
+/// Receives signals by a file descriptor, so that one poll waits for them and for a socket. (The
+/// coordinator and the commands use handlers instead: some of their threads never poll.)
+class StopSignals {
+ public:
+  /// Blocks the signals, for good, for the calling thread and those that it makes from now on.
+  /// @throws Error if the system has no descriptor left.
+  explicit StopSignals(SignalSource source);
+
+  /// Readable while request() has something to take in.
+  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
+
+  /// Takes in the signals that have come and returns the strongest request since the beginning.
+  [[nodiscard]] EndRequest request();
+
+ private:
+  SignalSource source_;
+  wire::Descriptor descriptor_;
+  EndRequest request_ = EndRequest::none;
+};
 
 /// Whom a worker serves, and how.
 struct ServeConfig {

@@ -13,7 +13,6 @@
 #include "core/math/hash.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/codec.hpp"
-#include "proto/wire/conversions.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -129,9 +128,7 @@ void Spool::read_records(std::string_view content) {
 std::optional<std::string> Spool::append(std::span<const wire::LeasedResult> results) {
   std::string records;
   wire::ResultBatches batches;
-  for (const auto& [campaign, attempt, computed] : results) {
-    batches.add(campaign, attempt, computed);
-  }
+  for (const wire::LeasedResult& result : results) batches.add(result);
   for (proto::ResultBatch& batch : batches.take()) records += record_of(std::move(batch));
   return write(records);
 }

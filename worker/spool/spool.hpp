@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/link/descriptor.hpp"
+#include "proto/link/whole_file.hpp"
 #include "worker/execution/execution.hpp"
 
 namespace proofmass::worker {

@@ -11,13 +11,12 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <random>
 #include <string>
 #include <utility>
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/wire/conversions.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -59,7 +58,7 @@ class Supervisor {
   int run() {
     std::optional<proto::FormerSession> former;
     while (true) {
-      const ChildStart start{.session = random_session(), .former = former};
+      const ChildStart start{.session = wire::SessionId{wire::random_number()}, .former = former};
       const std::uint64_t num_killed_before = wire::num_oom_kills();
       const pid_t child = start_child(start);
       const int status = wait_for(child);
@@ -169,13 +168,6 @@ std::optional<RestartConfig::Duration> RestartPolicy::on_crash(
 }
 
 int handed_on_signal() { return SIGRTMIN; }
-
-wire::SessionId random_session() {
-  std::random_device device;
-  std::uint64_t value = 0;
-  while (value == 0) value = (std::uint64_t{device()} << 32) | device();
-  return {value};
-}
 
 int supervise(const std::function<int(const ChildStart&)>& work, const wire::Log& log,
               const RestartConfig& config) {

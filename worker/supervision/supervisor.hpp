@@ -51,9 +51,6 @@ struct ChildStart {
 /// Exit code of a child that had to leave a computation that hangs: it is started again.
 inline constexpr int exit_hung = 3;
 
-/// A random number, not 0.
-[[nodiscard]] wire::SessionId random_session();
-
 /// Runs the work in a child process, and again when that crashes or hangs. To be called before the
 /// process has other threads or sockets.
 ///

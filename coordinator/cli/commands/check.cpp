@@ -18,7 +18,6 @@
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {

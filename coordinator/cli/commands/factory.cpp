@@ -24,8 +24,7 @@
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
-#include "proto/link/start_program.hpp"
-#include "proto/link/surroundings.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
 

@@ -19,7 +19,6 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
-#include "proto/link/descriptor.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {

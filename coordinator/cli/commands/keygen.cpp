@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/net/authentication/allow_list.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -24,7 +24,7 @@
 #include "core/campaign/plan_study.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {

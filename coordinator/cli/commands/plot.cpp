@@ -19,7 +19,6 @@
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -28,7 +28,6 @@
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

@@ -23,7 +23,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/link/start_program.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {

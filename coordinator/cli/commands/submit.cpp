@@ -17,7 +17,7 @@
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {

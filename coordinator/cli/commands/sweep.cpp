@@ -25,8 +25,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
-#include "proto/link/surroundings.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

@@ -13,8 +13,8 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/report/json.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {

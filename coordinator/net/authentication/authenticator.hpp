@@ -5,15 +5,15 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "coordinator/dispatch/outbox.hpp"
-#include "coordinator/net/authentication/allow_list.hpp"
-#include "coordinator/net/authentication/refusal_log.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "proto/link/keys.hpp"
+#include "proto/link/socket.hpp"
 
 namespace zmq {
 class context_t;
@@ -21,6 +21,39 @@ class socket_t;
 }  // namespace zmq
 
 namespace proofmass::coordinator {
+
+/// A peer that was refused.
+struct Refusal {
+  std::string_view domain;
+  std::string_view address;     ///< Of the peer; empty if it is not known.
+  std::string_view public_key;  ///< Empty if it has shown none.
+  std::string_view reason;
+};
+
+/// Logs refusals, but not a flood of them: a peer is logged once a minute for the same reason, and
+/// at most 20 lines a minute are written in all. The other refusals are counted.
+class RefusalLog {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  explicit RefusalLog(Log log);
+
+  void refused(const Refusal& refusal, TimePoint now);
+
+ private:
+  void begin_minute(TimePoint now);
+
+  Log log_;
+  TimePoint began_at_;
+  std::set<std::string> lines_;  ///< Of this minute.
+  std::uint64_t num_left_out_ = 0;
+};
+
+/// Events of handshakes that failed: ZMQ_EVENT_..., joined by |.
+extern const int failed_handshakes;
+
+/// Why a handshake failed, for people.
+[[nodiscard]] std::string_view reason_of(const wire::SocketEvent& failure);
 
 /// Decides who may connect, by the ZAP protocol [ZeroMQ RFC 27]: a worker whose key is in
 /// authorized_workers, at the workers' address; a client whose key is in authorized_clients, at the

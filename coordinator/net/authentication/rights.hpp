@@ -1,48 +1,38 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "proto/link/keys.hpp"
 
 namespace proofmass::coordinator {
 
 /// What a client may do.
 enum class Right : std::uint8_t {
-  observe = 1,  ///< See campaigns, workers and factories; report how a factory stands.
-  submit = 2,   ///< Submit campaigns, and control those that the same name submitted.
-  control = 4,  ///< Control the campaigns of everybody; release hosts.
+  observe,  ///< See campaigns, workers and factories; report how a factory stands.
+  submit,   ///< Submit campaigns, and control those that the same name submitted.
+  control,  ///< Control the campaigns of everybody; release hosts.
 };
 
-/// A set of rights.
-class Rights {
- public:
-  constexpr Rights() = default;
-
-  /// The rights that a comma list grants, such as `observe,submit`; nothing if it is not such a
-  /// list.
-  [[nodiscard]] static std::optional<Rights> parse(std::string_view text);
-  [[nodiscard]] static constexpr Rights all() { return Rights(7); }
-  /// The rights of a client whose line in the list names none: observe and submit.
-  [[nodiscard]] static constexpr Rights usual() { return Rights(3); }
-
-  [[nodiscard]] constexpr bool has(Right right) const {
-    return (bits_ & static_cast<std::uint8_t>(right)) != 0;
-  }
-
-  bool operator==(const Rights&) const = default;
-
- private:
-  explicit constexpr Rights(std::uint8_t bits) : bits_(bits) {}
-
-  std::uint8_t bits_ = 0;
-};
+using Rights = std::set<Right>;
+inline const Rights all_rights{Right::observe, Right::submit, Right::control};
+/// The rights of a client whose line in the list names none.
+inline const Rights usual_rights{Right::observe, Right::submit};
+/// The rights that a comma list grants, such as `observe,submit`; nothing if it is not such a list.
+[[nodiscard]] std::optional<Rights> parse_rights(std::string_view text);
 
 /// The client that asks for something.
 struct Asker {
   std::string name;  ///< Of its key, as in the list; empty without keys.
-  Rights rights = Rights::all();
+  Rights rights = all_rights;
 };
 
 /// @throws Error reading `key = NAME (must have the right ...)` if the asker does not have it.
@@ -59,6 +49,88 @@ void require_control(const Asker& asker, std::string_view campaign, std::string_
 struct SubmissionLimits {
   std::size_t campaigns_max = 100;
   std::uint64_t size_max = std::uint64_t{1} << 30;  ///< Of their definitions, bytes.
+};
+
+inline constexpr std::size_t allowed_keys_max = 65536;
+
+/// The owner of a key.
+struct AllowedKey {
+  std::string name;
+  Rights rights;  ///< Of a client; a worker has none.
+
+  bool operator==(const AllowedKey&) const = default;
+};
+
+/// Owners by public key.
+using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
+
+/// The keys in the text of an allow-list. Each has a line `KEY NAME`, or `KEY NAME RIGHTS` for a
+/// client. Empty lines and lines that begin with `#` are ignored.
+///
+/// @param domain  Whose list it is.
+/// @param file    For messages.
+/// @throws Error reading `FILE line = NUMBER (rule)`. What the line says is not repeated, because
+///         somebody may have put a secret there.
+[[nodiscard]] AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
+                                           const std::filesystem::path& file);
+
+/// The keys that may connect to one address of the coordinator, from a file that may change at any
+/// time. A key whose line is removed is revoked when two looks, a second or more apart, agree that
+/// it is gone: an editor or a full disk may leave a part of the file for a moment.
+class AllowList {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// @throws Error if the file cannot be read, can be written by others than its owner, or holds
+  ///         anything but keys and names.
+  AllowList(std::filesystem::path file, wire::Domain domain);
+
+  /// Reads the file again if it changed. A file that is wrong, gone or without any content leaves
+  /// the list as it was.
+  /// @return What is wrong, once.
+  [[nodiscard]] std::optional<std::string> refresh(TimePoint now);
+
+  /// As refresh(), but at most once a second.
+  [[nodiscard]] std::optional<std::string> refresh_if_due(TimePoint now);
+
+  /// How the list was last read again.
+  struct Change {
+    std::size_t num_added = 0;
+    std::size_t num_removed = 0;
+  };
+
+  /// The change since the last call: if keys, or what they may do, changed, or if the file can be
+  /// read after it could not.
+  [[nodiscard]] std::optional<Change> take_change() { return std::exchange(change_, {}); }
+
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
+  /// The key's owner; null if the key is not on the list.
+  [[nodiscard]] const AllowedKey* owner_of(std::string_view public_key) const;
+
+ private:
+  /// What tells one state of the file from another.
+  struct Stamp {
+    std::int64_t changed_ns = 0;
+    std::int64_t size = 0;
+    std::uint64_t inode = 0;
+    int error = 0;  ///< errno if there is no file.
+
+    bool operator==(const Stamp&) const = default;
+  };
+  [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
+  [[nodiscard]] static bool is_settled(const Stamp& stamp);
+  void take(AllowedKeys keys, TimePoint now);
+
+  std::filesystem::path file_;
+  wire::Domain domain_;
+  std::optional<Stamp> stamp_;  ///< None if the file must be read again in any case.
+  std::string reported_;
+  std::optional<Change> change_;
+  std::optional<TimePoint> looked_at_;
+  AllowedKeys keys_;
+  /// Without the keys that the last look did not find any more, and the time of that look.
+  std::optional<std::pair<AllowedKeys, TimePoint>> shorter_;
 };
 
 }  // namespace proofmass::coordinator

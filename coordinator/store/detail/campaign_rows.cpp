@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/campaign_rows.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/store/detail/integrity.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"

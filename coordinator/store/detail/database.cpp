@@ -13,7 +13,7 @@
 
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/entry_rows.hpp"
-
 #include <fmt/format.h>
 
 #include <ctime>
@@ -7,8 +5,8 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/campaign_rows.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/detail/rows.hpp"
+#include "coordinator/store/records.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -22,7 +22,7 @@
 #include <system_error>
 
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -8,7 +8,6 @@
 #include <string>
 #include <string_view>
 
-#include "proto/link/descriptor.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator::detail {

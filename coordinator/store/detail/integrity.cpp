@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/integrity.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,9 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/store/detail/entry_rows.hpp"
-#include "coordinator/store/detail/result_rows.hpp"
-#include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 

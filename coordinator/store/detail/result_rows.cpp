@@ -1,5 +1,3 @@
-#include "coordinator/store/detail/result_rows.hpp"
-
 #include <fmt/format.h>
 
 #include <bit>
@@ -11,9 +9,11 @@
 #include <string>
 #include <system_error>
 
+#include "coordinator/store/detail/rows.hpp"
+#include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/records.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "coordinator/store/detail/file_place.hpp"
-#include "proto/link/start_program.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 

@@ -2,7 +2,7 @@
 -- of lower versions were made before the first release.
 --
 -- A word in braces stands for text that follows from the quantities of a result: see
--- detail/result_sql.hpp. One key has one name in all tables and views: run_index, parameter, term,
+-- detail/schema.hpp. One key has one name in all tables and views: run_index, parameter, term,
 -- quantity, worker_key (and worker, its name).
 
 CREATE TABLE campaign (

@@ -2,7 +2,7 @@
 #include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/sweep_plan.hpp"
-#include "coordinator/net/directory_look.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/model.hpp"

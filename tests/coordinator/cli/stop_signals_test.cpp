@@ -11,7 +11,7 @@
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/worker_processes.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/error.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"

@@ -4,9 +4,7 @@
 #include <deque>
 #include <ostream>
 
-#include "coordinator/dispatch/campaigns.hpp"
-#include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/runs.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"

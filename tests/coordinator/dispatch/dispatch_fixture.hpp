@@ -1,8 +1,6 @@
 #pragma once
 
-#include "coordinator/dispatch/campaigns.hpp"
-#include "coordinator/dispatch/results.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/events.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"

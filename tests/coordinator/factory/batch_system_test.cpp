@@ -1,7 +1,7 @@
 #include "coordinator/factory/batch_system.hpp"
 
 #include "core/error.hpp"
-#include "proto/link/start_program.hpp"
+#include "proto/link/machine.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {

@@ -1,5 +1,4 @@
-#include "coordinator/net/factory_reports.hpp"
-
+#include "coordinator/net/service_snapshot.hpp"
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/proto/wire/requests.hpp"

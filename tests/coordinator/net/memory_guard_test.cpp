@@ -1,11 +1,10 @@
-#include "coordinator/net/memory_guard.hpp"
-
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <condition_variable>
 #include <cstring>
 
+#include "coordinator/net/service_sockets.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {

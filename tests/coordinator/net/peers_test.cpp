@@ -1,9 +1,7 @@
-#include "coordinator/net/peers.hpp"
-
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/server_paths.hpp"
-#include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/link/machine.hpp"

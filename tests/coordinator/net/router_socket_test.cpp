@@ -7,9 +7,8 @@
 
 #include <zmq.hpp>
 
-#include "coordinator/net/authentication/refusal_log.hpp"
+#include "coordinator/net/authentication/authenticator.hpp"
 #include "coordinator/net/private_endpoint.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/endpoint.hpp"

@@ -3,7 +3,7 @@
 #include <sqlite3.h>
 
 #include "coordinator/store/campaign_record.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"
 #include "tests/coordinator/net/playing_client.hpp"

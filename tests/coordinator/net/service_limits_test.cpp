@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "coordinator/net/directory_look.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/link/keys.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"
@@ -73,7 +73,7 @@ class ServiceLimits : public test::ServiceTest {
 
   const std::string too_many =
       "error: campaigns = 2 (must be at most 1 unfinished ones of the key anna)";
-  const Asker anna{.name = "anna", .rights = Rights::usual()};
+  const Asker anna{.name = "anna", .rights = usual_rights};
   const wire::KeyPair coordinator_keys = wire::make_key_pair();
   const wire::KeyPair client_keys = wire::make_key_pair();
   std::filesystem::path keys;

@@ -70,7 +70,7 @@ TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
     EXPECT_FALSE(service->worker_of(1002));
     const auto worker = service->worker_of(1001);
     ASSERT_TRUE(worker);
-    EXPECT_THAT(service->runs_held_text(*worker), HasSubstr("0"));
+    EXPECT_THAT(runs_held_text(service->state(), *worker), HasSubstr("0"));
     service->worker_ended(*worker, LossReason::crashed);
   });
   const proto::RunLease lease = PlayingWorker(endpoint.address(), 1002).borrow();

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
-#include "coordinator/store/campaign_history.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/records.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/test.hpp"
 

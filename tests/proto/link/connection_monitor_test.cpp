@@ -1,5 +1,3 @@
-#include "proto/link/connection_monitor.hpp"
-
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>

@@ -6,10 +6,7 @@
 
 #include <csignal>
 
-#include "proto/link/init_system.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/start_program.hpp"
-#include "proto/link/surroundings.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
 
@@ -60,38 +57,40 @@ class NoticeReceiver {
   int file_;
 };
 
-TEST(InitSystem, MayHaveAnAbstractSocket) {
+TEST(ServiceNotices, MayGoToAnAbstractSocket) {
   const std::string name = "@proofmass-test-" + std::to_string(getpid());
   const NoticeReceiver receiver(name);
-  InitSystem(name, std::nullopt).notify("STOPPING=1");
+  ServiceNotices(name, std::nullopt).stopping();
   EXPECT_EQ(receiver.receive(), "STOPPING=1");
 }
 
-TEST(InitSystem, NeedNotBeThere) {
-  InitSystem("", std::nullopt).notify("READY=1");
-  InitSystem("/nowhere/at/all", std::nullopt).notify("READY=1");
-  InitSystem(std::string(200, 'x'), std::nullopt).notify("READY=1");
+TEST(ServiceNotices, NeedNoInitSystem) {
+  ServiceNotices("", std::nullopt).ready();
+  ServiceNotices("/nowhere/at/all", std::nullopt).ready();
+  ServiceNotices(std::string(200, 'x'), std::nullopt).ready();
   SUCCEED();
 }
 
-TEST(InitSystem, IsKnownFromTheEnvironment) {
+TEST(ServiceNotices, FindTheInitSystemInTheEnvironment) {
   const test::ScratchDirectory directory;
   const std::string path = (directory / "notify").string();
   const NoticeReceiver receiver(path);
+  const auto tick = [] { ServiceNotices().on_tick({}, [] { return "well"; }); };
   setenv("NOTIFY_SOCKET", path.c_str(), 1);
   setenv("WATCHDOG_USEC", "30000000", 1);
-  const InitSystem init_system = InitSystem::from_environment();
-  init_system.notify("STATUS=well");
+  tick();
+  EXPECT_EQ(receiver.receive(), "WATCHDOG=1");
   EXPECT_EQ(receiver.receive(), "STATUS=well");
-  EXPECT_EQ(init_system.watchdog_interval(), 15s) << "half of the time";
 
   for (const char* const value : {"0", "-5", "soon", "5 "}) {
     setenv("WATCHDOG_USEC", value, 1);
-    EXPECT_EQ(InitSystem::from_environment().watchdog_interval(), std::nullopt) << value;
+    tick();
+    EXPECT_EQ(receiver.receive(), "STATUS=well") << value;
   }
-  unsetenv("NOTIFY_SOCKET");
   unsetenv("WATCHDOG_USEC");
-  EXPECT_EQ(InitSystem::from_environment().watchdog_interval(), std::nullopt);
+  tick();
+  EXPECT_EQ(receiver.receive(), "STATUS=well");
+  unsetenv("NOTIFY_SOCKET");
 }
 
 // Of a watchdog that waits 4 s: every 2 s that the service lives, every 5 s what it does.
@@ -99,7 +98,7 @@ TEST(ServiceNotices, ComeInTime) {
   const test::ScratchDirectory directory;
   const std::string path = (directory / "notify").string();
   const NoticeReceiver receiver(path);
-  ServiceNotices notices(InitSystem(path, 4s));
+  ServiceNotices notices(path, 4s);
   const ServiceNotices::TimePoint start{};
   for (int second = 0; second <= 6; ++second) {
     notices.on_tick(start + std::chrono::seconds(second), [&] { return std::to_string(second); });

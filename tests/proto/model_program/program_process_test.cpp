@@ -1,5 +1,3 @@
-#include "proto/model_program/program_process.hpp"
-
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -8,6 +6,7 @@
 
 #include <thread>
 
+#include "proto/model_program/program_model.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
 

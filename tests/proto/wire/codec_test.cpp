@@ -231,7 +231,7 @@ TEST(ResultBatches, AreSmallerWhereResultsAreLarge) {
   ComputedRun run{.result = some_result({1}, RunStatus::completed), .compute_s = 0.1};
   run.result.fit.assign(16000, 1.0);
   ResultBatches batches;
-  for (int i = 0; i < 40; ++i) batches.add({1}, {1}, run);
+  for (int i = 0; i < 40; ++i) batches.add({.campaign = {1}, .attempt = {1}, .computed = run});
   const std::vector<proto::ResultBatch> taken = batches.take();
   ASSERT_EQ(taken.size(), 3U);
   EXPECT_EQ(taken[0].results_size(), 16);

@@ -16,6 +16,7 @@
 #include "tests/support/cuda_driver/test_device.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/prepared_campaign.hpp"
 #include "worker/execution/executor.hpp"
 
 namespace proofmass::worker {
@@ -74,12 +75,16 @@ class ScriptedSimulation final : public DeviceSimulation {
   std::size_t num_ended_ = 0;
 };
 
+std::function<std::unique_ptr<DeviceSimulation>(Device&)> simulate_on(Script& script) {
+  return [&script](Device&) { return std::make_unique<ScriptedSimulation>(script); };
+}
+
 /// An executor with one thread and one device.
 class DeviceBench {
  public:
   explicit DeviceBench(Script& script, double checked_fraction = 0.0)
       : executor(
-            [&script](const Campaign&) -> PreparedCampaign {
+            [&script](const Campaign&) -> test::PreparedCampaign {
               return {.simulate =
                           [](std::span<const RunRequest> requests,
                              const std::function<void(int)>& progress) {
@@ -87,10 +92,7 @@ class DeviceBench {
                             return results_of(requests);
                           },
                       .num_steps = 2,
-                      .simulate_on = script.can_simulate ? SimulateOn([&script](Device&) {
-                        return std::make_unique<ScriptedSimulation>(script);
-                      })
-                                                         : nullptr};
+                      .simulate_on = script.can_simulate ? simulate_on(script) : nullptr};
             },
             [this] { changed_.release(); },
             {.num_threads = 1,
@@ -110,7 +112,7 @@ class DeviceBench {
     std::multiset<std::uint64_t> runs;
     while (runs.size() < count) {
       changed_.acquire();
-      for (const FinishedRun& run : executor.take_finished()) {
+      for (const wire::LeasedResult& run : executor.take_finished()) {
         runs.insert(run.computed.result.run.value);
       }
     }

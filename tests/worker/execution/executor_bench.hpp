@@ -11,11 +11,13 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/prepared_campaign.hpp"
 #include "worker/execution/executor.hpp"
 
 namespace proofmass::worker {
 
 using Indices = std::vector<std::uint64_t>;
+using test::PreparedCampaign;
 
 inline constexpr wire::CampaignId first_campaign{1};
 inline constexpr wire::CampaignId second_campaign{2};
@@ -69,11 +71,11 @@ class Bench {
     executor.define(first_campaign, definition());
   }
 
-  std::vector<FinishedRun> wait_for(std::size_t count) {
-    std::vector<FinishedRun> all;
+  std::vector<wire::LeasedResult> wait_for(std::size_t count) {
+    std::vector<wire::LeasedResult> all;
     while (all.size() < count) {
       changed_.acquire();
-      for (FinishedRun& run : executor.take_finished()) all.push_back(std::move(run));
+      for (wire::LeasedResult& run : executor.take_finished()) all.push_back(std::move(run));
     }
     return all;
   }
@@ -87,9 +89,9 @@ class Bench {
   Executor executor;
 };
 
-inline Indices indices_of(const std::vector<FinishedRun>& runs) {
+inline Indices indices_of(const std::vector<wire::LeasedResult>& runs) {
   Indices indices;
-  for (const FinishedRun& run : runs) indices.push_back(run.computed.result.run.value);
+  for (const wire::LeasedResult& run : runs) indices.push_back(run.computed.result.run.value);
   return indices;
 }
 

@@ -10,9 +10,9 @@ TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
   Bench bench(prepare_counting(2));
   submit(bench.executor, lease(10, 3));
   submit(bench.executor, lease(40, 1));
-  const std::vector<FinishedRun> runs = bench.wait_for(4);
+  const std::vector<wire::LeasedResult> runs = bench.wait_for(4);
   EXPECT_EQ(indices_of(runs), (Indices{10, 11, 12, 40}));
-  for (const FinishedRun& run : runs) {
+  for (const wire::LeasedResult& run : runs) {
     EXPECT_EQ(run.campaign, first_campaign);
     EXPECT_EQ(run.computed.result.num_draws, run.computed.result.run.value);
     EXPECT_GE(run.computed.elapsed_s, 0.0);
@@ -25,7 +25,7 @@ TEST(Executor, HandsEachRunItsTableValues) {
   Bench bench(prepare_counting(1));
   const auto two = test::make_lease(first_campaign, {{0}, 2}, {3}, {1.5, -1.0, 2.5, -2.0});
   submit(bench.executor, two);
-  const std::vector<FinishedRun> runs = bench.wait_for(2);
+  const std::vector<wire::LeasedResult> runs = bench.wait_for(2);
   EXPECT_EQ(runs[0].computed.result.truth[0], 1.5);
   EXPECT_EQ(runs[1].computed.result.truth[0], 2.5);
 }
@@ -39,7 +39,7 @@ TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
   submit(bench.executor, lease(10, 3));
   submit(bench.executor, lease(20, 3));
   gate.open.release(3);
-  const std::vector<FinishedRun> runs = bench.wait_for(7);
+  const std::vector<wire::LeasedResult> runs = bench.wait_for(7);
   EXPECT_EQ(indices_of(runs), (Indices{0, 10, 11, 12, 20, 21, 22}));
   const Indices size_of_its_batch{1, 4, 4, 4, 4, 2, 2};
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -52,7 +52,7 @@ TEST(Executor, TakesNoMoreRunsThanTheirModelComputesTogether) {
   const std::uint64_t batch_size = model().batch_size();
   Bench bench(prepare_counting(1), {.num_threads = 1, .batch_size_max = 4 * batch_size});
   submit(bench.executor, lease(0, 2 * batch_size));
-  for (const FinishedRun& run : bench.wait_for(2 * batch_size)) {
+  for (const wire::LeasedResult& run : bench.wait_for(2 * batch_size)) {
     EXPECT_EQ(run.computed.result.num_rounds, batch_size);
   }
 }
@@ -61,8 +61,8 @@ TEST(Executor, GivesEachRunTheTimeOfItsBatchAndAShareOfIt) {
   Bench bench(prepare_counting(1), {.num_threads = 1, .batch_size_max = 4});
   EXPECT_FALSE(bench.executor.usual_batch_time().has_value());
   submit(bench.executor, lease(0, 4));
-  const std::vector<FinishedRun> runs = bench.wait_for(4);
-  for (const FinishedRun& run : runs) {
+  const std::vector<wire::LeasedResult> runs = bench.wait_for(4);
+  for (const wire::LeasedResult& run : runs) {
     EXPECT_EQ(run.computed.elapsed_s, runs[0].computed.elapsed_s);
     EXPECT_EQ(run.computed.compute_s, run.computed.elapsed_s / 4.0);
   }
@@ -150,7 +150,7 @@ TEST(Executor, ComputesARunThatIsToBeAloneInABatchOfItsOwn) {
   submit(bench.executor, suspect);
   submit(bench.executor, lease(2, 1));
   gate.open.release(3);
-  const std::vector<FinishedRun> runs = bench.wait_for(4);
+  const std::vector<wire::LeasedResult> runs = bench.wait_for(4);
   EXPECT_EQ(indices_of(runs), (Indices{0, 1, 2, 5}));
   const Indices size_of_its_batch{1, 2, 2, 1};
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -321,7 +321,7 @@ TEST(Executor, ComputesRunsOfSeveralCampaigns) {
   submit(bench.executor, lease(0, 2));
   submit(bench.executor, lease(0, 2, second_campaign));
   submit(bench.executor, lease(2, 2));
-  for (const FinishedRun& run : bench.wait_for(6)) {
+  for (const wire::LeasedResult& run : bench.wait_for(6)) {
     EXPECT_EQ(run.computed.result.num_draws, run.campaign == second_campaign ? 22U : 1U);
   }
   EXPECT_EQ(num_prepared, 2);
@@ -408,7 +408,8 @@ TEST(Executor, PreparesACampaignThatIsDefinedAgainWhileItIsPrepared) {
   bench.executor.define(first_campaign, definition_with(2));
   submit(bench.executor, lease(1, 2));
   go_on.release();
-  for (const FinishedRun& run : bench.wait_for(2)) EXPECT_EQ(run.computed.result.num_draws, 2U);
+  for (const wire::LeasedResult& run : bench.wait_for(2))
+    EXPECT_EQ(run.computed.result.num_draws, 2U);
 }
 
 TEST(Executor, SaysWhyItCannotGoOn) {

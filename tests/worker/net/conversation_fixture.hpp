@@ -57,7 +57,7 @@ class FakeExecution final : public Execution {
     forgotten.push_back(campaign);
   }
   void abandon() override { ++num_abandons; }
-  std::vector<FinishedRun> take_finished() override { return std::exchange(finished, {}); }
+  std::vector<wire::LeasedResult> take_finished() override { return std::exchange(finished, {}); }
   std::vector<CrashedBatch> take_crashed() override { return std::exchange(crashed, {}); }
   std::vector<RunningBatch> computing() const override { return batches; }
   std::optional<Duration> usual_batch_time() const override { return batch_time; }
@@ -95,7 +95,7 @@ class FakeExecution final : public Execution {
   std::vector<wire::CampaignId> forgotten;
   std::deque<WaitingRuns> waiting;
   std::vector<RunningBatch> batches;
-  std::vector<FinishedRun> finished;
+  std::vector<wire::LeasedResult> finished;
   std::vector<CrashedBatch> crashed;
   std::optional<Duration> batch_time;
   std::optional<std::string> failure_text;
@@ -109,7 +109,7 @@ class FakeExecution final : public Execution {
   }
   void finish(wire::CampaignId campaign, const std::vector<RunRange>& ranges) {
     for (const RunIndex run : indices_of(ranges)) {
-      FinishedRun done{.campaign = campaign, .computed = {}};
+      wire::LeasedResult done{.campaign = campaign, .attempt = {}, .computed = {}};
       done.computed.result = test::zero_result({.run = run});
       finished.push_back(done);
     }

@@ -14,10 +14,10 @@
 #include "tests/support/faults/planned_faults.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/prepared_campaign.hpp"
 #include "tests/test.hpp"
 #include "worker/execution/executor.hpp"
 #include "worker/net/held_runs.hpp"
-#include "worker/net/stop_signals.hpp"
 #include "worker/supervision/supervisor.hpp"
 
 namespace proofmass::worker {
@@ -82,7 +82,7 @@ class Coordinator {
   std::uint64_t num_sent_ = 0;
 };
 
-PreparedCampaign prepare(const Campaign&) {
+test::PreparedCampaign prepare(const Campaign&) {
   return {.simulate =
               [](std::span<const RunRequest> requests, const std::function<void(int)>& progress) {
                 progress(1);

@@ -9,6 +9,7 @@
 
 #include "coordinator/dispatch/state.hpp"
 #include "core/error.hpp"
+#include "proto/link/machine.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::worker {
@@ -236,8 +237,8 @@ TEST_F(SupervisorTest, TakesTheWorkerWithItWhenItIsKilled) {
 }
 
 TEST(RandomSession, IsNeverTheSame) {
-  EXPECT_NE(random_session().value, 0U);
-  EXPECT_NE(random_session(), random_session());
+  EXPECT_NE(wire::random_number(), 0U);
+  EXPECT_NE(wire::random_number(), wire::random_number());
 }
 
 }  // namespace

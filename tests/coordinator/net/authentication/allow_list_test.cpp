@@ -1,9 +1,7 @@
-#include "coordinator/net/authentication/allow_list.hpp"
-
 #include <fmt/format.h>
 #include <sys/stat.h>
 
-#include "coordinator/net/authentication/refusal_log.hpp"
+#include "coordinator/net/authentication/authenticator.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "core/error.hpp"
 #include "proto/link/keys.hpp"
@@ -61,8 +59,8 @@ TEST(AllowListText, NamesTheRightsOfClients) {
   const std::string two = new_key();
   const AllowedKeys keys = parse_allow_list(one + " anna\n" + two + " ben observe,control \n",
                                             wire::Domain::clients, "keys");
-  EXPECT_EQ(keys.at(one).rights, Rights::usual());
-  EXPECT_EQ(keys.at(two).rights, Rights::parse("control,observe"));
+  EXPECT_EQ(keys.at(one).rights, usual_rights);
+  EXPECT_EQ(keys.at(two).rights, parse_rights("control,observe"));
   for (const std::string rights : {"all", "observe,", ",submit", "observe submit", "Submit"}) {
     EXPECT_NE(parsing_clients(one + " anna " + rights + "\n"), "") << rights;
   }
@@ -281,15 +279,15 @@ TEST_F(RefusalLogTest, CountsAFlood) {
 }
 
 Asker asker(const std::string& name, const std::string& rights) {
-  return {.name = name, .rights = Rights::parse(rights).value()};
+  return {.name = name, .rights = parse_rights(rights).value()};
 }
 
 TEST(RightsOfAKey, AreAListOfWords) {
-  EXPECT_EQ(Rights::parse("observe,submit,control"), Rights::all());
-  EXPECT_EQ(Rights::parse("submit,observe"), Rights::usual());
-  EXPECT_FALSE(Rights::parse("observe")->has(Right::submit));
+  EXPECT_EQ(parse_rights("observe,submit,control"), all_rights);
+  EXPECT_EQ(parse_rights("submit,observe"), usual_rights);
+  EXPECT_FALSE(parse_rights("observe")->contains(Right::submit));
   for (const std::string text : {"", "observe,", ",", "Observe", "observe, submit", "root"}) {
-    EXPECT_EQ(Rights::parse(text), std::nullopt) << text;
+    EXPECT_EQ(parse_rights(text), std::nullopt) << text;
   }
 }
 

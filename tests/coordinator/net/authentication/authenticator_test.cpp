@@ -3,7 +3,6 @@
 #include <zmq.hpp>
 
 #include "core/error.hpp"
-#include "proto/link/connection_monitor.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/link/whole_file.hpp"

@@ -3,8 +3,8 @@
 #include <cerrno>
 
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/open_file.hpp"
 #include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/store_writer.hpp"
 #include "core/microscope/results/health.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"

@@ -1,10 +1,9 @@
-#include "coordinator/store/detail/result_rows.hpp"
-
 #include <gmock/gmock.h>
 
 #include <limits>
 #include <set>
 
+#include "coordinator/store/detail/rows.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
@@ -13,6 +16,59 @@ class Hello;
 }  // namespace proofmass::proto
 
 namespace proofmass::coordinator {
+
+// Events of campaigns.
+
+/// Begins to lend the runs of a campaign.
+/// @pre No campaign has this id; definition->validate() passed.
+void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, TimePoint now,
+                 Outbox& outbox);
+/// The campaign has more runs than before.
+void on_extended(State& state, CampaignId id, std::shared_ptr<const Campaign> definition,
+                 TimePoint now, Outbox& outbox);
+/// Changes how early the runs of the campaign are lent, and which fraction of the results that come
+/// from now on is computed a second time.
+void on_control(State& state, CampaignId id, int priority, double audit_fraction);
+/// The runs that were given up are open again, as suspects.
+void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox);
+/// Lends no more runs of the campaign until on_resume(). Runs that have not begun are asked back.
+void on_pause(State& state, CampaignId id, Outbox& outbox);
+void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox);
+/// Drops the open runs of the campaign, also at the workers. Stored results stay, and on_resume()
+/// goes on with the campaign.
+void on_cancel(State& state, CampaignId id, Outbox& outbox);
+/// The campaign is not served any more. Workers forget it if it is finished or cancelled; otherwise
+/// they keep its results. @pre None of its results is on its way to the store.
+void on_removed(State& state, CampaignId id, Outbox& outbox);
+/// A campaign that is not served is known to be finished or cancelled: workers that name it are
+/// told to forget it, until on_campaign() or on_unlisted().
+/// @param num_runs  Number of its runs. Workers keep results of later runs, which may belong to an
+///                  extension that is not known here.
+void on_ended(State& state, CampaignId id, std::uint64_t num_runs = num_runs_max);
+
+/// Takes on_ended() back, because the file of the campaign is gone or has changed: workers with
+/// results of it keep them. @pre It is not served.
+void on_unlisted(State& state, CampaignId id);
+
+// Events of results: a worker delivers them, and the store has written or compared them.
+
+/// Hands results of open runs to the store, and those of others to be compared; acknowledges at
+/// once those that are durable already.
+/// @param attempt  Under which the runs were lent, as the worker says.
+void on_results(State& state, WorkerId id, CampaignId campaign, Attempt attempt,
+                std::vector<wire::ComputedRun> results, TimePoint now, Outbox& outbox);
+
+/// Results that went to the store are durable: acknowledges them.
+/// @pre Each run had a Delivery and is named here for the first time.
+void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, TimePoint now,
+                  Outbox& outbox);
+/// A result was compared with the stored one.
+void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, bool is_equal,
+                 TimePoint now, Outbox& outbox);
+/// Nothing can be stored for now: lends no more of the campaign. Results stay with the store, which
+/// tries again.
+void on_store_failed(State& state, CampaignId id, const std::string& reason, Outbox& outbox);
+void on_store_recovered(State& state, CampaignId id, TimePoint now, Outbox& outbox);
 
 // Events of workers, of time and of the end of the service.
 //
@@ -70,11 +126,4 @@ void on_stop(State& state, Outbox& outbox);
 /// The last event, when all has been stored: workers that have not left are noted as leaving.
 void on_end(State& state, Outbox& outbox);
 
-namespace detail {
-
-/// The worker that sent a message, with the time noted at which it was heard. If it is not
-/// registered, it is told so, and the result is null.
-Worker* heard(State& state, WorkerId id, TimePoint now, Outbox& outbox);
-
-}  // namespace detail
 }  // namespace proofmass::coordinator
