@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/names.hpp"
@@ -47,8 +47,6 @@ std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path
   std::ranges::sort(files);
   return files;
 }
-
-using Json = nlohmann::ordered_json;
 
 Json json_of(const CampaignRecord& campaign) {
   const std::string file = campaign.file.string();
@@ -106,11 +104,8 @@ Table listing_table(std::span<const CampaignRecord> campaigns) {
   return table;
 }
 
-std::string listing_json(std::span<const CampaignRecord> campaigns) {
-  constexpr int indent = 2;
-  Json json{{"campaigns", Json::array()}};
-  for (const CampaignRecord& campaign : campaigns) json["campaigns"].push_back(json_of(campaign));
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+Json listing_json(std::span<const CampaignRecord> campaigns) {
+  return {{"campaigns", array_of(campaigns, json_of)}};
 }
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +24,6 @@ namespace proofmass::coordinator {
 [[nodiscard]] Table listing_table(std::span<const CampaignRecord> campaigns);
 
 /// The campaigns as JSON, complete.
-[[nodiscard]] std::string listing_json(std::span<const CampaignRecord> campaigns);
+[[nodiscard]] nlohmann::ordered_json listing_json(std::span<const CampaignRecord> campaigns);
 
 }  // namespace proofmass::coordinator

@@ -13,7 +13,6 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/campaign_file/data_file.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/math/instruction_set.hpp"

@@ -6,7 +6,6 @@
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/report/review.hpp"
-#include "coordinator/report/run_spectra.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/recording.hpp"
 #include "core/runs.hpp"

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "coordinator/cli/progress_display.hpp"
-#include "coordinator/report/status_json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/figures.hpp"
 #include "proto/text/visible_text.hpp"

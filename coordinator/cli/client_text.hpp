@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/report/status_json.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/wire/client_codec.hpp"
 

@@ -13,7 +13,7 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/report/status_json.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/standard_error.hpp"

@@ -1,7 +1,7 @@
 #include <string>
 
 #include "coordinator/page/page_layout.hpp"
-#include "coordinator/report/review_documents.hpp"
+#include "coordinator/report/report.hpp"
 
 namespace proofmass::coordinator {
 

@@ -6,9 +6,9 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/review_tables.hpp"
-#include "coordinator/report/status_json.hpp"
-#include "coordinator/report/verification_matrix.hpp"
+#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/requirements.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator {
@@ -112,60 +112,57 @@ Json budget_of(const Review& review) {
 }
 
 Json warnings_of(const ResultSchema& schema, const CampaignWarnings& warnings) {
-  Json json = Json::array();
-  for (const WarnedQuantity& of : warnings.quantities) {
-    json.push_back({{"effect", of.effect},
-                    {"parameter", schema.quantities[of.quantity].name},
-                    {"num_runs", of.num_runs},
-                    {"largest_part", of.largest_part},
-                    {"largest_run", of.run.value}});
-  }
-  return json;
+  return array_of(warnings.quantities, [&](const WarnedQuantity& of) -> Json {
+    return {{"effect", of.effect},
+            {"parameter", schema.quantities[of.quantity].name},
+            {"num_runs", of.num_runs},
+            {"largest_part", of.largest_part},
+            {"largest_run", of.run.value}};
+  });
 }
 
 /// Null without standard errors.
 Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return nullptr;
-  Json json{{"parameters", Json::array()}, {"fit", Json::array()}};
-  for (const StandardErrorStatistic& of : statistics.quantities) {
-    json["parameters"].push_back({{"parameter", schema.quantities[of.quantity].name},
-                                  {"num_runs", of.num_runs},
-                                  {"mean", of.mean},
-                                  {"squared_ratio", of.squared_ratio},
-                                  {"squared_ratio_standard_error", of.squared_ratio_error},
-                                  {"num_within_95", of.num_within},
-                                  {"fraction_within_95_interval", of.within}});
-  }
-  for (const FitStatistic& of : statistics.fit) {
-    json["fit"].push_back({{"session", of.session},
-                           {"mean_chi_squared", of.chi_squared},
-                           {"mean_degrees_of_freedom", of.degrees_of_freedom},
-                           {"ratio_standard_error", of.ratio_error},
-                           {"p_value", of.p_value}});
-  }
-  return json;
+  const auto of_quantity = [&](const StandardErrorStatistic& of) -> Json {
+    return {{"parameter", schema.quantities[of.quantity].name},
+            {"num_runs", of.num_runs},
+            {"mean", of.mean},
+            {"squared_ratio", of.squared_ratio},
+            {"squared_ratio_standard_error", of.squared_ratio_error},
+            {"num_within_95", of.num_within},
+            {"fraction_within_95_interval", of.within}};
+  };
+  const auto of_session = [](const FitStatistic& of) -> Json {
+    return {{"session", of.session},
+            {"mean_chi_squared", of.chi_squared},
+            {"mean_degrees_of_freedom", of.degrees_of_freedom},
+            {"ratio_standard_error", of.ratio_error},
+            {"p_value", of.p_value}};
+  };
+  return {{"parameters", array_of(statistics.quantities, of_quantity)},
+          {"fit", array_of(statistics.fit, of_session)}};
 }
 
 Json json_of(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Requirement& requirement = answer.requirement;
-  Json json{{"requirement", answer.stated.requirement},
-            {"answer", name_of(check.verdict)},
-            {"rule", check.is_of_fixed_size ? "fixed size" : "sequential"},
-            {"parameter", answer.is_joint() ? Json(nullptr) : Json(answer.subject.name)},
-            {"limit", answer.is_joint() ? Json(nullptr) : Json(requirement.limit)},
-            {"coverage", requirement.tolerance.coverage},
-            {"confidence", requirement.tolerance.confidence},
-            {"num_runs", check.num_runs},
-            {"num_exceedances", check.num_exceedances},
-            {"num_without_estimate", check.num_without_estimate},
-            {"num_exceedances_allowed",
-             check.bound_order > 0 ? Json(check.bound_order - 1) : Json(nullptr)},
-            {"exceedance_bounds", check.exceedance},
-            {"tolerance_bound", answer.is_joint() ? Json(nullptr) : Json(answer.bound)},
-            {"num_runs_at_best", check.num_runs_at_best},
-            {"num_runs_at_this_rate", check.num_runs_at_this_rate}};
-  return json;
+  return {{"requirement", answer.stated.requirement},
+          {"answer", name_of(check.verdict)},
+          {"rule", check.is_of_fixed_size ? "fixed size" : "sequential"},
+          {"parameter", answer.is_joint() ? Json(nullptr) : Json(answer.subject.name)},
+          {"limit", answer.is_joint() ? Json(nullptr) : Json(requirement.limit)},
+          {"coverage", requirement.tolerance.coverage},
+          {"confidence", requirement.tolerance.confidence},
+          {"num_runs", check.num_runs},
+          {"num_exceedances", check.num_exceedances},
+          {"num_without_estimate", check.num_without_estimate},
+          {"num_exceedances_allowed",
+           check.bound_order > 0 ? Json(check.bound_order - 1) : Json(nullptr)},
+          {"exceedance_bounds", check.exceedance},
+          {"tolerance_bound", answer.is_joint() ? Json(nullptr) : Json(answer.bound)},
+          {"num_runs_at_best", check.num_runs_at_best},
+          {"num_runs_at_this_rate", check.num_runs_at_this_rate}};
 }
 
 Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
@@ -184,29 +181,27 @@ Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
 /// Null without a stop rule.
 Json stop_of(const std::optional<StopOutcome>& outcome) {
   if (!outcome) return nullptr;
-  const std::optional<StopCheckRow>& row = outcome->check;
-  Json json{{"rule", outcome->rule},
-            {"answer", row ? Json(outcome->answer) : Json(nullptr)},
-            {"is_missed", outcome->is_missed},
-            {"num_runs", nullptr},
-            {"estimate", nullptr},
-            {"interval", nullptr},
-            {"relative_half_width", nullptr}};
-  if (!row) return json;
-  json["num_runs"] = row->num_runs;
-  json["estimate"] = row->check.estimate;
-  json["interval"] = row->check.interval;
-  json["relative_half_width"] = row->check.relative_half_width;
-  return json;
+  const bool is_checked = outcome->check.has_value();
+  const StopCheckRow row = outcome->check.value_or(StopCheckRow{});
+  return {{"rule", outcome->rule},
+          {"answer", is_checked ? Json(outcome->answer) : Json(nullptr)},
+          {"is_missed", outcome->is_missed},
+          {"num_runs", is_checked ? Json(row.num_runs) : Json(nullptr)},
+          {"estimate", is_checked ? Json(row.check.estimate) : Json(nullptr)},
+          {"interval", row.check.interval},
+          {"relative_half_width", row.check.relative_half_width}};
 }
 
 }  // namespace
 
-std::string report_json(const Review& review, std::span<const StatedRequirement> stated) {
+Json report_json(const Review& review, std::span<const StatedRequirement> stated) {
   const ResultSchema& schema = review.schema;
   const ReadResults& results = review.results;
   const CampaignStatistics& statistics = results.statistics;
   const MissingEstimates& missing = results.missing;
+  const auto of_stated = [&](const StatedRequirement& each) {
+    return json_of(answer_to(each, review));
+  };
   Json json{{"campaign", review.name},
             {"seed", std::to_string(review.seed)},
             {"digest", results.digests.results},
@@ -231,19 +226,16 @@ std::string report_json(const Review& review, std::span<const StatedRequirement>
             {"standard_errors", standard_errors_of(schema, results.standard_errors)},
             {"budget", budget_of(review)},
             {"stop", stop_of(review.stop_outcome)},
-            {"requirements", Json::array()},
+            {"requirements", array_of(stated, of_stated)},
             {"matrix", Json::array()}};
   if (results.instruments) json["instruments"] = json_of(schema, *results.instruments);
   if (results.replicates) json["replicates"] = json_of(schema, *results.replicates);
   json["why_not_independent"] = review.why_not_independent;
-  for (const StatedRequirement& each : stated) {
-    json["requirements"].push_back(json_of(answer_to(each, review)));
-  }
-  for (const RequirementAnswer& row : review.matrix) {
-    if (!review.why_not_independent.empty()) break;
-    json["matrix"].push_back(json_of(row, review.interpretation));
-  }
-  return dumped(json, JsonLayout::indented);
+  if (!review.why_not_independent.empty()) return json;
+  json["matrix"] = array_of(review.matrix, [&](const RequirementAnswer& row) {
+    return json_of(row, review.interpretation);
+  });
+  return json;
 }
 
 }  // namespace proofmass::coordinator

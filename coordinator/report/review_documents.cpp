@@ -1,5 +1,3 @@
-#include "coordinator/report/review_documents.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,9 +5,9 @@
 #include <string_view>
 
 #include "coordinator/charts/svg.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review_charts.hpp"
-#include "coordinator/report/review_tables.hpp"
 #include "coordinator/table/document_table.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -5,8 +5,8 @@
 #include <span>
 
 #include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_tables.hpp"
 #include "coordinator/table/figures.hpp"
 
 namespace proofmass::coordinator {

@@ -8,8 +8,8 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/json.hpp"
-#include "coordinator/report/review_tables.hpp"
-#include "coordinator/report/status_json.hpp"
+#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
@@ -205,13 +205,15 @@ std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows,
   return std::span(rows).first(std::min(count, rows.size()));
 }
 
-std::size_t position_of(const DrawnRuns& drawn, RunIndex run) {
-  const auto found = std::ranges::lower_bound(drawn.runs, run);
-  if (found == drawn.runs.end() || *found != run) {
+/// Nothing if no run is asked for.
+std::optional<std::size_t> position_of(const DrawnRuns& drawn, std::optional<RunIndex> run) {
+  if (!run) return std::nullopt;
+  const auto found = std::ranges::lower_bound(drawn.runs, *run);
+  if (found == drawn.runs.end() || *found != *run) {
     const std::string last =
         drawn.last_with_estimate ? fmt::to_string(drawn.last_with_estimate->value) : "none";
     throw InvalidArgument(fmt::format("run = {} (must have an estimate, as {} runs up to {} have)",
-                                      run.value, drawn.num_with_estimate, last));
+                                      run->value, drawn.num_with_estimate, last));
   }
   return static_cast<std::size_t>(found - drawn.runs.begin());
 }
@@ -225,33 +227,28 @@ std::size_t rank_of(const std::vector<double>& errors, std::size_t position) {
 
 Json json_of(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
              std::optional<std::size_t> position) {
-  Json json = Json::array();
-  for (const Sensitivity& row : rows) {
+  return array_of(rows, [&](const Sensitivity& row) -> Json {
     const FirstOrderIndex& index = row.first_order;
-    Json entry{{"quantity", drawn.names[row.input]}, {"fraction_of_variance", index.index},
-               {"interval", index.interval},         {"rank_correlation", row.rank_correlation},
-               {"p_value", row.adjusted_p_value},    {"run_value", nullptr},
-               {"run_percentile", nullptr}};
-    if (position) {
-      const std::vector<double>& values = drawn.columns[row.input];
-      entry["run_value"] = values[*position];
-      entry["run_percentile"] = percentile_of(values, values[*position]);
-    }
-    json.push_back(std::move(entry));
-  }
-  return json;
+    const std::vector<double>& values = drawn.columns[row.input];
+    return {{"quantity", drawn.names[row.input]},
+            {"fraction_of_variance", index.index},
+            {"interval", index.interval},
+            {"rank_correlation", row.rank_correlation},
+            {"p_value", row.adjusted_p_value},
+            {"run_value", position ? Json(values[*position]) : Json(nullptr)},
+            {"run_percentile",
+             position ? Json(percentile_of(values, values[*position])) : Json(nullptr)}};
+  });
 }
 
 Json json_of_terms(const DrawnRuns& drawn, std::size_t quantity) {
-  Json json = Json::array();
-  for (const ExplanatoryTerm& term : terms_of(drawn, quantity)) {
-    json.push_back({{"quantity", drawn.names[term.first]},
-                    {"times", term.second ? Json(drawn.names[*term.second]) : Json(nullptr)},
-                    {"slope", term.slope},
-                    {"fraction_of_variance", term.share},
-                    {"p_value", term.p_value}});
-  }
-  return json;
+  return array_of(terms_of(drawn, quantity), [&](const ExplanatoryTerm& term) -> Json {
+    return {{"quantity", drawn.names[term.first]},
+            {"times", term.second ? Json(drawn.names[*term.second]) : Json(nullptr)},
+            {"slope", term.slope},
+            {"fraction_of_variance", term.share},
+            {"p_value", term.p_value}};
+  });
 }
 
 }  // namespace
@@ -308,47 +305,37 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
 }
 
 std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
-                             std::optional<std::size_t> num_rows, Paint paint) {
+                             std::optional<RunIndex> run, std::optional<std::size_t> num_rows,
+                             Paint paint) {
   const TerminalStyle style = document_style(paint);
-  const auto both = sensitivities_of(drawn, quantity);
-  const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
-  Table drivers = driver_table(drawn, of_error, "error", std::nullopt);
-  if (!of_error.empty() || !of_magnitude.empty()) {
-    drivers.notes.push_back("% of variance: with its 95 % interval; rank: rank correlation; " +
-                            note_of_p(both[1].size(), drawn.errors.size()));
-  }
-  return fmt::format(
-      "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", drawn.quantities[quantity].symbol, drawn.runs.size(),
-      limit_line(drawn), left_out(drawn),
-      terminal_text(driver_table(drawn, of_magnitude, "|error|", std::nullopt), style),
-      terminal_text(drivers, style), terminal_text(term_table(drawn, quantity, {}), style),
-      worst_run_text(drawn, quantity, !of_error.empty() || !of_magnitude.empty()));
-}
-
-std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
-                             std::optional<std::size_t> num_rows, Paint paint) {
-  const TerminalStyle style = document_style(paint);
-  const std::size_t position = position_of(drawn, run);
   const Quantity& info = drawn.quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];
+  const std::optional<std::size_t> position = position_of(drawn, run);
   const auto both = sensitivities_of(drawn, quantity);
   const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
+  const bool has_rows = !of_error.empty() || !of_magnitude.empty();
   Table drivers = driver_table(drawn, of_error, "error", position);
-  if (!of_error.empty() || !of_magnitude.empty()) {
-    drivers.notes.push_back("% below: of the runs; " +
-                            note_of_p(both[1].size(), drawn.errors.size()));
+  if (has_rows) {
+    drivers.notes.push_back(
+        (position ? "% below: of the runs; "
+                  : "% of variance: with its 95 % interval; rank: rank correlation; ") +
+        note_of_p(both[1].size(), drawn.errors.size()));
   }
-  return fmt::format("Run {}: error of {} {}, rank {} of {}\n{}{}\n{}\n{}\n{}", run.value,
-                     info.symbol, quantity_text(errors[position], info), rank_of(errors, position),
-                     errors.size(), limit_line(drawn), left_out(drawn),
+  const std::string heading = position
+                                  ? fmt::format("Run {}: error of {} {}, rank {} of {}", run->value,
+                                                info.symbol, quantity_text(errors[*position], info),
+                                                rank_of(errors, *position), errors.size())
+                                  : fmt::format("{}: {} runs", info.symbol, errors.size());
+  return fmt::format("{}\n{}{}\n{}\n{}\n{}{}", heading, limit_line(drawn), left_out(drawn),
                      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
                      terminal_text(drivers, style),
-                     terminal_text(term_table(drawn, quantity, position), style));
+                     terminal_text(term_table(drawn, quantity, position), style),
+                     position ? "" : "\n" + worst_run_text(drawn, quantity, has_rows));
 }
 
 std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,
                               std::span<const double> objectives) {
-  const std::size_t position = position_of(drawn, run);
+  const std::size_t position = *position_of(drawn, run);
   // Where no parameter has an objective, the rank among the runs decides.
   const auto badness = [&](std::size_t quantity) {
     const std::vector<double>& errors = drawn.errors[quantity];
@@ -369,36 +356,33 @@ std::string choice_text(const DrawnRuns& drawn, RunIndex run, std::span<const do
     return fmt::format("Of {}, no parameter having an objective: that of the highest rank\n", name);
   }
   const double ratio =
-      std::abs(drawn.errors[quantity][position_of(drawn, run)]) / objectives[quantity];
+      std::abs(drawn.errors[quantity][*position_of(drawn, run)]) / objectives[quantity];
   return fmt::format(
       "Of {}, as its error is the largest beside its objective: {:.3g} times that\n"
       "(another parameter: --parameter NAME)\n",
       name, ratio);
 }
 
-std::string sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quantities,
-                             std::optional<RunIndex> run, std::optional<std::size_t> num_rows) {
-  std::optional<std::size_t> position;
-  if (run) position = position_of(drawn, *run);
-  Json json{{"run", run ? Json(run->value) : Json(nullptr)},
-            {"num_runs", drawn.runs.size()},
-            {"num_with_estimate", drawn.num_with_estimate},
-            {"confidence", default_confidence},
-            {"parameters", Json::array()}};
-  for (const std::size_t quantity : quantities) {
+Json sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quantities,
+                      std::optional<RunIndex> run, std::optional<std::size_t> num_rows) {
+  const std::optional<std::size_t> position = position_of(drawn, run);
+  const auto of_quantity = [&](std::size_t quantity) -> Json {
     const std::vector<double>& errors = drawn.errors[quantity];
     const auto both = sensitivities_of(drawn, quantity);
-    json["parameters"].push_back(
-        {{"parameter", drawn.quantities[quantity].name},
-         {"unit", drawn.quantities[quantity].unit},
-         {"worst_run", worst_run_of(drawn, quantity).value},
-         {"run_error", position ? Json(errors[*position]) : Json(nullptr)},
-         {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},
-         {"drives_magnitude", json_of(drawn, first_of(both[1], num_rows), position)},
-         {"drives_error", json_of(drawn, first_of(both[0], num_rows), position)},
-         {"terms", json_of_terms(drawn, quantity)}});
-  }
-  return dumped(json, JsonLayout::indented);
+    return {{"parameter", drawn.quantities[quantity].name},
+            {"unit", drawn.quantities[quantity].unit},
+            {"worst_run", worst_run_of(drawn, quantity).value},
+            {"run_error", position ? Json(errors[*position]) : Json(nullptr)},
+            {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},
+            {"drives_magnitude", json_of(drawn, first_of(both[1], num_rows), position)},
+            {"drives_error", json_of(drawn, first_of(both[0], num_rows), position)},
+            {"terms", json_of_terms(drawn, quantity)}};
+  };
+  return {{"run", run ? Json(run->value) : Json(nullptr)},
+          {"num_runs", drawn.runs.size()},
+          {"num_with_estimate", drawn.num_with_estimate},
+          {"confidence", default_confidence},
+          {"parameters", array_of(quantities, of_quantity)}};
 }
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <set>
 #include <span>
 #include <string>
@@ -45,5 +46,11 @@ struct CampaignCounter {
 /// About the coordinator itself: files that are not served, refused workers, hosts in quarantine,
 /// factories.
 [[nodiscard]] std::vector<Remark> service_notes(const proto::StatusReply& status);
+
+// How a coordinator stands, for programs: JSON objects with stable keys, units in their names.
+// coordinator/cli/README.md lists them.
+
+[[nodiscard]] nlohmann::ordered_json status_json(const proto::StatusReply& status);
+[[nodiscard]] nlohmann::ordered_json workers_json(const proto::WorkersReply& workers);
 
 }  // namespace proofmass::coordinator

@@ -17,7 +17,7 @@ int list_databases(const ListOptions& options) {
   const std::vector<std::filesystem::path> here{"."};
   const auto campaigns = list_campaigns(options.places.empty() ? here : options.places);
   if (options.format == OutputFormat::json) {
-    print_lines(listing_json(campaigns));
+    print_json(listing_json(campaigns));
   } else {
     write_standard_output(terminal_text(listing_table(campaigns), style_of(stdout)));
   }

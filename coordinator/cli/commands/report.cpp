@@ -19,7 +19,6 @@
 #include "coordinator/cli/shared_options.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -152,7 +151,7 @@ int print_report(const ReportOptions& options) {
   }
   const Paint paint = style_of(stdout).paint;
   if (is_json) {
-    print_lines(report_json(review, stated));
+    print_json(report_json(review, stated));
   } else {
     write_standard_output(stated.empty() ? report_text(review, paint)
                                          : answers_text(review, stated, paint));

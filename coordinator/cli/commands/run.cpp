@@ -314,7 +314,7 @@ void print_outcome(const Store& store, const Campaign& campaign, RunOutput outpu
     write_standard_output(report_text(review, style_of(stdout).paint));
   }
   if (output == RunOutput::json) {
-    print_lines(report_json(read_review(store, campaign, ReviewDepth::matrix)));
+    print_json(report_json(read_review(store, campaign, ReviewDepth::matrix)));
   }
 }
 

@@ -10,7 +10,7 @@ int show_status(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const proto::StatusReply status = whole_status(ask);
     if (options.format == OutputFormat::json) {
-      print_lines(status_json(status, JsonLayout::indented));
+      print_json(status_json(status));
     } else {
       write_standard_output(status_text(status, style_of(stdout)));
     }
@@ -22,7 +22,7 @@ int show_workers(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const proto::WorkersReply workers = all_workers(ask);
     if (options.format == OutputFormat::json) {
-      print_lines(workers_json(workers));
+      print_json(workers_json(workers));
     } else {
       write_standard_output(terminal_text(workers_table(workers), style_of(stdout)));
     }

@@ -193,17 +193,16 @@ int run_all(const Sweep& sweep, bool is_quiet) {
   return gravest;
 }
 
-std::string sweep_text(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
+void print_comparison(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
   std::vector<std::filesystem::path> files;
   std::vector<SweptValues> values;
   for (const SweptCampaign& swept : sweep) {
     files.push_back(*swept.run.database);
     values.push_back(swept.values);
   }
-  const std::vector<ComparedMember> members = compare_several(files, is_stopped);
-  return format == OutputFormat::json
-             ? wire::visible_lines(comparison_json(members, values))
-             : comparison_text(members, sweep_names(values), style_of(stdout).paint);
+  const std::vector<ComparedCampaign> members = compare_several(files, is_stopped);
+  if (format == OutputFormat::json) return print_json(comparison_json(members, values));
+  write_standard_output(comparison_text(members, sweep_names(values), style_of(stdout).paint));
 }
 
 int sweep_campaigns(const SweepOptions& options) {
@@ -217,7 +216,7 @@ int sweep_campaigns(const SweepOptions& options) {
     return exit_code;
   }
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    write_standard_output(sweep_text(sweep, options.format, is_stopped));
+    print_comparison(sweep, options.format, is_stopped);
     return exit_code;
   });
 }

@@ -4,7 +4,7 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/report_tables.hpp"
-#include "coordinator/report/verification_matrix.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/text/visible_text.hpp"

@@ -2,7 +2,6 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/error_figures.hpp"
-#include "coordinator/report/live_results.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
@@ -372,38 +371,6 @@ TEST(MagnitudeBins, ShowTenPercent) {
   for (int i = 0; i < 90; ++i) bins.add(1.5);
   for (int i = 0; i < 10; ++i) bins.add(0.75);
   EXPECT_THAT(bins.histogram().counts, ElementsAre(10, 0, 0, 90));
-}
-
-/// Results of a database, one after the other.
-class LiveResultsTest : public test::ReviewTest {
- protected:
-  static LiveResults results_in(const Store& store) {
-    LiveResults results(test::campaign_of(1), test::schema());
-    store.for_each_result([&](const RunResult& result) { results.add(result); });
-    return results;
-  }
-};
-
-// A review reads the same results in passes, and its statistics are of another method.
-TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
-  const Store store = store_with(150);
-  const std::string html = results_in(store).html();
-  EXPECT_EQ(test::malformed_part(html), "");
-  EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
-                          Not(HasSubstr("<html"))));
-  const Review review = review_of(store, 150);
-  for (const Row& row : accuracy_table(review).rows) {
-    for (const Cell& cell : row) {
-      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
-    }
-  }
-  EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
-}
-
-TEST(LiveResults, AreEmptyAtFirst) {
-  const LiveResults results(test::campaign_of(1), test::schema());
-  EXPECT_EQ(test::malformed_part(results.html()), "");
-  EXPECT_THAT(results.html(), HasSubstr("no data"));
 }
 
 }  // namespace
