@@ -1,5 +1,3 @@
-#include "coordinator/archive/replayed_spectra.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "core/math/elementary.hpp"
 #include "core/signal/band_pass.hpp"

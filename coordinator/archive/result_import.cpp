@@ -1,5 +1,3 @@
-#include "coordinator/archive/result_import.hpp"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -15,7 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/campaign_file/data_file.hpp"
+#include "coordinator/archive/export.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"

@@ -1,5 +1,3 @@
-#include "coordinator/page/attempts_chart.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <utility>
 
 #include "coordinator/charts/svg.hpp"
+#include "coordinator/page/page_views.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -31,8 +31,8 @@ inline constexpr std::size_t page_given_up_max = 100;
 inline constexpr std::uint64_t page_results_a_reading = 16'384;
 
 /// Results that were read of a campaign database, a part at a time. Results never change: what was
-/// read once stays, and only what has come since is read further. A copy costs little: memory is 17 kB a
-/// quantity.
+/// read once stays, and only what has come since is read further. A copy costs little: memory is 17
+/// kB a quantity.
 class ResultsReading {
  public:
   /// Nothing is read yet.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "coordinator/page/attempts_chart.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/document_table.hpp"

@@ -1,6 +1,6 @@
 #include <string>
 
-#include "coordinator/page/page_layout.hpp"
+#include "coordinator/page/page_views.hpp"
 #include "coordinator/report/report.hpp"
 
 namespace proofmass::coordinator {

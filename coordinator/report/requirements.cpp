@@ -9,6 +9,7 @@
 
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
+#include "core/result_rules.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

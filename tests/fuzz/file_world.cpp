@@ -12,7 +12,7 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
-#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/net/service.hpp"

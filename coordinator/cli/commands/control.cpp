@@ -3,7 +3,6 @@
 #include <string>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "core/campaign/name.hpp"

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"

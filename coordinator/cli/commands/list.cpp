@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/archive/replayed_spectra.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/cli/commands/commands.hpp"

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/archive/replayed_spectra.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/campaign_file/requirements_file.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"

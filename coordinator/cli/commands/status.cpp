@@ -1,5 +1,4 @@
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 

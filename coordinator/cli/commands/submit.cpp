@@ -8,7 +8,6 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/watch.hpp"
 #include "coordinator/cli/output.hpp"

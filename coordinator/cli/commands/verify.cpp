@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/archive/publication.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/report/json.hpp"

@@ -12,8 +12,9 @@
 #include <thread>
 #include <utility>
 
-#include "coordinator/cli/client_text.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"

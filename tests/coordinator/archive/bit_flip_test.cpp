@@ -5,7 +5,6 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
-#include "coordinator/archive/listing.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/summarise.hpp"

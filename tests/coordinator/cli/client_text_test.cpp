@@ -1,5 +1,3 @@
-#include "coordinator/cli/client_text.hpp"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "coordinator/cli/client.hpp"
 #include "core/runs.hpp"
 #include "tests/proto/wire/requests.hpp"
 
