@@ -13,10 +13,10 @@ namespace proofmass::coordinator {
 
 std::string report_text(const Review& review, Paint paint) {
   const ReadResults& results = review.results;
-  std::string text =
-      fitted(wire::visible_lines(summary_text(review))) + given_up_text(results.given_up, paint) +
-      note_text(review.note) +
-      fitted(wire::visible_lines(warnings_text(review.schema, results.warnings) + review.stop));
+  std::string text = fitted(wire::visible_lines(summary_text(review))) +
+                     given_up_text(results.given_up, paint) + note_text(review.note) +
+                     fitted(wire::visible_lines(warnings_text(review.schema, results.warnings) +
+                                                (review.stop ? review.stop->text : "")));
   std::vector<Table> tables = accuracy_tables(review);
   const auto further = std::back_inserter(tables);
   std::ranges::move(standard_error_tables(review.schema, results.standard_errors), further);

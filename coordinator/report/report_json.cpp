@@ -225,7 +225,7 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
               {"fraction_within_interval", statistics.within_objectives(missing.num_given_up)}}},
             {"standard_errors", standard_errors_of(schema, results.standard_errors)},
             {"budget", budget_of(review)},
-            {"stop", stop_of(review.stop_outcome)},
+            {"stop", stop_of(review.stop)},
             {"requirements", array_of(stated, of_stated)},
             {"matrix", Json::array()}};
   if (results.instruments) json["instruments"] = json_of(schema, *results.instruments);

@@ -77,8 +77,7 @@ Review read_review(const Store& store, const Campaign& campaign, ReviewDepth dep
   stated = matrix_requirements(store.schema(), std::move(stated), campaign.objectives());
   store.read_one_state([&] {
     review = read_of_one_state(store, campaign, depth, std::move(stated));
-    review.stop = stop_text(store);
-    review.stop_outcome = stop_outcome(store);
+    review.stop = stop_outcome(store);
   });
   return review;
 }

@@ -90,8 +90,7 @@ struct Review {
   std::optional<Causes> causes = {};       ///< Empty if runs are too few, or not asked for.
   std::optional<RunSpectra> spectra = {};  ///< Of worst_run_of(); empty if not asked for.
   CampaignExecution execution = {};
-  std::string stop = {};  ///< See stop_text().
-  std::optional<StopOutcome> stop_outcome = {};
+  std::optional<StopOutcome> stop = {};
 };
 
 /// The run with the largest |error| of any quantity beside its objective; none if no run has an

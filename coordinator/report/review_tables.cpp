@@ -104,7 +104,9 @@ Table identity_table(const Review& review) {
              {"SHA-256 of the results", digest_words(review)},
              {"SHA-256 of the definition", review.definition_digest}});
   if (review.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
-  if (!review.stop.empty()) table.rows.push_back({"stop rule", review.stop});
+  if (review.stop && !review.stop->text.empty()) {
+    table.rows.push_back({"stop rule", review.stop->text});
+  }
   if (!review.note.empty()) table.rows.push_back({"note", review.note});
   return table;
 }

@@ -60,9 +60,9 @@ TEST_F(Summarise, AsksForTheRunsOfTheNextCheck) {
 // 64 magnitudes of 1 and 63 of 3 have a mean within 8.8496 % (scipy).
 TEST_F(Summarise, TellsWhatTheRuleAskedForAndWhatItFound) {
   Store store = finished(128, plan_of(1000), 1.0, 3.0);
-  EXPECT_EQ(stop_text(store), "") << "not checked yet";
+  EXPECT_EQ(stop_outcome(store)->text, "") << "not checked yet";
   (void)next_runs(store);
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  mean(k2c) within 8.85 %, half its 95 % interval\n"
             "          after 128 runs; mean(k2c) within 5%: not reached\n");
 }
@@ -74,7 +74,7 @@ TEST_F(Summarise, DecidesARequirement) {
   Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 1);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_FALSE(is_rule_missed(store));
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  k2c < 2 for 90% with 95% decided\n"
             "          met after 128 runs; exceeding: 1\n"
             "          at most 5.083 % of all draws, with 95 %\n");
@@ -87,7 +87,7 @@ TEST_F(Summarise, DecidesARequirementOnAllObjectives) {
   Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 0, 0);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_FALSE(is_rule_missed(store));
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  all objectives for 90% with 95% decided\n"
             "          met after 128 runs; holding: 127\n"
             "          at least 94.92 % of all draws, with 95 %\n");
@@ -115,7 +115,7 @@ TEST_F(Summarise, CountsWhereAllObjectivesHold) {
   Store store = finished(128, plan, 0.0, 1.0);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_EQ(store.stop_checks().back().check.estimate, 0.5);
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  all objectives within 17.9 %, half its 95 % interval\n"
             "          in 64 of 128 runs, 41 to 59 % of all draws\n"
             "          after 128 runs; all objectives within 50%: reached\n");
