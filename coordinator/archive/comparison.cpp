@@ -7,7 +7,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/result_columns.hpp"

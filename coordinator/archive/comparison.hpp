@@ -9,12 +9,10 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"

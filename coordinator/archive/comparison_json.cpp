@@ -1,5 +1,4 @@
 #include <cstddef>
-#include <string>
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/report/json.hpp"

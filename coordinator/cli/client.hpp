@@ -2,13 +2,11 @@
 
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/net/client_connection.hpp"
-#include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/wire/client_codec.hpp"
 

@@ -17,7 +17,6 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "core/campaign/definition.hpp"

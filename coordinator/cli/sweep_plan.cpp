@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ranges>
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/store/sha256.hpp"

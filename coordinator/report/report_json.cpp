@@ -6,7 +6,6 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "core/campaign/campaign.hpp"

@@ -11,7 +11,6 @@
 #include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"

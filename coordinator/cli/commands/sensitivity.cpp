@@ -15,7 +15,6 @@
 #include "coordinator/cli/output.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/dispersion.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include "coordinator/archive/comparison.hpp"
@@ -27,7 +26,6 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/surroundings.hpp"
-#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
