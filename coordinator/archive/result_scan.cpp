@@ -1,5 +1,3 @@
-#include "coordinator/archive/result_scan.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/archive/verification.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
@@ -154,15 +153,14 @@ Check check_stored_statistics(const Store& store, const Campaign& campaign,
       scan.num_violations == 0) {
     return check_current(store, campaign, *summary, read_results(store, campaign));
   }
-  Lines lines;
   const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
                                     summary->num_not_finite + summary->num_no_draw +
                                     summary->num_lost;
   if (num_counted != summary->num_finished) {
-    lines.push_back(fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
-                                summary->num_finished, num_counted));
+    return Check::fails(std::string(unfit),
+                        {fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
+                                     summary->num_finished, num_counted)});
   }
-  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::not_checked("they are not of the results that are in the file");
 }
 

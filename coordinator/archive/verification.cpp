@@ -7,8 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "coordinator/archive/resimulation.hpp"
-#include "coordinator/archive/result_scan.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"
@@ -270,10 +269,6 @@ bool verify(const std::filesystem::path& file, const VerifyOptions& options,
   return Verification(file, options, report, is_stopped).run();
 }
 
-Check Check::holds(std::string finding) {
-  return {.name = {}, .verdict = CheckOutcome::holds, .finding = std::move(finding), .details = {}};
-}
-
 Check Check::fails(std::string finding, std::vector<std::string> details,
                    std::uint64_t num_further) {
   if (details.size() > details_named_max) {
@@ -281,17 +276,8 @@ Check Check::fails(std::string finding, std::vector<std::string> details,
     details.resize(details_named_max);
   }
   if (num_further > 0) details.push_back(fmt::format("and {} more", num_further));
-  return {.name = {},
-          .verdict = CheckOutcome::fails,
-          .finding = std::move(finding),
-          .details = std::move(details)};
-}
-
-Check Check::not_checked(std::string finding) {
-  return {.name = {},
-          .verdict = CheckOutcome::not_checked,
-          .finding = std::move(finding),
-          .details = {}};
+  return {
+      .verdict = CheckOutcome::fails, .finding = std::move(finding), .details = std::move(details)};
 }
 
 std::string_view word_for(CheckOutcome verdict) {

@@ -37,8 +37,7 @@ namespace {
 constexpr double timeout_s_min = 0.01;
 constexpr double timeout_s_max = 86400.0;
 
-}  // namespace
-
+/// Declares --keys and --insecure-plain.
 void add_key_options(CLI::App& command, ClientConnectionConfig& connection) {
   command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
       ->type_name(wire::directory_type)
@@ -46,6 +45,8 @@ void add_key_options(CLI::App& command, ClientConnectionConfig& connection) {
   command.add_flag("--insecure-plain", connection.is_plain_waived,
                    "Allow an address beyond this machine without keys");
 }
+
+}  // namespace
 
 void add_client_options(CLI::App& command, ClientOptions& options) {
   ClientConnectionConfig& connection = options.connection;
@@ -333,12 +334,11 @@ std::string campaign_line(const CampaignStatus& campaign) {
   return text;
 }
 
-std::string done_text(const proto::DoneReply& done, const ActionTaken& action,
-                      OutputFormat format) {
-  if (format == OutputFormat::text) return done.text() + "\n";
-  return dumped(
-      {{"action", action.name}, {std::string(action.kind), action.target}, {"text", done.text()}},
-      JsonLayout::indented);
+void print_done(const Ask& ask, const proto::RequestEnvelope& request, const ActionTaken& action,
+                OutputFormat format) {
+  const std::string text = reply_of(ask, request, proto::ReplyEnvelope::kDone).done().text();
+  if (format == OutputFormat::text) return print_lines(text + "\n");
+  print_json({{"action", action.name}, {std::string(action.kind), action.target}, {"text", text}});
 }
 
 }  // namespace proofmass::coordinator

@@ -18,10 +18,6 @@ struct ClientOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-/// Declares --keys and --insecure-plain.
-/// @param connection  Lives as long as the command.
-void add_key_options(CLI::App& command, ClientConnectionConfig& connection);
-
 /// Declares --connect, --keys, --insecure-plain, --timeout and --json.
 /// @param options  Lives as long as the command.
 void add_client_options(CLI::App& command, ClientOptions& options);
@@ -111,8 +107,10 @@ struct ActionTaken {
   std::string_view target;  ///< Name.
 };
 
-/// The coordinator's words, or an object with them: {"action": name, kind: target, "text": words}.
-[[nodiscard]] std::string done_text(const proto::DoneReply& done, const ActionTaken& action,
-                                    OutputFormat format);
+/// Asks for it, and prints the coordinator's words, or an object with them: {"action": name, kind:
+/// target, "text": words}.
+/// @throws As reply_of().
+void print_done(const Ask& ask, const proto::RequestEnvelope& request, const ActionTaken& action,
+                OutputFormat format);
 
 }  // namespace proofmass::coordinator

@@ -21,7 +21,6 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/shared_options.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"

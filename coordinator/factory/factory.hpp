@@ -29,6 +29,8 @@ struct FactoryConfig {
   std::string worker_command = {};  ///< A line of `sh` that ends as a worker named NAME-"$1".
   std::optional<unsigned> num_processors = {};   ///< Of a worker; nothing: a node of its own.
   std::vector<std::string> submit_options = {};  ///< Further ones, as the batch system has them.
+  std::string batch_system = {};                 ///< Its name.
+  std::uint64_t interval_s = 30;                 ///< Between two looks.
 };
 
 /// A worker's place in the queue of a batch system.
@@ -96,7 +98,7 @@ void on_submission_failed(FactoryState& state, const std::string& reason, Factor
 /// Nothing if all is well. Once there is a reason, there is one as long as the state lives.
 [[nodiscard]] std::optional<std::string> reason_to_pause(const FactoryState& state);
 
-/// What the factory tells the coordinator after a look; without batch system and interval.
+/// What the factory tells the coordinator after a look.
 [[nodiscard]] proto::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
                                              const FactoryView& view, FactoryTime now);
 

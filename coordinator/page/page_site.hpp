@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "coordinator/page/campaign_details.hpp"
 #include "coordinator/page/http_server.hpp"
@@ -25,5 +27,30 @@ struct PageSite {
   [[nodiscard]] std::optional<HttpAnswer> answer(const HttpRequest& request,
                                                  HttpServer::Patience patience) const;
 };
+
+/// What the kernel says of this process.
+struct ProcessFigures {
+  double cpu_s = 0.0;
+  std::uint64_t resident_size = 0;  ///< Bytes.
+  std::uint64_t virtual_size = 0;   ///< Bytes.
+  std::uint64_t num_descriptors = 0;
+  std::uint64_t num_descriptors_max = 0;
+  double start_unix_s = 0.0;
+};
+
+/// The figures of this moment. What cannot be read is 0.
+[[nodiscard]] ProcessFigures process_figures();
+
+/// Campaigns that have metrics of their own, so that the number of series is bounded; how many are
+/// left out is one of the metrics.
+inline constexpr std::size_t campaigns_with_metrics_max = 200;
+
+/// All metrics in Prometheus' text format 0.0.4. README.md names those that deserve an
+/// alert.
+[[nodiscard]] std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
+                                       const ProcessFigures& process, const HttpCounts& page);
+
+/// A label's value with backslash, quote and end of line escaped, and what is not UTF-8 visible.
+[[nodiscard]] std::string label_value(std::string_view text);
 
 }  // namespace proofmass::coordinator

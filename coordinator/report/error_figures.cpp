@@ -11,15 +11,15 @@ constexpr std::size_t num_worst_shown = 5;
 constexpr std::size_t num_convergence_points = 40;
 constexpr std::uint64_t first_convergence_count = 5;
 
-void add_if_worst(const RunValue& candidate, std::vector<RunValue>& worst) {
-  if (worst.size() == num_worst_shown && candidate.value <= worst.back().value) return;
-  const auto place =
-      std::ranges::upper_bound(worst, candidate.value, std::greater<>(), &RunValue::value);
-  worst.insert(place, candidate);
-  if (worst.size() > num_worst_shown) worst.pop_back();
-}
-
 }  // namespace
+
+void keep_largest(const RunValue& candidate, std::size_t count, std::vector<RunValue>& largest) {
+  if (largest.size() == count && candidate.value <= largest.back().value) return;
+  const auto place =
+      std::ranges::upper_bound(largest, candidate.value, std::greater<>(), &RunValue::value);
+  largest.insert(place, candidate);
+  if (largest.size() > count) largest.pop_back();
+}
 
 std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs) {
   std::vector<std::uint64_t> counts;
@@ -42,7 +42,7 @@ void ErrorFigures::add_error(RunIndex run, double error, Growing& quantity) {
   const double magnitude = std::abs(error);
   quantity.magnitudes.add(magnitude);
   quantity.errors.add(error);
-  add_if_worst({.run = run, .value = magnitude}, quantity.figures.worst);
+  keep_largest({.run = run, .value = magnitude}, num_worst_shown, quantity.figures.worst);
   if (!quantity.sums) quantity.sums.emplace(magnitude);
   quantity.sums->add(magnitude);
 }

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/instruments.hpp"
-#include "coordinator/report/replicates.hpp"
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"

@@ -121,10 +121,10 @@ double Exceedances::value_of(const RunResult& result) const {
                                     : of_run.entries.at(position - num_quantities - 1);
 }
 
-double Exceedances::largest_ratio(const RunResult& result) const {
+double largest_ratio(const RunResult& result, std::span<const double> objectives) {
   double largest = 0.0;
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    largest = std::max(largest, std::abs(result.error(i)) / objectives_[i]);
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    largest = std::max(largest, std::abs(result.error(i)) / objectives[i]);
   }
   return largest;
 }
@@ -139,7 +139,7 @@ double Exceedances::add(const RunResult& result) {
   std::vector<double> errors(objectives_.size());
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = result.error(i);
   if (exceeds(requirement_, errors, objectives_)) ++num_exceeding_;
-  return largest_ratio(result);
+  return largest_ratio(result, objectives_);
 }
 
 ExceedanceCount Exceedances::of(std::uint64_t num_runs) const {

@@ -38,6 +38,9 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string bounds_text(const Requirement& requirement, const Interval& exceedance,
                                       RequirementVerdict verdict);
 
+/// Largest |error| of a result with an estimate beside its objective.
+[[nodiscard]] double largest_ratio(const RunResult& result, std::span<const double> objectives);
+
 /// Counts the runs that exceed what is required.
 class Exceedances {
  public:
@@ -60,7 +63,6 @@ class Exceedances {
 
  private:
   [[nodiscard]] double value_of(const RunResult& result) const;
-  [[nodiscard]] double largest_ratio(const RunResult& result) const;
 
   Requirement requirement_;
   std::vector<double> objectives_;

@@ -22,11 +22,10 @@ struct ControlOptions {
   int priority = 0;  ///< For set_priority.
 };
 
-int print_done(const ClientOptions& client, const proto::RequestEnvelope& request,
-               const ActionTaken& action) {
+int ask_for(const ClientOptions& client, const proto::RequestEnvelope& request,
+            const ActionTaken& action) {
   return with_connection(client, [&](const Ask& ask) {
-    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kDone);
-    print_lines(done_text(reply.done(), action, client.format));
+    print_done(ask, request, action, client.format);
     return exit_done;
   });
 }
@@ -37,7 +36,7 @@ int control_campaign(const ControlOptions& options) {
   control.set_action(static_cast<proto::ControlAction>(options.action));
   control.set_campaign(checked_campaign_name(options.campaign));
   control.set_priority(options.priority);
-  return print_done(
+  return ask_for(
       options.client, request,
       {.name = wire::name_of(options.action), .kind = "campaign", .target = options.campaign});
 }
@@ -67,8 +66,8 @@ int release_host(const ReleaseOptions& options) {
   }
   proto::RequestEnvelope request;
   request.mutable_release_host()->set_host(options.host);
-  return print_done(options.client, request,
-                    {.name = "release", .kind = "host", .target = options.host});
+  return ask_for(options.client, request,
+                 {.name = "release", .kind = "host", .target = options.host});
 }
 
 }  // namespace

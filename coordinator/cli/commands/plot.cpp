@@ -12,7 +12,7 @@
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"

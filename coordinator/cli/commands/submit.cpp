@@ -78,10 +78,8 @@ int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
   const proto::RequestEnvelope request = submit_request(options, *campaign);
   return with_connection(options.client, [&](const Ask& ask) {
-    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kDone);
-    print_lines(done_text(reply.done(),
-                          {.name = "submit", .kind = "campaign", .target = campaign->name},
-                          options.client.format));
+    print_done(ask, request, {.name = "submit", .kind = "campaign", .target = campaign->name},
+               options.client.format);
     if (!options.waits) return static_cast<int>(exit_done);
     flush_standard_output();
     const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);

@@ -18,7 +18,7 @@
 #include "coordinator/cli/commands/run.hpp"
 #include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/cli/sweep_plan.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store.hpp"

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/archive/resimulation.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"

@@ -1,5 +1,3 @@
-#include "coordinator/archive/result_scan.hpp"
-
 #include <fmt/format.h>
 
 #include "coordinator/archive/verification.hpp"

@@ -1,5 +1,3 @@
-#include "coordinator/report/instruments.hpp"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
