@@ -245,15 +245,12 @@ std::string service_lines(const proto::StatusReply& status, std::size_t line_wid
     num_lent += campaign.num_lent();
     versions.insert(campaign.model_version());
   }
-  const std::size_t width = line_width_max;
-  const std::string service = fmt::format("Proofmass {}, {}, up {}", status.version(),
-                                          models_text(std::move(versions), status.model_version()),
-                                          duration_text(status.uptime_s()));
   const std::string workers =
       fmt::format("{} with {}, {} lent", counted(status.num_workers(), "worker"),
                   counted(status.num_slots(), "slot"), counted(num_lent, "run"));
-  return fmt::format("{}\n{}\n\n", shortened(wire::visible_text(service), width),
-                     shortened(workers, width));
+  return fmt::format("{}\n{}\n\n",
+                     shortened(wire::visible_text(service_line(status, versions)), line_width_max),
+                     shortened(workers, line_width_max));
 }
 
 /// Seven characters at most.

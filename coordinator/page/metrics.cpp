@@ -10,7 +10,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "coordinator/page/page_site.hpp"
+#include "coordinator/page/page.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"

@@ -9,7 +9,6 @@
 #include "coordinator/page/campaign_details.hpp"
 #include "coordinator/page/http_server.hpp"
 #include "coordinator/page/page_request.hpp"
-#include "coordinator/page/page_site.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/page/snapshot_board.hpp"
 #include "core/error.hpp"
@@ -67,33 +66,21 @@ void PageConfig::validate() const { (void)token_of(*this); }
 
 std::uint64_t page_descriptors_max() { return connections_allowed() + further_descriptors; }
 
-struct Page::Impl {
-  explicit Impl(const PageConfig& page_config)
-      : address(page_config.address),
-        board(clock_now()),
-        reader(read_details),
-        site({.access = PageAccess(token_of(page_config)),
-              .board = &board,
-              .details = [this](const CampaignRecord& campaign,
-                                TimePoint now) { return reader.details(campaign, now); },
-              .counts = [this] { return server->counts(); },
-              .now = clock_now}) {
-    server = std::make_unique<HttpServer>(
-        http_config(page_config),
-        [this](const HttpRequest& request, HttpServer::Patience patience) {
-          return site.answer(request, patience);
-        });
-    address.port = server->port();
-  }
-
-  PageAddress address;
-  SnapshotBoard board;
-  DetailReader reader;
-  PageSite site;
-  std::unique_ptr<HttpServer> server;  ///< Ends before what it uses.
-};
-
-Page::Page(const PageConfig& config, const Log& log) : impl_(std::make_unique<Impl>(config)) {
+Page::Page(const PageConfig& config, const Log& log)
+    : address_(config.address),
+      board_(clock_now()),
+      reader_(read_details),
+      site_({.access = PageAccess(token_of(config)),
+             .board = &board_,
+             .details = [this](const CampaignRecord& campaign,
+                               TimePoint now) { return reader_.details(campaign, now); },
+             .counts = [this] { return server_->counts(); },
+             .now = clock_now}) {
+  server_ = std::make_unique<HttpServer>(
+      http_config(config), [this](const HttpRequest& request, HttpServer::Patience patience) {
+        return site_.answer(request, patience);
+      });
+  address_.port = server_->port();
   log({.kind = "page_served", .fields = {{"url", url()}}});
   if (config.address.is_loopback) return;
   log({.severity = wire::Severity::warning,
@@ -103,13 +90,11 @@ Page::Page(const PageConfig& config, const Log& log) : impl_(std::make_unique<Im
                                       "token; use a tunnel of ssh or a proxy with TLS)")}});
 }
 
-Page::~Page() = default;
-
 void Page::on_turn(const Service& service) {
-  impl_->board.on_turn(clock_now(), [&](SnapshotDepth depth) { return service.snapshot(depth); });
+  board_.on_turn(clock_now(), [&](SnapshotDepth depth) { return service.snapshot(depth); });
 }
 
-std::string Page::url() const { return url_of(impl_->address); }
+std::string Page::url() const { return url_of(address_); }
 
 namespace {
 

@@ -37,14 +37,11 @@ Cell progress_cell(const CampaignStatus& campaign) {
 }
 
 std::string title_of(const ServiceSnapshot& snapshot) {
-  const proto::StatusReply& status = snapshot.status;
   std::set<std::string> versions;
   for (const CampaignRecord& campaign : snapshot.campaigns) {
     versions.insert(campaign.status.model_version());
   }
-  const std::string models = models_text(std::move(versions), status.model_version());
-  return fmt::format("<p>Proofmass {}, {}, up {}</p>\n", markup_text(status.version()),
-                     markup_text(models), duration_text(status.uptime_s()));
+  return fmt::format("<p>{}</p>\n", markup_text(service_line(snapshot.status, versions)));
 }
 
 /// The line that screen readers announce when it changes: it must not change often.

@@ -39,7 +39,10 @@ void RunningInstruments::add(const RunResult& run) {
   const Runs runs = groups_.add(run);
   if (runs.empty()) return;
   add_objectives(runs);
-  for (std::size_t i = 0; i < objectives_.size(); ++i) add_shares(runs, i);
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    const auto is_miss = [&](const RunResult& of) { return is_beyond(of, i, objectives_[i]); };
+    quantities_[i].beyond.add(count_of(runs, is_miss));
+  }
   if (!std::ranges::all_of(runs, &RunResult::is_completed)) {
     ++counts_.num_not_estimated;
     return;
@@ -63,12 +66,6 @@ void RunningInstruments::add_objectives(Runs runs) {
   }
   if (num_within == counts_.temporal) ++counts_.num_temporal;
   ++counts_.num_instruments;
-}
-
-void RunningInstruments::add_shares(Runs runs, std::size_t i) {
-  Quantity& quantity = quantities_[i];
-  quantity.beyond.add(
-      count_of(runs, [&](const RunResult& run) { return is_beyond(run, i, objectives_[i]); }));
 }
 
 void RunningInstruments::add_values(Runs runs, std::size_t i) {

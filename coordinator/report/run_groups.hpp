@@ -124,7 +124,6 @@ class RunningInstruments {
   };
   using Runs = std::span<const RunResult>;  // Of an instrument.
   void add_objectives(Runs runs);
-  void add_shares(Runs runs, std::size_t i);
   void add_values(Runs runs, std::size_t i);
   [[nodiscard]] InstrumentQuantity statistics_of(std::size_t i) const;
 

@@ -58,10 +58,12 @@ Remark comparison_note(const proto::CampaignStatus& campaign) {
 
 }  // namespace
 
-std::string models_text(std::set<std::string> versions, const std::string& of_coordinator) {
+std::string service_line(const proto::StatusReply& status, std::set<std::string> versions) {
   versions.erase("");
-  if (versions.empty()) versions.insert(of_coordinator);
-  return fmt::format("model{} {}", versions.size() > 1 ? "s" : "", fmt::join(versions, ", "));
+  if (versions.empty()) versions.insert(status.model_version());
+  return fmt::format("Proofmass {}, model{} {}, up {}", status.version(),
+                     versions.size() > 1 ? "s" : "", fmt::join(versions, ", "),
+                     duration_text(status.uptime_s()));
 }
 
 std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {

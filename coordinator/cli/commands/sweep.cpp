@@ -99,7 +99,7 @@ Rest rest_of(const Campaign& campaign, const RunOptions& run) {
                            summary->num_finished == num_finished_runs &&
                            store.given_up_runs().empty() && !lacks_stop_check(store) &&
                            store.stop_plan() == stop_plan_of(run, campaign.num_runs);
-  const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.rule.empty();
+  const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.stop_rule.empty();
   if (is_complete && has_all) {
     return {.num_missing = 0, .exit_code = is_rule_missed(store) ? exit_not_met : exit_done};
   }
@@ -123,7 +123,7 @@ Sweep plan_sweep(const SweepOptions& options) {
       throw UsageError(
           fmt::format("vary = {} (makes the same campaign as {})", text_of(values), same->second));
     }
-    check_until(*campaign, swept.run.stop.rule);
+    check_until(*campaign, swept.run.stop.stop_rule);
     swept.rest = rest_of(*campaign, swept.run);
   }
   return sweep;

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "coordinator/page/page_site.hpp"
+#include "coordinator/page/page.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 
 namespace proofmass::coordinator {
