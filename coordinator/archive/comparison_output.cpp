@@ -15,7 +15,6 @@
 #include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 constexpr double significance = 1.0 - default_confidence;

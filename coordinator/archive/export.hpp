@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/report/digest.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"

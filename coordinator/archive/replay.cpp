@@ -23,7 +23,6 @@
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 void require_model_of_this_program(const Store& store) {

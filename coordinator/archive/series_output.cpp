@@ -17,7 +17,6 @@
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 /// @throws InvalidArgument for a name of `chosen` that is not one of `known`.

@@ -13,15 +13,14 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/report/digest.hpp"
 #include "coordinator/report/json.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 // To open a pipe would wait for somebody to write to it.

@@ -11,7 +11,6 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 struct Extents {

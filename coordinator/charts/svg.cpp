@@ -12,7 +12,6 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 constexpr double margin = 6.0;

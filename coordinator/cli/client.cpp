@@ -31,7 +31,6 @@
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 constexpr double timeout_s_min = 0.01;

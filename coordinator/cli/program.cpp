@@ -31,7 +31,6 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 constexpr std::string_view interrupted = "proofmass: interrupted\n";

@@ -1,5 +1,3 @@
-#include "coordinator/factory/batch_system.hpp"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
@@ -13,6 +11,7 @@
 #include <sstream>
 #include <thread>
 
+#include "coordinator/factory/factory.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/link/descriptor.hpp"

@@ -14,7 +14,6 @@
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 using wire::markup_text;

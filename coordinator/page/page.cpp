@@ -8,13 +8,12 @@
 
 #include "coordinator/page/campaign_details.hpp"
 #include "coordinator/page/http_server.hpp"
-#include "coordinator/page/page_request.hpp"
+#include "coordinator/page/page_access.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/page/snapshot_board.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 constexpr std::uint64_t connections_max = 64;

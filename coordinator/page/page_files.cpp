@@ -4,7 +4,6 @@
 #include "coordinator/report/report.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 // Beside review_style(). The colours have a contrast of 4.5 at least, in both themes.

@@ -17,7 +17,6 @@
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 using proto::CampaignStatus;

@@ -9,7 +9,7 @@
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/page/campaign_details.hpp"
-#include "coordinator/page/page_request.hpp"
+#include "coordinator/page/page_access.hpp"
 #include "coordinator/page/snapshot_board.hpp"
 #include "coordinator/store/campaign_history.hpp"
 #include "coordinator/table/table.hpp"

@@ -12,7 +12,6 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 std::string percent(double fraction, int num_digits) {

@@ -16,7 +16,6 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 using wire::markup_text;

@@ -10,7 +10,6 @@
 #include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 /// A table of names and what they have.

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "coordinator/report/digest.hpp"
 #include "coordinator/report/json.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/figures.hpp"
@@ -19,7 +19,6 @@
 #include "core/statistics/sensitivity.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.

@@ -13,7 +13,6 @@
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 double share_within(const StandardErrorStatistic& statistic) {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "coordinator/cli/client.hpp"
+#include "coordinator/report/json.hpp"
 #include "core/runs.hpp"
 #include "tests/proto/wire/requests.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/store/detail/database.hpp"

@@ -1,7 +1,7 @@
 #include "coordinator/report/summarise.hpp"
 
-#include "coordinator/report/digest.hpp"
 #include "coordinator/report/error_figures.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
