@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +14,7 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
@@ -25,8 +25,6 @@
 
 namespace proofmass::coordinator {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::size_t schema_size_max = std::size_t{1} << 20;
 constexpr std::size_t results_size_max = std::size_t{2} << 30;

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/summarise.hpp"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"

@@ -256,22 +256,17 @@ void DetailReader::read(const std::string& name, std::unique_lock<std::mutex>& l
   found->second.details = std::move(details);
 }
 
-void DetailReader::read_next(std::unique_lock<std::mutex>& lock) {
-  TimePoint look_again{};
-  const std::optional<std::string> name = choose(steady_now(), look_again);
-  if (name) {
-    read(*name, lock);
-  } else {
-    changed_.wait_until(lock, look_again);
-  }
-}
-
 void DetailReader::work() {
   become_unimportant();
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
     try {
-      read_next(lock);
+      TimePoint look_again{};
+      if (const std::optional<std::string> name = choose(steady_now(), look_again)) {
+        read(*name, lock);
+      } else {
+        changed_.wait_until(lock, look_again);
+      }
     } catch (const std::exception&) {
       // Memory is short: the page shows what it has.
       if (!lock.owns_lock()) lock.lock();

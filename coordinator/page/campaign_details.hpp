@@ -129,7 +129,6 @@ class DetailReader {
   /// The name of the campaign that is to be read now, if any, and otherwise when to look again.
   [[nodiscard]] std::optional<std::string> choose(TimePoint now, TimePoint& look_again) const;
   void read(const std::string& name, std::unique_lock<std::mutex>& lock);
-  void read_next(std::unique_lock<std::mutex>& lock);
   /// @return Whether there is room for one more campaign.
   [[nodiscard]] bool make_room(TimePoint now);
 

@@ -10,7 +10,6 @@
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/page/campaign_details.hpp"
 #include "coordinator/page/page_access.hpp"
-#include "coordinator/page/snapshot_board.hpp"
 #include "coordinator/store/campaign_history.hpp"
 #include "coordinator/table/table.hpp"
 

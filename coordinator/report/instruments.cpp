@@ -173,14 +173,11 @@ std::string temporal_text(const InstrumentStatistics& statistics) {
 }
 
 Table no_instruments(const InstrumentStatistics& statistics) {
-  Table table{.id = "variance-table",
-              .caption = "Variance between instruments and within",
-              .columns = {{"instruments", true}}};
-  if (statistics.realisations > 0) {
-    table.rows.push_back(
-        {fmt::format("none of which all {} realisations are finished", statistics.realisations)});
-  }
-  return table;
+  return {.id = "variance-table",
+          .caption = "Variance between instruments and within",
+          .columns = {{"instruments", true}},
+          .rows = {Row{fmt::format("none of which all {} realisations are finished",
+                                   statistics.realisations)}}};
 }
 
 Row variance_row(const proofmass::Quantity& quantity, const InstrumentQuantity& of) {

@@ -9,7 +9,6 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
-#include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"

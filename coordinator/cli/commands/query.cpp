@@ -65,11 +65,6 @@ std::string read_standard_input() {
   return text;
 }
 
-std::optional<std::size_t> terminal_columns() {
-  if (isatty(fileno(stdout)) == 0) return std::nullopt;
-  return screen_size_of(stdout).columns;
-}
-
 // `NAME=FILE`; the names differ, and letters in them have no case.
 std::vector<AttachedFile> attached_files_of(const std::vector<std::string>& texts) {
   std::vector<AttachedFile> files;
@@ -116,7 +111,8 @@ const std::map<std::string, RowFormat>& formats() {
 
 /// Columns of a table; nothing if any number.
 std::optional<std::size_t> table_columns(const QueryOptions& options) {
-  return options.num_columns ? options.num_columns : terminal_columns();
+  if (options.num_columns || isatty(fileno(stdout)) == 0) return options.num_columns;
+  return screen_size_of(stdout).columns;
 }
 
 int query_remotely(const QueryOptions& options) {

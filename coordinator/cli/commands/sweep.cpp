@@ -24,7 +24,6 @@
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/table/terminal_table.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"

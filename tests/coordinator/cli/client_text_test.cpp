@@ -8,6 +8,7 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/report/json.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "core/runs.hpp"
 #include "tests/proto/wire/requests.hpp"
 
