@@ -7,7 +7,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/result_columns.hpp"
@@ -136,16 +135,16 @@ void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
     why = "imported truths that are the same in all runs do not tell whose draws they are";
   }
   comparison.why_unpaired = why;
-  comparison.num_first = of_first.size();
-  comparison.num_second = of_second.size();
+  comparison.first.num_estimated = of_first.size();
+  comparison.second.num_estimated = of_second.size();
   if (!comparison.is_paired()) return;
   comparison.num_pairs = of_first.count(Partner::with_estimate);
   const std::size_t a = of_first.count(Partner::none), b = of_second.count(Partner::none);
-  comparison.num_alone_first = a;
-  comparison.num_alone_second = b;
+  comparison.first.num_alone = a;
+  comparison.second.num_alone = b;
   const bool are_many = std::max(a, b) >= std::max(comparison.num_pairs, std::size_t{2});
   if (!are_many || std::min(of_first.size(), of_second.size()) < 2) return;
-  (a > b ? comparison.num_tested_first : comparison.num_tested_second) = std::max(a, b);
+  (a > b ? comparison.first : comparison.second).num_tested = std::max(a, b);
 }
 
 ComparedAccuracy accuracy_of(std::span<const double> errors, double limit) {
@@ -196,8 +195,8 @@ void compare_parameter(const CampaignComparison& comparison, const SideErrors& o
   parameter.bias_change = moments(differences).mean;
   parameter.bias_interval = mean_interval(moments(differences), default_confidence);
   parameter.p_values = compare_paired_errors(a, b);
-  const bool tests_first = comparison.num_tested_first > 0;
-  const bool tests_others = tests_first || comparison.num_tested_second > 0;
+  const bool tests_first = comparison.first.num_tested > 0;
+  const bool tests_others = tests_first || comparison.second.num_tested > 0;
   parameter.smallest_scale_factor =
       smallest_paired_scale_factor(a, b, tests_others ? 2 * num_quantities : num_quantities);
   if (!tests_others) return;
@@ -225,26 +224,19 @@ std::string why_not_compared(const ComparedCampaign& first, const ComparedCampai
   if (comparison.is_paired() && comparison.num_pairs == 0) {
     return "no run has an estimate in both";
   }
-  if (!comparison.is_paired() && std::min(comparison.num_first, comparison.num_second) < 2) {
-    return fmt::format("{} and {} runs with an estimate (must be at least 2)", comparison.num_first,
-                       comparison.num_second);
+  const std::size_t a = comparison.first.num_estimated, b = comparison.second.num_estimated;
+  if (!comparison.is_paired() && std::min(a, b) < 2) {
+    return fmt::format("{} and {} runs with an estimate (must be at least 2)", a, b);
   }
   const std::string why = why_not_independent(*first.campaign);
   return why.empty() ? why_not_independent(*second.campaign) : why;
 }
 
-/// A campaign of a file, of which one state is read.
-struct OpenCampaign {
-  ComparedMember member;
-  ComparedCampaign compared;
-};
-
-/// @param store  Outlives what is returned.
-OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file,
-                           const IsStopped& is_stopped) {
+/// @param store  Of which one state is read; outlives ComparedCampaign::open_results.
+ComparedCampaign open_campaign(const Store& store, const std::filesystem::path& file,
+                               const IsStopped& is_stopped) {
   if (is_stopped()) throw Interrupted();
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-  ReadResults results = read_checked_results(store, *campaign);
   const auto open_results = [&store, is_stopped]() -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
     return [reader = std::make_shared<ResultReader>(store.results()), is_stopped] {
@@ -252,21 +244,14 @@ OpenCampaign open_campaign(const Store& store, const std::filesystem::path& file
       return reader->next();
     };
   };
-  return {.member = {.file = file,
-                     .num_runs = store.num_runs(),
-                     .statistics = std::move(results.statistics),
-                     .digest = results.digests.results,
-                     .why_not_independent = why_not_independent(*campaign),
-                     .missing = results.missing,
-                     .quantities = store.schema().quantities,
-                     .objectives = campaign->objectives(),
-                     .comparison = std::nullopt},
-          .compared = {.campaign = campaign,
-                       .quantities = store.schema().quantities,
-                       .model_version = store.model_version(),
-                       .reference_digest = store.reference_digest(),
-                       .build = store.build(),
-                       .open_results = open_results}};
+  return {.file = file,
+          .campaign = campaign,
+          .quantities = store.schema().quantities,
+          .model_version = store.model_version(),
+          .reference_digest = store.reference_digest(),
+          .build = store.build(),
+          .results = read_checked_results(store, *campaign),
+          .open_results = open_results};
 }
 
 }  // namespace
@@ -308,31 +293,31 @@ std::vector<std::string> lacking(std::span<const Quantity> first,
   return names;
 }
 
-std::vector<ComparedMember> compare_several(std::span<const std::filesystem::path> files,
-                                            const IsStopped& is_stopped) {
+std::vector<ComparedCampaign> compare_several(std::span<const std::filesystem::path> files,
+                                              const IsStopped& is_stopped) {
   PROOFMASS_EXPECT(files.size() >= 2);
-  std::vector<ComparedMember> members;
+  std::vector<ComparedCampaign> members;
   const Store first_store = Store::open_read_only(files.front());
   first_store.read_one_state([&] {
-    const OpenCampaign first = open_campaign(first_store, files.front(), is_stopped);
-    members.push_back(first.member);
+    members.push_back(open_campaign(first_store, files.front(), is_stopped));
     for (const std::filesystem::path& file : files.subspan(1)) {
       const Store store = Store::open_read_only(file);
       store.read_one_state([&] {
-        OpenCampaign other = open_campaign(store, file, is_stopped);
-        other.member.comparison = compare_campaigns(first.compared, other.compared);
-        members.push_back(std::move(other.member));
+        members.push_back(open_campaign(store, file, is_stopped));
+        members.back().comparison = compare_campaigns(members.front(), members.back());
+        members.back().open_results = nullptr;
       });
     }
   });
+  members.front().open_results = nullptr;
   adjust_together(members);
   return members;
 }
 
-void adjust_together(std::span<ComparedMember> members) {
+void adjust_together(std::span<ComparedCampaign> members) {
   std::vector<ParameterComparison*> compared;
   std::vector<ChangePValues> p_values;
-  for (ComparedMember& member : members) {
+  for (ComparedCampaign& member : members) {
     if (!member.comparison || !member.comparison->why_not_compared.empty()) continue;
     for (ParameterComparison& parameter : member.comparison->parameters) {
       compared.push_back(&parameter);

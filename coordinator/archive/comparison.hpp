@@ -5,20 +5,18 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/campaign/statistics.hpp"
 #include "core/statistics/error_change.hpp"
 #include "core/statistics/interval.hpp"
 
@@ -26,17 +24,6 @@ namespace proofmass::coordinator {
 
 /// Results in run order, one a call; empty after the last.
 using ResultStream = std::function<std::optional<RunResult>()>;
-
-/// A campaign that is compared with another.
-struct ComparedCampaign {
-  std::shared_ptr<const Campaign> campaign;
-  std::vector<Quantity> quantities;  ///< Of its results.
-  std::string model_version;
-  std::uint64_t reference_digest = 0;  ///< Store::reference_digest().
-  std::string build;
-  /// Begins with the first result, the same ones each time.
-  std::function<ResultStream()> open_results;
-};
 
 /// estimate − truth of one parameter over all runs of one side with an estimate, SI.
 struct ComparedAccuracy {
@@ -62,25 +49,48 @@ struct ParameterComparison {
   ChangePValues adjusted_p_values;
 };
 
+/// Runs of one of two campaigns.
+struct ComparedRuns {
+  std::size_t num_estimated = 0;
+  std::size_t num_alone = 0;   ///< Of them, not computed in the other campaign; 0 unless paired.
+  std::size_t num_tested = 0;  ///< Of these, tested beside the pairs.
+};
+
 /// What two campaigns differ in, and what that does to the accuracy.
 struct CampaignComparison {
   /// Of the definitions, then `model` and `build`.
   std::vector<DefinitionDifference> differences;
   /// Why the draws are not the same, run by run; empty if they are, and pairs are compared.
   std::string why_unpaired;
-  std::size_t num_first = 0;   ///< Runs of the first campaign with an estimate.
-  std::size_t num_second = 0;  ///< Runs of the second campaign with an estimate.
-  std::size_t num_pairs = 0;   ///< Runs with an estimate in both; 0 unless paired.
-  /// Runs with an estimate that the other campaign has not computed; 0 unless paired.
-  std::size_t num_alone_first = 0, num_alone_second = 0;
-  /// Those of them that are tested beside the pairs.
-  std::size_t num_tested_first = 0, num_tested_second = 0;
+  ComparedRuns first;
+  ComparedRuns second;
+  std::size_t num_pairs = 0;  ///< Runs with an estimate in both; 0 unless paired.
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
   /// Of each quantity that both campaigns have, in the order of the first.
   std::vector<ParameterComparison> parameters;
 
   [[nodiscard]] bool is_paired() const { return why_unpaired.empty(); }
+};
+
+/// Most campaigns that `compare` takes: each is compared with the first, and has a row for each
+/// parameter.
+inline constexpr std::size_t num_compared_max = 64;
+
+/// One of several campaigns, and how it differs from the first.
+struct ComparedCampaign {
+  std::filesystem::path file = {};
+  std::shared_ptr<const Campaign> campaign;
+  std::vector<Quantity> quantities = {};  ///< Of its results.
+  std::string model_version = {};
+  std::uint64_t reference_digest = 0;  ///< Store::reference_digest().
+  std::string build = {};
+  ReadResults results = {};
+  /// Begins with the first result, the same ones each time; nothing once its file is closed.
+  std::function<ResultStream()> open_results = {};
+  /// With the first campaign as its first side; empty for the first campaign itself. The adjusted
+  /// p-values are those of adjust_together().
+  std::optional<CampaignComparison> comparison = {};
 };
 
 /// Compares the quantities that both campaigns have, in the runs with an estimate: run by run, if
@@ -97,36 +107,17 @@ struct CampaignComparison {
 [[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                                    const ComparedCampaign& second);
 
-/// Most campaigns that `compare` takes: each is compared with the first, and has a row for each
-/// parameter.
-inline constexpr std::size_t num_compared_max = 64;
-
-/// One of several campaigns: all its runs with an estimate, and how it differs from the first.
-struct ComparedMember {
-  std::filesystem::path file;
-  std::uint64_t num_runs = 0;  ///< Wanted.
-  CampaignStatistics statistics;
-  std::string digest;               ///< Of the results.
-  std::string why_not_independent;  ///< Of its draws, see why_not_independent().
-  MissingEstimates missing;  ///< Finished and given-up runs without an estimate: perhaps its worst.
-  std::vector<Quantity> quantities;  ///< Of its results.
-  std::vector<double> objectives;    ///< Of each quantity, SI; infinite if there is none.
-  /// With the first campaign as its first side; empty for the first campaign itself. The adjusted
-  /// p-values are those of adjust_together().
-  std::optional<CampaignComparison> comparison;
-};
-
 /// Reads campaigns and compares each with the first, as compare_campaigns().
 /// @param files  At least two.
 /// @throws StoreError or DefinitionError if a file cannot be read or holds other results than were
 ///         stored, see check_digest(); Interrupted.
-[[nodiscard]] std::vector<ComparedMember> compare_several(
+[[nodiscard]] std::vector<ComparedCampaign> compare_several(
     std::span<const std::filesystem::path> files, const IsStopped& is_stopped);
 
 /// Corrects the p-values of all parameters and all campaigns together, see adjusted_changes(): the
 /// more campaigns are compared, the larger a change must be to be significant. What was not
 /// compared is left out.
-void adjust_together(std::span<ComparedMember> members);
+void adjust_together(std::span<ComparedCampaign> members);
 
 /// What several campaigns are called in their tables.
 struct MemberNames {
@@ -144,7 +135,7 @@ struct MemberNames {
 /// The campaigns, the keys of their definitions that differ, and tables of bias, scatter and
 /// |error| with a row for each parameter and each campaign that has it. Lines have at most 80
 /// characters but for names of files and values of definitions that are longer.
-[[nodiscard]] std::string comparison_text(std::span<const ComparedMember> members,
+[[nodiscard]] std::string comparison_text(std::span<const ComparedCampaign> members,
                                           const MemberNames& names, Paint paint = Paint::no);
 
 /// A text of a key, for JSON.
@@ -154,7 +145,7 @@ using KeyText = std::pair<std::string, std::string>;
 /// of campaigns, each with its comparison with the first.
 /// @param varied  Keys with their values for each campaign, which is in the list then, even of two;
 ///                empty if none was varied.
-[[nodiscard]] std::string comparison_json(std::span<const ComparedMember> members,
-                                          std::span<const std::vector<KeyText>> varied = {});
+[[nodiscard]] nlohmann::ordered_json comparison_json(
+    std::span<const ComparedCampaign> members, std::span<const std::vector<KeyText>> varied = {});
 
 }  // namespace proofmass::coordinator

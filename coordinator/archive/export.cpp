@@ -1,12 +1,10 @@
 #include "coordinator/archive/export.hpp"
 
-#include <fmt/format.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>

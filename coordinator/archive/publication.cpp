@@ -1,5 +1,3 @@
-#include "coordinator/archive/publication.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,12 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "coordinator/archive/export.hpp"
-#include "coordinator/archive/replayed_spectra.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/archive/verification.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/campaign_file/data_file.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/math/instruction_set.hpp"

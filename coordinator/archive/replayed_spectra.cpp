@@ -1,15 +1,12 @@
-#include "coordinator/archive/replayed_spectra.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <span>
 #include <utility>
 
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "core/math/elementary.hpp"
 #include "core/signal/band_pass.hpp"

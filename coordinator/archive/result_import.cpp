@@ -1,5 +1,3 @@
-#include "coordinator/archive/result_import.hpp"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -8,14 +6,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "coordinator/campaign_file/data_file.hpp"
+#include "coordinator/archive/export.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
@@ -26,8 +25,6 @@
 
 namespace proofmass::coordinator {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::size_t schema_size_max = std::size_t{1} << 20;
 constexpr std::size_t results_size_max = std::size_t{2} << 30;

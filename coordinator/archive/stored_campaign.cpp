@@ -4,15 +4,21 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <fstream>
 #include <string_view>
 #include <system_error>
 
+#include "coordinator/archive/archive_error.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/json.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/store/store.hpp"
 #include "core/model.hpp"
+#include "core/runs.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -62,6 +68,100 @@ std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store) {
                                .seed = fmt::to_string(store.seed()),
                                .num_runs = fmt::to_string(store.num_runs())});
   return campaign;
+}
+
+namespace {
+
+CampaignRecord listed(const std::filesystem::path& file) {
+  try {
+    const Store store = Store::open_read_only(file);
+    CampaignRecord record = store.record();
+    record.file = file;
+    record.status.set_num_done(num_runs_in(store.finished_runs()));
+    return record;
+  } catch (const StoreError& error) {
+    return {.file = file, .problem = error.what()};
+  }
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& place, std::string_view what) {
+  throw ArchiveError(fmt::format("campaign database = {} ({})", place.string(), what));
+}
+
+std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() != ".db" || !may_be_campaign(entry->path())) continue;
+    files.push_back(entry->path());
+  }
+  if (error) {
+    throw ArchiveError(
+        fmt::format("directory = {} (cannot be read: {})", directory.string(), error.message()));
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+Json record_json(const CampaignRecord& campaign) {
+  const std::string file = campaign.file.string();
+  if (!campaign.problem.empty()) return {{"file", file}, {"problem", campaign.problem}};
+  return {{"file", file},
+          {"problem", nullptr},
+          {"name", campaign.status.name()},
+          {"seed", std::to_string(campaign.seed)},
+          {"phase", wire::name_of(wire::phase_of(campaign.status))},
+          {"num_runs", campaign.status.num_runs()},
+          {"num_finished", campaign.status.num_done()},
+          {"created_utc", campaign.created_utc}};
+}
+
+}  // namespace
+
+std::vector<CampaignRecord> list_campaigns(std::span<const std::filesystem::path> places) {
+  std::vector<CampaignRecord> campaigns;
+  for (const std::filesystem::path& place : places) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(place, ignored)) {
+      for (const auto& file : campaign_files_in(place)) campaigns.push_back(listed(file));
+      continue;
+    }
+    if (!std::filesystem::exists(place, ignored)) refuse(place, "does not exist");
+    if (!may_be_campaign(place)) refuse(place, "is not a Proofmass campaign");
+    campaigns.push_back(listed(place));
+  }
+  return campaigns;
+}
+
+Table listing_table(std::span<const CampaignRecord> campaigns) {
+  if (campaigns.empty()) return {.remarks = {{"no campaigns"}}};
+  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
+  Table table{.columns = {{"file", true, 18},
+                          {"campaign", true, 14},
+                          {"phase", true, 10},
+                          {"done", false, 9},
+                          {"runs", false, 9},
+                          {"seed", false, 9},
+                          {"created", false, 11}}};
+  for (const CampaignRecord& campaign : campaigns) {
+    const std::string file = campaign.file.filename().string();
+    if (!campaign.problem.empty()) {
+      table.rows.push_back({file, "", "", "-", "-", "-", "-"});
+      table.remarks.push_back({campaign.problem, Tone::bad});
+      continue;
+    }
+    const proto::CampaignStatus& status = campaign.status;
+    table.rows.push_back({file, status.name(), wire::name_of(wire::phase_of(status)),
+                          std::to_string(status.num_done()), std::to_string(status.num_runs()),
+                          std::to_string(campaign.seed),
+                          campaign.created_utc.substr(0, date_size)});
+  }
+  return table;
+}
+
+Json listing_json(std::span<const CampaignRecord> campaigns) {
+  return {{"campaigns", array_of(campaigns, record_json)}};
 }
 
 }  // namespace proofmass::coordinator

@@ -4,12 +4,18 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
+#include "coordinator/store/store.hpp"
 #include "coordinator/table/terminal_table.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/runs.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -24,17 +30,19 @@ inline constexpr std::size_t details_named_max = 10;
 
 /// One thing that a campaign database was checked for.
 struct Check {
-  std::string_view name;  ///< `integrity`, `digest` ...
+  std::string_view name = {};  ///< `integrity`, `digest` ...
   CheckOutcome verdict = CheckOutcome::holds;
-  std::string finding;               ///< What was found, in a line.
-  std::vector<std::string> details;  ///< Further lines.
+  std::string finding = {};               ///< What was found, in a line.
+  std::vector<std::string> details = {};  ///< Further lines.
 
   // Checks without a name yet.
-  [[nodiscard]] static Check holds(std::string finding);
+  [[nodiscard]] static Check holds(std::string finding) { return {.finding = std::move(finding)}; }
   /// Names the first ten of the details and counts the others, and those that are not among them.
   [[nodiscard]] static Check fails(std::string finding, std::vector<std::string> details = {},
                                    std::uint64_t num_further = 0);
-  [[nodiscard]] static Check not_checked(std::string finding);
+  [[nodiscard]] static Check not_checked(std::string finding) {
+    return {.verdict = CheckOutcome::not_checked, .finding = std::move(finding)};
+  }
 };
 
 /// How much is checked, and against what.
@@ -64,5 +72,62 @@ struct VerifyOptions {
 /// A check as text: a line, then one for each detail; at most 80 characters each unless a detail
 /// has no place to break.
 [[nodiscard]] std::string check_text(const Check& check, Paint paint = Paint::no);
+
+/// Writes an archive (tar, gzip) with which others can check, repeat and cite a campaign: README.md
+/// lists its files. It is of one state of the database, which a coordinator may be writing to. The
+/// same database gives the same bytes.
+///
+/// @param authors  For the citation.
+/// @throws StoreError if the database cannot be read or is damaged; DefinitionError or ArchiveError
+///         if this program cannot make its campaign again; Error if the archive cannot be written;
+///         Interrupted. Then no file appears.
+void publish(const std::filesystem::path& database, const std::filesystem::path& archive,
+             wire::IfThere if_there, std::span<const std::string> authors,
+             const IsStopped& is_stopped);
+
+/// Checks an archive from elsewhere: `checksums`, `campaign`, then all of verify(). It is unpacked
+/// to the temporary directory, where nothing of it remains.
+///
+/// @param report  As of verify().
+/// @return True if no check fails.
+/// @throws ArchiveError `archive = FILE (why)` if it is not one folder with plain files, is damaged
+///         or unpacks to over 256 MiB and 64 times its size; Interrupted.
+[[nodiscard]] bool check_publication(const std::filesystem::path& archive,
+                                     const VerifyOptions& options,
+                                     const std::function<void(const Check&)>& report,
+                                     const IsStopped& is_stopped);
+
+/// What one pass over all results of a campaign database finds. Runs are ranges: memory does not
+/// grow with them unless every other one is missing.
+struct ResultScan {
+  std::vector<RunRange> runs;  ///< Finished ones, ascending.
+  ResultDigests digests;       ///< Of their results.
+  std::uint64_t num_violations = 0;
+  std::vector<std::string>
+      violations;  ///< details_named_max at most: `run 3: num_draws = 0 (rule)`.
+};
+
+/// Reads all results and holds them against the rules of their status, and against the list of
+/// those who delivered them. Both are of one state of the file if Store::read_one_state() says so.
+///
+/// @throws StoreError if the file cannot be read or has them in another order, Interrupted.
+[[nodiscard]] ResultScan scan_results(const Store& store, const Campaign& campaign,
+                                      const IsStopped& is_stopped);
+
+// Checks of what a campaign database keeps beside the results that it follows from, and that people
+// read. All that is handed over is of one state of the file.
+
+/// Holds `statistic`, `budget_entry`, `run_warning` and `summary` against the results that the
+/// summary is of. A coordinator brings them up to date when a campaign ends or is stopped: in
+/// between they are of fewer results, and only what does not depend on results is checked.
+[[nodiscard]] Check check_stored_statistics(const Store& store, const Campaign& campaign,
+                                            const ResultScan& scan);
+
+/// Holds `stop_check` against the results.
+[[nodiscard]] Check check_stored_stop_checks(const Store& store, const Campaign& campaign,
+                                             const ResultScan& scan);
+
+/// Fails if two workers delivered different results of one run.
+[[nodiscard]] Check check_contradictions(const Store& store);
 
 }  // namespace proofmass::coordinator

@@ -6,12 +6,40 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "coordinator/report/stated_requirement.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/error.hpp"
 
 namespace proofmass::coordinator {
+
+namespace detail {
+
+/// A file cannot be opened, is no regular file, or is too large; the text is the reason alone.
+class UnreadableFile : public Error {
+ public:
+  using Error::Error;
+};
+
+/// What is done with a pipe or a device, which may never end.
+enum class Pipes : std::uint8_t {
+  refused,
+  accepted,  ///< For a file that a user names: `<(make_campaign)`.
+};
+
+/// All bytes of a file.
+/// @throws UnreadableFile
+[[nodiscard]] std::string read_text_file(const std::filesystem::path& file, std::size_t size_max,
+                                         Pipes pipes);
+
+/// read_text_file() of a file that a user names.
+/// @throws DefinitionError `file: reason`.
+[[nodiscard]] std::string read_definition_text(const std::filesystem::path& file,
+                                               std::size_t size_max, Pipes pipes);
+
+}  // namespace detail
 
 /// What a command line changes in a campaign file.
 struct Overrides {
@@ -67,5 +95,24 @@ void require_identity(const Campaign& defined, const StoredIdentity& stored);
 /// a data file whose values are the same.
 [[nodiscard]] std::vector<std::string> definition_differences(const Campaign& stored,
                                                               const Campaign& wanted);
+
+/// Largest requirements file that is read, and most requirements in one.
+inline constexpr std::uintmax_t requirements_file_size_max = std::uintmax_t{256} << 10;
+inline constexpr std::size_t num_requirements_max = 100;
+
+/// Reads a file of requirements in TOML:
+///
+///     [[requirements]]
+///     id = "SYS-REQ-012"
+///     text = "The gain is known to 1e-3."
+///     requirement = "gain < 1e-3 for 99% with 95%"
+///
+/// `id` has 1 to 64 bytes and is unique, `text` 1,000 at most and may be absent; see
+/// parse_requirement() for the rest.
+///
+/// @param results  Of the campaign that they are about.
+/// @throws DefinitionError naming file, line, field, value and rule.
+[[nodiscard]] std::vector<StatedRequirement> read_requirements(const std::filesystem::path& file,
+                                                               const ResultSchema& results);
 
 }  // namespace proofmass::coordinator

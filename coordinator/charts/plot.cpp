@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
+
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -173,6 +177,212 @@ double draw_chart(const ChartGrid& grid, Point corner, double width, SvgWriter& 
     row_height = std::max(row_height, draw_chart(grid.charts[i], place, cell_width, writer));
   }
   return top + row_height - corner.y;
+}
+
+namespace {
+
+constexpr double line_height = 19.0;
+
+/// Lines of whole words, as far as words fit; at most three.
+std::vector<std::string> wrapped_lines(std::string_view text, double width) {
+  constexpr std::size_t num_lines_max = 3;
+  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
+  std::vector<std::string> lines{""};
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    const std::string word(text.substr(begin, end - begin));
+    const std::string longer = lines.back().empty() ? word : lines.back() + " " + word;
+    if (lines.back().empty() || wire::display_width(longer) <= num_columns ||
+        lines.size() == num_lines_max) {
+      lines.back() = longer;
+    } else {
+      lines.push_back(word);
+    }
+    begin = end + 1;
+  }
+  for (std::string& line : lines) line = wire::shortened(line, num_columns);
+  return lines;
+}
+
+constexpr double sample_width = 22.0;
+
+void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
+  const double middle = place.y - 4.5;
+  const std::string colour = writer.colour(entry.ink);
+  if (const auto* const shape = std::get_if<Shape>(&entry.look)) {
+    writer.marker({place.x + 8.0, middle}, *shape, entry.ink);
+  } else if (const auto* const dash = std::get_if<Dash>(&entry.look)) {
+    writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
+                {.colour = colour, .width = 2.0, .dash = *dash});
+  } else {
+    writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
+                              std::get<double>(entry.look), {.colour = colour, .width = 1.0});
+  }
+}
+
+/// Labels that would touch the one before them are left out.
+class FreeSpace {
+ public:
+  [[nodiscard]] bool take(double from, double to) {
+    if (from < end_) return false;
+    end_ = to;
+    return true;
+  }
+
+ private:
+  double end_ = -1e9;
+};
+
+}  // namespace
+
+double AxisMap::at(double value) const {
+  if (scale == Scale::linear) {
+    return begin + (value - range.from) / (range.to - range.from) * (end - begin);
+  }
+  if (!(value > 0.0)) return begin;
+  return begin + std::log(value / range.from) / std::log(range.to / range.from) * (end - begin);
+}
+
+bool AxisMap::contains(double value) const {
+  if (!has(value)) return false;
+  const double place = (at(value) - begin) / (end - begin);
+  return place >= -1e-9 && place <= 1.0 + 1e-9;
+}
+
+bool AxisMap::has(double value) const {
+  return std::isfinite(value) && (scale == Scale::linear || value > 0.0);
+}
+
+double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
+  double height = 0.0;
+  for (const std::string& line : wrapped_lines(title, width)) {
+    height += line_height;
+    writer.text({corner.x, corner.y + height - 4.0}, line, {.is_bold = true});
+  }
+  return height + 3.0;
+}
+
+double draw_legend(std::span<const LegendEntry> entries, Point corner, double width,
+                   SvgWriter& writer) {
+  if (entries.empty()) return 0.0;
+  Point place{corner.x, corner.y + 14.0};
+  for (const LegendEntry& entry : entries) {
+    const double needed = sample_width + 1.06 * text_width(entry.name) + 14.0;
+    if (place.x > corner.x && place.x + needed > corner.x + width) {
+      place = {corner.x, place.y + line_height};
+    }
+    draw_sample(entry, place, writer);
+    writer.text({place.x + sample_width, place.y}, entry.name);
+    place.x += needed;
+  }
+  return place.y - corner.y + 8.0;
+}
+
+void Extent::add(double value) {
+  if (!std::isfinite(value) || (scale == Scale::logarithmic && value <= 0.0)) return;
+  from = std::min(from.value_or(value), value);
+  to = std::max(to.value_or(value), value);
+}
+
+AxisRange range_of(const ChartAxis& axis, const Extent& data, std::size_t num_ticks_max) {
+  const bool is_linear = axis.scale == Scale::linear;
+  const double lower = data.from.value_or(is_linear ? 0.0 : 1.0);
+  const double upper = data.to.value_or(is_linear ? 1.0 : 10.0);
+  return is_linear ? linear_range(axis, lower, upper, num_ticks_max)
+                   : logarithmic_range(axis, lower, upper, num_ticks_max);
+}
+
+void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer) {
+  FreeSpace space;
+  for (const Tick& tick : x.range.ticks) {
+    const double at = x.at(tick.value);
+    writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
+    const double half = text_width(tick.label) / 2.0;
+    if (!space.take(at - half, at + half + 3.0)) continue;
+    writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});
+  }
+  writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
+              {.colour = writer.colour(Ink::text)});
+  writer.text({box.left + box.width / 2.0, box.bottom() + 34.0}, axis.label,
+              {.anchor = Anchor::middle});
+}
+
+void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
+  for (const Tick& tick : y.range.ticks) {
+    const double at = y.at(tick.value);
+    writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour("--chart-grid")});
+    writer.text({box.left - 6.0, at + 4.5}, tick.label, {.anchor = Anchor::end});
+  }
+  writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
+}
+
+namespace {
+
+std::string place_text(char command, double x, double y) {
+  return command + coordinate(x) + " " + coordinate(y);
+}
+
+void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
+  const std::size_t count =
+      std::min(bars.heights.size(), bars.edges.empty() ? 0 : bars.edges.size() - 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(bars.heights[i] > 0.0) || !area.y.has(bars.heights[i])) continue;
+    const double left = std::max(area.x.at(bars.edges[i]), area.box.left);
+    const double right = std::min(area.x.at(bars.edges[i + 1]), area.box.right());
+    const double top = std::max(area.y.at(bars.heights[i]), area.box.top);
+    if (!(right > left)) continue;
+    // A gap between neighbours, which else would look like one bar.
+    const double gap = right - left > 3.0 ? 1.0 : 0.0;
+    writer.rectangle({left, top, right - left - gap, area.box.bottom() - top},
+                     writer.colour(bars.ink));
+  }
+}
+
+void draw(const Curve& curve, const PlotArea& area, SvgWriter& writer) {
+  const auto* const shape = std::get_if<Shape>(&curve.look);
+  std::string path;
+  bool is_begun = false;
+  for (const Point& point : curve.points) {
+    const bool has_place = area.x.has(point.x) && area.y.has(point.y);
+    if (shape != nullptr) {
+      if (!area.x.contains(point.x) || !area.y.contains(point.y)) continue;
+      writer.marker({area.x.at(point.x), area.y.at(point.y)}, *shape, curve.ink);
+    } else if (has_place) {
+      path += place_text(is_begun ? 'L' : 'M', area.x.at(point.x), area.y.at(point.y));
+    }
+    is_begun = has_place;
+  }
+  if (path.empty()) return;
+  writer.outline(
+      path, {.colour = writer.colour(curve.ink), .width = 2.0, .dash = std::get<Dash>(curve.look)});
+}
+
+void draw(const Band& band, const PlotArea& area, SvgWriter& writer) {
+  std::string upper;
+  std::string lower;
+  for (const BandPoint& point : band.points) {
+    const bool is_finite = std::isfinite(point.lower) && std::isfinite(point.upper);
+    if (!area.x.has(point.x) || !is_finite) continue;
+    const double x = area.x.at(point.x);
+    upper += place_text(upper.empty() ? 'M' : 'L', x, area.y.at(point.upper));
+    lower = place_text('L', x, area.y.at(point.lower)) + lower;
+  }
+  if (upper.empty()) return;
+  writer.area(upper + lower + "Z", writer.colour(band.ink), 0.25);
+}
+
+/// draw_chart() writes the label above the box.
+void draw(const LimitLine& limit, const PlotArea& area, SvgWriter& writer) {
+  if (!area.x.contains(limit.value)) return;
+  const double x = area.x.at(limit.value);
+  writer.line({x, area.box.top}, {x, area.box.bottom()},
+              {.colour = writer.colour(limit.ink), .width = 2.0, .dash = limit.dash});
+}
+
+}  // namespace
+
+void draw_layer(const Layer& layer, const PlotArea& area, SvgWriter& writer) {
+  std::visit([&](const auto& shown) { draw(shown, area, writer); }, layer);
 }
 
 }  // namespace proofmass::coordinator

@@ -15,8 +15,9 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/campaign/name.hpp"
@@ -92,12 +93,13 @@ void check_until(const Campaign& wanted, const std::string& stop_rule) {
       fmt::format("until = {} (must not be with quantities whose law is a table)", stop_rule));
 }
 
+namespace {
+
+/// Gives a campaign's database as many runs as are wanted. @pre require_same() passed.
 void extend_same(Store& store, const Campaign& wanted, const std::filesystem::path& database) {
   require_no_fewer_runs(store, wanted, database);
   if (wanted.num_runs > store.num_runs()) store.extend(wanted, text_of(wanted));
 }
-
-namespace {
 
 /// The campaign as it is to be for now; shared with the dispatch and with messages under way.
 std::shared_ptr<const Campaign> with_horizon(const Campaign& wanted, const StopPlan& plan,
@@ -107,7 +109,7 @@ std::shared_ptr<const Campaign> with_horizon(const Campaign& wanted, const StopP
   return campaign;
 }
 
-/// The database after require_same() and extend_same().
+/// The database for a campaign that it holds.
 ServedCampaign open_same(const Campaign& wanted, const StopPlan& plan,
                          const std::filesystem::path& database, std::string_view remedy,
                          const Asker& asker) {

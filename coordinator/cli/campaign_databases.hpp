@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"
@@ -36,13 +35,9 @@ void require_no_fewer_runs(const Store& store, const Campaign& wanted,
 /// @throws UsageError or ConfigError
 void check_until(const Campaign& wanted, const std::string& stop_rule);
 
-/// Gives a campaign's database as many runs as are wanted.
-/// @pre require_same() passed.
-/// @throws UsageError if the database holds more runs than wanted.
-void extend_same(Store& store, const Campaign& wanted, const std::filesystem::path& database);
-
-/// The database for a campaign, a new one, or the one that exists after require_same() and
-/// extend_same(); and the campaign with as many runs as are to be computed next, see horizon_of().
+/// The database for a campaign, a new one, or the one that exists after require_same(), with as
+/// many runs as are wanted; and the campaign with as many runs as are to be computed next, see
+/// horizon_of().
 /// @param asker  Owner of a new database; must be allowed to control one that exists.
 /// @throws UsageError as those do, or if there is a stop rule and quantities are read from
 ///         tables, which have an end of their own; StoreError if it cannot be used; Error if the

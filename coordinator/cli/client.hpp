@@ -2,12 +2,12 @@
 
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/net/client_connection.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -17,10 +17,6 @@ struct ClientOptions {
   ClientConnectionConfig connection;
   OutputFormat format = OutputFormat::text;
 };
-
-/// Declares --keys and --insecure-plain.
-/// @param connection  Lives as long as the command.
-void add_key_options(CLI::App& command, ClientConnectionConfig& connection);
 
 /// Declares --connect, --keys, --insecure-plain, --timeout and --json.
 /// @param options  Lives as long as the command.
@@ -89,5 +85,32 @@ enum class AnswerText : std::uint8_t {
 /// @throws As reply_of() and with_connection() do; Error if the answer arrived damaged.
 [[nodiscard]] int print_answer(const ClientConnectionConfig& connection,
                                const proto::RequestEnvelope& question, AnswerText text);
+
+// What a coordinator replied.
+
+/// True if it is finished or cancelled.
+[[nodiscard]] bool is_over(const proto::CampaignStatus& campaign);
+
+/// Two lines about the coordinator, a row a campaign, and lines about what is out of the ordinary.
+[[nodiscard]] std::string status_text(const proto::StatusReply& status, const TerminalStyle& style);
+
+/// A row a worker, and lines about those that are lent nothing.
+[[nodiscard]] Table workers_table(const proto::WorkersReply& workers);
+
+/// `mine active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
+[[nodiscard]] std::string campaign_line(const proto::CampaignStatus& campaign);
+
+/// What a client asked for.
+struct ActionTaken {
+  std::string_view name;    ///< `pause`, `submit`.
+  std::string_view kind;    ///< Of its target: `campaign`, `host`.
+  std::string_view target;  ///< Name.
+};
+
+/// Asks for it, and prints the coordinator's words, or an object with them: {"action": name, kind:
+/// target, "text": words}.
+/// @throws As reply_of().
+void print_done(const Ask& ask, const proto::RequestEnvelope& request, const ActionTaken& action,
+                OutputFormat format);
 
 }  // namespace proofmass::coordinator

@@ -1,28 +1,32 @@
 #include <fmt/format.h>
+#include <sys/types.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/notice_commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/shared_options.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
+#include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
@@ -30,8 +34,100 @@
 #include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"
 
+extern char** environ;
+
 namespace proofmass::coordinator {
 namespace {
+
+/// Starts the commands that the options --on-finish and --on-failure of a coordinator name, and
+/// follows them to their end. The service never waits for one.
+class NoticeCommands {
+ public:
+  /// Lines of `sh`; empty for none.
+  struct Config {
+    std::string on_finish;
+    std::string on_failure;
+  };
+
+  NoticeCommands(Config config, Log log) : config_(std::move(config)), log_(std::move(log)) {}
+
+  /// Starts the command for the notice, or lets it wait while many run. The command finds
+  /// PROOFMASS_CAMPAIGN, PROOFMASS_DATABASE and, after a failure, PROOFMASS_REASON in its
+  /// environment.
+  void take(const CampaignNotice& notice) {
+    if (command_of(notice).empty()) return;
+    constexpr std::size_t num_waiting_max = 10'000;
+    if (waiting_.size() == num_waiting_max) {
+      return log_failure(notice, "too many commands wait; it is not started");
+    }
+    waiting_.push_back(notice);
+    review();
+  }
+
+  /// Starts commands that wait, and logs those that failed. To be called many times a second.
+  void review() {
+    constexpr std::size_t num_running_max = 16;
+    std::erase_if(running_, [&](const Running& running) {
+      const std::optional<int> status = wire::status_if_ended(running.process_id);
+      if (!status) return false;
+      if (*status != 0) log_failure(running.notice, wire::end_text(*status));
+      return true;
+    });
+    while (!waiting_.empty() && running_.size() < num_running_max) {
+      const CampaignNotice notice = std::move(waiting_.front());
+      waiting_.pop_front();
+      start(notice);
+    }
+  }
+
+  /// Waits for the commands that run or wait, at most so long. Those that still run go on.
+  void wait(std::chrono::seconds duration_max) {
+    const auto deadline = std::chrono::steady_clock::now() + duration_max;
+    for (review(); !running_.empty() && std::chrono::steady_clock::now() < deadline; review()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+
+ private:
+  struct Running {
+    CampaignNotice notice;
+    pid_t process_id = 0;
+  };
+
+  [[nodiscard]] const std::string& command_of(const CampaignNotice& notice) const {
+    return notice.failure.empty() ? config_.on_finish : config_.on_failure;
+  }
+
+  void start(const CampaignNotice& notice) {
+    std::vector<std::string> environment;
+    for (char** variable = environ; *variable != nullptr; ++variable) {
+      environment.emplace_back(*variable);
+    }
+    environment.push_back("PROOFMASS_CAMPAIGN=" + notice.campaign);
+    environment.push_back("PROOFMASS_DATABASE=" + std::filesystem::absolute(notice.file).string());
+    environment.push_back("PROOFMASS_REASON=" + notice.failure);
+    try {
+      const pid_t process_id =
+          wire::start_program({.arguments = {"/bin/sh", "-c", command_of(notice)},
+                               .environment = std::move(environment)});
+      running_.push_back({.notice = notice, .process_id = process_id});
+    } catch (const Error& error) {
+      log_failure(notice, error.what());
+    }
+  }
+
+  void log_failure(const CampaignNotice& notice, const std::string& reason) const {
+    const std::string_view option = notice.failure.empty() ? "on-finish" : "on-failure";
+    log_({.severity = Severity::warning,
+          .kind = "command_failed",
+          .fields = {{"command", option}, {"campaign", notice.campaign}, Field::reason(reason)}});
+  }
+
+  Config config_;
+  Log log_;
+  std::deque<CampaignNotice> waiting_;
+  std::vector<Running> running_;
+};
 
 constexpr double drain_time_s_max = 366.0 * 86400.0;
 constexpr std::chrono::seconds command_wait_max(60);
@@ -43,16 +139,10 @@ constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
 
 /// Arguments of `proofmass-coordinator`.
 struct ServeOptions {
-  std::filesystem::path directory;              ///< Of the campaign databases.
-  std::string endpoint;                         ///< For workers.
-  std::optional<std::string> clients_endpoint;  ///< By default a socket in the directory.
-  std::optional<std::filesystem::path> keys;    ///< Directory of `proofmass keygen`.
-  bool is_plain_waived = false;
-  ServiceEnd end = ServiceEnd::never;
+  std::filesystem::path directory;      ///< Of the campaign databases.
+  ServiceConfig service;                ///< As far as options set it; see config_of().
   double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
-  std::size_t num_workers_max = DispatchConfig{}.num_workers_max;
-  SubmissionLimits limits;  ///< Of each client's key.
   PageOptions page;
   NoticeCommands::Config commands;
   wire::LogFormat log_format = wire::LogFormat::text;
@@ -104,25 +194,21 @@ std::filesystem::path answer_program() {
 }
 
 ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
-  ServiceConfig config;
-  config.workers_endpoint = options.endpoint;
-  config.clients_endpoint = options.clients_endpoint.value_or(
-      "ipc://" + (std::filesystem::absolute(options.directory) / "clients").string());
-  config.keys = options.keys;
-  config.is_plain_waived = options.is_plain_waived;
-  config.end = options.end;
+  ServiceConfig config = options.service;
+  if (!config.clients_endpoint) {
+    config.clients_endpoint =
+        "ipc://" + (std::filesystem::absolute(options.directory) / "clients").string();
+  }
   config.drain_max =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));
   config.memory_size_max = options.memory_mib_max << 20;
   config.files = &folder;
   config.directory = &folder;
-  config.limits = options.limits;
   config.answer_program = answer_program();
   config.answer_directory = folder.answers();
   config.version = PROOFMASS_VERSION;
-  config.dispatch.num_workers_max = options.num_workers_max;
   config.dispatch.hosts_per_key_max =
-      std::max(config.dispatch.hosts_per_key_max, options.num_workers_max);
+      std::max(config.dispatch.hosts_per_key_max, config.dispatch.num_workers_max);
   config.dispatch.reference_digest = built_in_model().reference_digest(best_instruction_set());
   scale_times(config, options.time_scale);
   return config;
@@ -200,34 +286,37 @@ int serve_campaigns(const ServeOptions& options) {
   log({.kind = "coordinator_ended", .fields = {{"campaigns", num_campaigns}}});
   if (!is_written || service.has_storage_failed()) return exit_cannot_be_done;
   const bool is_in_order =
-      options.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;
+      options.service.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;
   if (!is_in_order) return exit_interrupted;
-  return has_given_up && options.end == ServiceEnd::when_done ? exit_cannot_be_done : exit_done;
+  return has_given_up && options.service.end == ServiceEnd::when_done ? exit_cannot_be_done
+                                                                      : exit_done;
 }
 
 void add_addresses(CLI::App& app, ServeOptions& options) {
-  app.add_option("--bind", options.endpoint,
+  app.add_option("--bind", options.service.workers_endpoint,
                  "Where workers connect, ipc://PATH or\ntcp://HOST:PORT")
       ->envname("PROOFMASS_BIND")
       ->required();
-  app.add_option("--bind-clients", options.clients_endpoint,
+  app.add_option("--bind-clients", options.service.clients_endpoint,
                  "Where clients connect; a socket in the\ndirectory by default")
       ->envname("PROOFMASS_BIND_CLIENTS");
-  app.add_option("--keys", options.keys, "Directory of keys, made by `proofmass keygen`")
+  app.add_option("--keys", options.service.keys, "Directory of keys, made by `proofmass keygen`")
       ->type_name(wire::directory_type)
       ->envname("PROOFMASS_KEYS");
-  app.add_flag("--insecure-plain", options.is_plain_waived,
+  app.add_flag("--insecure-plain", options.service.is_plain_waived,
                "Serve other machines without keys: on a\nnetwork that you trust");
 }
 
-void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
+void add_service(CLI::App& app, ServeOptions& options) {
   app.add_option("FILE", options.campaign_files, "Campaign files (TOML) to serve as well")
       ->type_name(campaign_file_type);
   app.add_option("--directory", options.directory, "Directory of the campaigns, one NAME.db each")
       ->type_name(wire::directory_type)
       ->envname("PROOFMASS_DIRECTORY")
       ->required();
-  app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
+  app.add_flag_callback(
+      "--exit-when-done", [&end = options.service.end] { end = ServiceEnd::when_done; },
+      "End when every campaign is finished");
   app.add_option("--drain-time", options.drain_time_s,
                  "Seconds that workers have after SIGTERM to\ndeliver what they hold")
       ->check(wire::in_range(0.0, drain_time_s_max))
@@ -238,15 +327,15 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
       ->check(wire::in_range(memory_mib_min, memory_mib_max))
       ->envname("PROOFMASS_MEMORY_MAX")
       ->capture_default_str();
-  app.add_option("--workers-max", options.num_workers_max,
+  app.add_option("--workers-max", options.service.dispatch.num_workers_max,
                  "Workers that may be registered at a time;\nothers are refused and ask again")
       ->check(wire::in_range(std::size_t{1}, workers_max_max))
       ->capture_default_str();
-  app.add_option("--campaigns-per-key", options.limits.campaigns_max,
+  app.add_option("--campaigns-per-key", options.service.limits.campaigns_max,
                  "Unfinished campaigns that a client's key may\nhave, at most")
       ->check(wire::in_range(std::size_t{1}, campaigns_per_key_max))
       ->capture_default_str();
-  app.add_option("--bytes-per-key", options.limits.size_max,
+  app.add_option("--bytes-per-key", options.service.limits.size_max,
                  "Bytes of the definitions of these campaigns,\nat most")
       ->check(wire::in_range(std::uint64_t{1}, bytes_per_key_max))
       ->capture_default_str();
@@ -281,15 +370,11 @@ int run_proofmass_coordinator(int argc, char** argv) {
   wire::add_option_file(app, "File with these options, as in\n`bind = \"tcp://*:5555\"`",
                         "PROOFMASS_CONFIG");
   ServeOptions options;
-  bool ends_when_done = false;
-  add_service(app, options, ends_when_done);
+  add_service(app, options);
   add_addresses(app, options);
   add_page_options(app, options.page);
   wire::add_model_program_option(app);
-  return run_program(app, argc, argv, [&] {
-    if (ends_when_done) options.end = ServiceEnd::when_done;
-    return serve_campaigns(options);
-  });
+  return run_program(app, argc, argv, [&] { return serve_campaigns(options); });
 }
 
 }  // namespace proofmass::coordinator

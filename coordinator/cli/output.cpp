@@ -8,12 +8,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <string>
 #include <system_error>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/report/status_json.hpp"
+#include "coordinator/report/json.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/link/whole_file.hpp"

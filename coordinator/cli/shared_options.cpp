@@ -47,8 +47,8 @@ std::string example_requirement() {
                      proofmass::detail::number_text(limit));
 }
 
-void add_stop_options(CLI::App& command, StopOptions& options) {
-  command.add_option("--until", options.rule,
+void add_stop_options(CLI::App& command, StopPlan& options) {
+  command.add_option("--until", options.stop_rule,
                      fmt::format("Stop as soon as the rule holds, as in\n\"std({}) within 5%\",\n"
                                  "\"all objectives within 2%\" or\n\"{} decided\"",
                                  example_quantity(example_results()).name, example_requirement()));

@@ -8,6 +8,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/page/page.hpp"
+#include "coordinator/store/records.hpp"
 
 namespace proofmass::coordinator {
 
@@ -16,12 +17,6 @@ namespace proofmass::coordinator {
 /// Declares --runs, --seed and --set.
 /// @param overrides  Lives as long as the command.
 void add_override_options(CLI::App& command, Overrides& overrides);
-
-/// When a campaign ends before all of its runs are finished.
-struct StopOptions {
-  std::string rule;                           ///< See parse_stop_rule(); empty for none.
-  std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate.
-};
 
 /// Why a campaign with --failures was cancelled, for standard error.
 /// @param num_failures  Runs given up or without an estimate.
@@ -33,7 +28,7 @@ struct StopOptions {
 
 /// Declares --until and --failures.
 /// @param options  Lives as long as the command.
-void add_stop_options(CLI::App& command, StopOptions& options);
+void add_stop_options(CLI::App& command, StopPlan& options);
 
 /// Declares --audit.
 /// @param audit_fraction  Lives as long as the command.

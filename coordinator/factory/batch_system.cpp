@@ -1,5 +1,3 @@
-#include "coordinator/factory/batch_system.hpp"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
@@ -9,11 +7,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <optional>
 #include <sstream>
 #include <thread>
 
+#include "coordinator/factory/factory.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 namespace proofmass::coordinator {
 namespace {
@@ -169,6 +168,8 @@ proto::FactoryReport report_of(const FactoryState& state, const FactoryConfig& c
                                const FactoryView& view, FactoryTime now) {
   proto::FactoryReport report;
   report.set_name(config.name);
+  report.set_batch_system(config.batch_system);
+  report.set_interval_s(config.interval_s);
   report.set_phase(proto::FACTORY_PHASE_ACTIVE);
   report.set_num_wanted(wanted_workers(config, view, state.rate_per_worker_hz));
   report.set_num_registered(

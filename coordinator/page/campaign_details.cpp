@@ -14,8 +14,14 @@
 #include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/charts/svg.hpp"
 #include "coordinator/net/server_paths.hpp"
+#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/standard_errors.hpp"
+#include "coordinator/table/document_table.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
@@ -63,12 +69,12 @@ bool goes_on(const ResultsReading* reading, const Store& store, const CampaignRe
 }
 
 /// Some results more, if the coordinator knows of others than those that were read.
-void read_results(const Store& store, const CampaignRecord& campaign, CampaignDetails& now) {
+void read_further(const Store& store, const CampaignRecord& campaign, CampaignDetails& now) {
   const bool is_further = goes_on(now.reading.get(), store, campaign);
   if (is_further && now.num_runs == campaign.status.num_done()) return;
   ResultsReading reading = is_further ? *now.reading : ResultsReading(store);
   reading.read_further(store, page_results_a_reading);
-  now.html = reading.results().html();
+  now.html = reading.html();
   now.num_runs = reading.num_read();
   now.reading = std::make_shared<const ResultsReading>(std::move(reading));
 }
@@ -109,7 +115,16 @@ std::shared_ptr<const CampaignDetails> without_room() {
 }  // namespace
 
 ResultsReading::ResultsReading(const Store& store)
-    : campaign_(store.id()), results_(*stored_campaign(store), store.schema()) {}
+    : ResultsReading(store, *stored_campaign(store)) {}
+
+ResultsReading::ResultsReading(const Store& store, const Campaign& campaign)
+    : campaign_(store.id()),
+      review_{.schema = store.schema(),
+              .objectives = campaign.objectives(),
+              .why_not_independent = why_not_independent(campaign)},
+      statistics_(review_.objectives),
+      standard_errors_(review_.schema),
+      figures_(review_.objectives.size(), 0) {}
 
 bool ResultsReading::is_of(const Store& store) const { return campaign_ == store.id(); }
 
@@ -119,7 +134,9 @@ void ResultsReading::read_further(const Store& store, std::uint64_t num_results_
     ResultReader reader = store.results(range);
     while (const std::optional<RunResult> result = reader.next()) {
       require_in_range(*result, store.schema());
-      results_.add(*result);
+      statistics_.add(*result);
+      standard_errors_.add(*result);
+      figures_.add(*result);
       read_.add(RunRange{result->run, 1});
       next_run_ = result->run.value + 1;
       if (--num_left == 0) return;
@@ -129,6 +146,26 @@ void ResultsReading::read_further(const Store& store, std::uint64_t num_results_
     if (num_left == 0) return;
   }
   next_run_ = 0;
+}
+
+CampaignStatistics ResultsReading::statistics() const {
+  CampaignStatistics statistics = statistics_.statistics();
+  if (!review_.why_not_independent.empty()) leave_out_intervals(statistics);
+  return statistics;
+}
+
+std::string ResultsReading::html() const {
+  Review review = review_;
+  review.results.statistics = statistics();
+  review.figures = ErrorFigures(figures_).figures();
+  StandardErrorStatistics errors = standard_errors_.statistics();
+  if (!review.why_not_independent.empty()) leave_out_intervals(errors);
+  std::string html = "<h3>Accuracy so far</h3>\n" + html_table(accuracy_table(review));
+  for (const Table& table : standard_error_tables(review.schema, errors)) {
+    html += table_or_nothing(table);
+  }
+  return html + "<h3>Errors so far</h3>\n<figure>\n" +
+         svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }
 
 CampaignDetails read_details(const CampaignRecord& campaign, const CampaignDetails* before) {
@@ -141,7 +178,7 @@ CampaignDetails read_details(const CampaignRecord& campaign, const CampaignDetai
     now.ends = store.ends_without_estimate();
     now.given_up = store.given_up_records(page_given_up_max);
     now.attempts = store.recent_attempts(page_attempts_max, page_losses_max);
-    read_results(store, campaign, now);
+    read_further(store, campaign, now);
   } catch (const std::exception& error) {
     now.failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
   }
@@ -219,22 +256,17 @@ void DetailReader::read(const std::string& name, std::unique_lock<std::mutex>& l
   found->second.details = std::move(details);
 }
 
-void DetailReader::read_next(std::unique_lock<std::mutex>& lock) {
-  TimePoint look_again{};
-  const std::optional<std::string> name = choose(steady_now(), look_again);
-  if (name) {
-    read(*name, lock);
-  } else {
-    changed_.wait_until(lock, look_again);
-  }
-}
-
 void DetailReader::work() {
   become_unimportant();
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
     try {
-      read_next(lock);
+      TimePoint look_again{};
+      if (const std::optional<std::string> name = choose(steady_now(), look_again)) {
+        read(*name, lock);
+      } else {
+        changed_.wait_until(lock, look_again);
+      }
     } catch (const std::exception&) {
       // Memory is short: the page shows what it has.
       if (!lock.owns_lock()) lock.lock();

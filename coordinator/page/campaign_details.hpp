@@ -16,7 +16,7 @@
 
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/net/service_snapshot.hpp"
-#include "coordinator/report/live_results.hpp"
+#include "coordinator/report/review.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -31,7 +31,8 @@ inline constexpr std::size_t page_given_up_max = 100;
 inline constexpr std::uint64_t page_results_a_reading = 16'384;
 
 /// Results that were read of a campaign database, a part at a time. Results never change: what was
-/// read once stays, and only what has come since is read further. A copy costs little.
+/// read once stays, and only what has come since is read further. A copy costs little: memory is 17
+/// kB a quantity.
 class ResultsReading {
  public:
   /// Nothing is read yet.
@@ -48,11 +49,20 @@ class ResultsReading {
   void read_further(const Store& store, std::uint64_t num_results_max);
 
   [[nodiscard]] std::uint64_t num_read() const { return read_.size(); }
-  [[nodiscard]] const LiveResults& results() const { return results_; }
+  [[nodiscard]] CampaignStatistics statistics() const;
+
+  /// A fragment of HTML for a page with review_style(): the accuracy table, that of standard errors
+  /// if there are any, and the histograms of |error| of a review report. Headings are of level 3.
+  [[nodiscard]] std::string html() const;
 
  private:
+  ResultsReading(const Store& store, const Campaign& campaign);
+
   wire::CampaignId campaign_;
-  LiveResults results_;
+  Review review_;  ///< What tables are made of, but for the results.
+  RunningStatistics statistics_;
+  RunningStandardErrors standard_errors_;
+  ErrorFigures figures_;
   RunSet read_;
   std::uint64_t next_run_ = 0;  ///< Where the next call begins.
 };
@@ -64,7 +74,7 @@ struct CampaignDetails {
   std::vector<EndCount> ends = {};           ///< Without an estimate.
   std::vector<GivenUpRecord> given_up = {};  ///< At most page_given_up_max.
   RecentAttempts attempts = {};
-  std::string html = {};                               ///< Of LiveResults.
+  std::string html = {};                               ///< ResultsReading::html().
   std::uint64_t num_runs = 0;                          ///< Finished runs that were read for it.
   std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.
   /// Why the last reading failed; the other members are those of the reading before it.
@@ -119,7 +129,6 @@ class DetailReader {
   /// The name of the campaign that is to be read now, if any, and otherwise when to look again.
   [[nodiscard]] std::optional<std::string> choose(TimePoint now, TimePoint& look_again) const;
   void read(const std::string& name, std::unique_lock<std::mutex>& lock);
-  void read_next(std::unique_lock<std::mutex>& lock);
   /// @return Whether there is room for one more campaign.
   [[nodiscard]] bool make_room(TimePoint now);
 

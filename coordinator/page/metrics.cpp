@@ -1,5 +1,3 @@
-#include "coordinator/page/metrics.hpp"
-
 #include <dirent.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -12,6 +10,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "coordinator/page/page.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"

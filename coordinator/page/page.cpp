@@ -5,11 +5,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "coordinator/page/campaign_details.hpp"
 #include "coordinator/page/http_server.hpp"
-#include "coordinator/page/page_site.hpp"
-#include "coordinator/page/snapshot_board.hpp"
+#include "coordinator/page/page_access.hpp"
+#include "coordinator/page/page_views.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -64,33 +65,21 @@ void PageConfig::validate() const { (void)token_of(*this); }
 
 std::uint64_t page_descriptors_max() { return connections_allowed() + further_descriptors; }
 
-struct Page::Impl {
-  explicit Impl(const PageConfig& page_config)
-      : address(page_config.address),
-        board(clock_now()),
-        reader(read_details),
-        site({.access = PageAccess(token_of(page_config)),
-              .board = &board,
-              .details = [this](const CampaignRecord& campaign,
-                                TimePoint now) { return reader.details(campaign, now); },
-              .counts = [this] { return server->counts(); },
-              .now = clock_now}) {
-    server = std::make_unique<HttpServer>(
-        http_config(page_config),
-        [this](const HttpRequest& request, HttpServer::Patience patience) {
-          return site.answer(request, patience);
-        });
-    address.port = server->port();
-  }
-
-  PageAddress address;
-  SnapshotBoard board;
-  DetailReader reader;
-  PageSite site;
-  std::unique_ptr<HttpServer> server;  ///< Ends before what it uses.
-};
-
-Page::Page(const PageConfig& config, const Log& log) : impl_(std::make_unique<Impl>(config)) {
+Page::Page(const PageConfig& config, const Log& log)
+    : address_(config.address),
+      board_(clock_now()),
+      reader_(read_details),
+      site_({.access = PageAccess(token_of(config)),
+             .board = &board_,
+             .details = [this](const CampaignRecord& campaign,
+                               TimePoint now) { return reader_.details(campaign, now); },
+             .counts = [this] { return server_->counts(); },
+             .now = clock_now}) {
+  server_ = std::make_unique<HttpServer>(
+      http_config(config), [this](const HttpRequest& request, HttpServer::Patience patience) {
+        return site_.answer(request, patience);
+      });
+  address_.port = server_->port();
   log({.kind = "page_served", .fields = {{"url", url()}}});
   if (config.address.is_loopback) return;
   log({.severity = wire::Severity::warning,
@@ -100,12 +89,145 @@ Page::Page(const PageConfig& config, const Log& log) : impl_(std::make_unique<Im
                                       "token; use a tunnel of ssh or a proxy with TLS)")}});
 }
 
-Page::~Page() = default;
-
 void Page::on_turn(const Service& service) {
-  impl_->board.on_turn(clock_now(), [&](SnapshotDepth depth) { return service.snapshot(depth); });
+  board_.on_turn(clock_now(), [&](SnapshotDepth depth) { return service.snapshot(depth); });
 }
 
-std::string Page::url() const { return url_of(impl_->address); }
+std::string Page::url() const { return url_of(address_); }
+
+namespace {
+
+constexpr std::chrono::seconds turn_interval_max(10);
+
+using Patience = HttpServer::Patience;
+
+HttpAnswer not_found() { return plain_answer(404, "there is nothing at this address"); }
+
+/// The page, or only what the script exchanges.
+HttpAnswer html_answer(const PageRequest& request, const PageContent& content) {
+  return {.body = request.has("fragment") ? content.live : whole_page(content)};
+}
+
+std::optional<HttpAnswer> file_answer(const std::string& name) {
+  if (name == "style.css") {
+    return HttpAnswer{.content_type = "text/css; charset=utf-8", .body = page_style()};
+  }
+  if (name == "script.js") {
+    return HttpAnswer{.content_type = "text/javascript; charset=utf-8",
+                      .body = std::string(page_script())};
+  }
+  return std::nullopt;
+}
+
+HttpAnswer health(Duration since_turn) {
+  if (since_turn < turn_interval_max) return plain_answer(200, "ok");
+  return plain_answer(
+      503, fmt::format("the service has not come round for {:.0f} s", seconds(since_turn)));
+}
+
+HttpAnswer about_campaign(const PageSite& site, const PageRequest& request,
+                          const ServiceSnapshot& snapshot) {
+  const std::string& name = request.path[1];
+  const auto& campaigns = snapshot.campaigns;
+  const auto found = std::ranges::find(
+      campaigns, name,
+      [](const CampaignRecord& one) -> const std::string& { return one.status.name(); });
+  if (found == campaigns.end()) return not_found();
+  const TimePoint now = site.now();
+  // The page shows what has been read by now. Two seconds later its script asks again.
+  return html_answer(request, campaign_page(*found, site.details(*found, now).get(), request, now));
+}
+
+HttpAnswer answer_of(const PageSite& site, const PageRequest& request,
+                     const ServiceSnapshot& snapshot) {
+  const std::vector<std::string>& path = request.path;
+  const TimePoint now = site.now();
+  if (path.empty()) return html_answer(request, overview_page(snapshot, request, now));
+  if (path.size() == 1 && path[0] == "workers") {
+    return html_answer(request, workers_page(snapshot, request, now));
+  }
+  if (path.size() == 1 && path[0] == "metrics") {
+    return {.content_type = "text/plain; version=0.0.4; charset=utf-8",
+            .body = metrics_text(snapshot, now, process_figures(), site.counts())};
+  }
+  if (path.size() == 2 && path[0] == "campaigns") return about_campaign(site, request, snapshot);
+  return not_found();
+}
+
+/// To somebody who may see the page.
+std::optional<HttpAnswer> answer_to_visitor(const PageSite& site, const PageRequest& request,
+                                            Patience patience) {
+  const std::vector<std::string>& path = request.path;
+  if (path.size() == 1) {
+    if (auto file = file_answer(path[0])) return file;
+  }
+  const SnapshotDepth depth = !path.empty() && path.back() == "workers"
+                                  ? SnapshotDepth::with_workers
+                                  : SnapshotDepth::without_workers;
+  std::shared_ptr<const ServiceSnapshot> snapshot = site.board->want(depth, site.now());
+  if (snapshot == nullptr && patience == Patience::left) return std::nullopt;
+  if (snapshot == nullptr) snapshot = site.board->newest();
+  if (snapshot == nullptr) return plain_answer(503, "the coordinator has not said anything yet");
+  return answer_of(site, request, *snapshot);
+}
+
+}  // namespace
+
+std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http, Patience patience) const {
+  const std::optional<PageRequest> request = parse_target(http.target);
+  if (!request) return not_found();
+  const std::vector<std::string>& path = request->path;
+  if (path.size() == 1 && path[0] == "healthz") return health(board->since_turn(now()));
+  if (path.empty() && request->has("token")) {
+    if (auto welcome = access.welcome(request->text("token"))) return welcome;
+  }
+  if (auto refusal = access.refusal_of(http)) return refusal;
+  std::optional<HttpAnswer> given = answer_to_visitor(*this, *request, patience);
+  if (given) given->has_shown_token = access.has_token();
+  return given;
+}
+
+std::shared_ptr<const ServiceSnapshot> SnapshotBoard::want(SnapshotDepth depth, TimePoint now) {
+  const bool needs_workers = depth == SnapshotDepth::with_workers;
+  const std::lock_guard lock(mutex_);
+  asked_at_ = now;
+  if (needs_workers) asked_for_workers_at_ = now;
+  const bool is_deep = !needs_workers || newest_depth_ == SnapshotDepth::with_workers;
+  const bool is_there = newest_ != nullptr && is_deep && now - newest_->taken_at <= age_max;
+  is_urgent_ = is_urgent_ || !is_there;
+  return is_there ? newest_ : nullptr;
+}
+
+std::shared_ptr<const ServiceSnapshot> SnapshotBoard::newest() const {
+  const std::lock_guard lock(mutex_);
+  return newest_;
+}
+
+void SnapshotBoard::on_turn(TimePoint now,
+                            const std::function<ServiceSnapshot(SnapshotDepth)>& take) {
+  std::unique_lock lock(mutex_);
+  turned_at_ = now;
+  if (!is_wanted(asked_at_, now)) return;
+  const bool is_due = newest_ == nullptr || now - newest_->taken_at >= interval;
+  const SnapshotDepth depth = is_wanted(asked_for_workers_at_, now)
+                                  ? SnapshotDepth::with_workers
+                                  : SnapshotDepth::without_workers;
+  // Workers that are asked for the first time need not wait for the second to end.
+  if (!is_due && (!is_urgent_ || depth == newest_depth_)) return;
+  lock.unlock();
+  ServiceSnapshot taken = take(depth);
+  taken.taken_at = now;
+  auto snapshot = std::make_shared<const ServiceSnapshot>(std::move(taken));
+  lock.lock();
+  newest_.swap(snapshot);  // What nobody uses any more is freed without the lock.
+  newest_depth_ = depth;
+  is_urgent_ = false;
+  lock.unlock();
+}
+
+Duration SnapshotBoard::since_turn(TimePoint now) const {
+  const std::lock_guard lock(mutex_);
+  return now - turned_at_;
+}
 
 }  // namespace proofmass::coordinator

@@ -1,16 +1,103 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/service.hpp"
+#include "coordinator/net/service_snapshot.hpp"
+#include "coordinator/page/campaign_details.hpp"
+#include "coordinator/page/http_server.hpp"
 #include "coordinator/page/page_access.hpp"
 
 namespace proofmass::coordinator {
+
+/// Where the thread of a service leaves snapshots for the thread of a page. The service makes one a
+/// second at most, and none if nobody has asked for 30 s, so that a page at which nobody looks
+/// costs nothing. Any thread may call the functions. Times are of the steady clock.
+class SnapshotBoard {
+ public:
+  static constexpr std::chrono::milliseconds interval{1000};
+  static constexpr std::chrono::milliseconds wanted_for{30'000};
+  static constexpr std::chrono::milliseconds age_max{1500};
+
+  explicit SnapshotBoard(TimePoint now) : turned_at_(now) {}
+
+  /// Asks for snapshots of this depth.
+  /// @return The newest one if it is that deep and not older than `age_max`; else null: a new one
+  ///         comes with the next turn of the service.
+  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> want(SnapshotDepth depth, TimePoint now);
+
+  /// However old it is; null before the first.
+  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> newest() const;
+
+  /// To be called in each turn of the service's loop.
+  /// @param take  Makes a snapshot; called if one is wanted.
+  void on_turn(TimePoint now, const std::function<ServiceSnapshot(SnapshotDepth)>& take);
+
+  /// Since the last turn, or since the board was made.
+  [[nodiscard]] Duration since_turn(TimePoint now) const;
+
+ private:
+  [[nodiscard]] bool is_wanted(const std::optional<TimePoint>& asked_at, TimePoint now) const {
+    return asked_at && now - *asked_at < wanted_for;
+  }
+
+  mutable std::mutex mutex_;
+  TimePoint turned_at_;
+  std::optional<TimePoint> asked_at_;              ///< For any snapshot.
+  std::optional<TimePoint> asked_for_workers_at_;  ///< For one with workers.
+  bool is_urgent_ = false;  ///< Somebody waits: the newest is too old or lacks the workers.
+  SnapshotDepth newest_depth_ = SnapshotDepth::without_workers;
+  /// Shared with answers that are being made of it.
+  std::shared_ptr<const ServiceSnapshot> newest_;
+};
+
+/// Which address has which answer; README.md lists them. All members but the access may be used
+/// from the thread of the page only.
+struct PageSite {
+  PageAccess access{std::nullopt};
+  SnapshotBoard* board = nullptr;  ///< Outlives the site; not null.
+  /// As DetailReader::details().
+  std::function<std::shared_ptr<const CampaignDetails>(const CampaignRecord&, TimePoint)> details;
+  std::function<HttpCounts()> counts;  ///< Of the server.
+  std::function<TimePoint()> now;      ///< Steady clock.
+
+  /// As HttpServer::Handler.
+  [[nodiscard]] std::optional<HttpAnswer> answer(const HttpRequest& request,
+                                                 HttpServer::Patience patience) const;
+};
+
+/// What the kernel says of this process.
+struct ProcessFigures {
+  double cpu_s = 0.0;
+  std::uint64_t resident_size = 0;  ///< Bytes.
+  std::uint64_t virtual_size = 0;   ///< Bytes.
+  std::uint64_t num_descriptors = 0;
+  std::uint64_t num_descriptors_max = 0;
+  double start_unix_s = 0.0;
+};
+
+/// The figures of this moment. What cannot be read is 0.
+[[nodiscard]] ProcessFigures process_figures();
+
+/// Campaigns that have metrics of their own, so that the number of series is bounded; how many are
+/// left out is one of the metrics.
+inline constexpr std::size_t campaigns_with_metrics_max = 200;
+
+/// All metrics in Prometheus' text format 0.0.4. README.md names those that deserve an
+/// alert.
+[[nodiscard]] std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
+                                       const ProcessFigures& process, const HttpCounts& page);
+
+/// A label's value with backslash, quote and end of line escaped, and what is not UTF-8 visible.
+[[nodiscard]] std::string label_value(std::string_view text);
 
 /// Settings of a live page.
 struct PageConfig {
@@ -19,8 +106,7 @@ struct PageConfig {
   std::optional<std::filesystem::path> token_file = {};
 
   /// @throws InvalidArgument `page = HOST:PORT (rule)` if such an address has no token; Error if
-  /// the
-  ///         token file cannot be used.
+  ///         the token file cannot be used.
   void validate() const;
 };
 
@@ -28,13 +114,13 @@ struct PageConfig {
 [[nodiscard]] std::uint64_t page_descriptors_max();
 
 /// The live page of a service: an HTTP server in a thread of its own and a thread that reads
-/// campaign databases. Neither touches the service: on_turn() hands them snapshots.
+/// campaign databases, for whose end the destructor waits. Neither touches the service: on_turn()
+/// hands them snapshots.
 class Page {
  public:
   /// Listens. Warns if other machines can reach the address, because nothing is encrypted.
   /// @throws Error as PageConfig::validate() does, or if the address cannot be used.
   Page(const PageConfig& config, const Log& log);
-  ~Page();  ///< Waits for a database that is being read.
   Page(const Page&) = delete;
   Page& operator=(const Page&) = delete;
 
@@ -44,8 +130,11 @@ class Page {
   [[nodiscard]] std::string url() const;  ///< `http://127.0.0.1:5557/`
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  PageAddress address_;
+  SnapshotBoard board_;
+  DetailReader reader_;
+  PageSite site_;
+  std::unique_ptr<HttpServer> server_;  ///< Ends before what it uses.
 };
 
 }  // namespace proofmass::coordinator

@@ -1,10 +1,9 @@
 #include <string>
 
-#include "coordinator/page/page_layout.hpp"
-#include "coordinator/report/review_documents.hpp"
+#include "coordinator/page/page_views.hpp"
+#include "coordinator/report/report.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 // Beside review_style(). The colours have a contrast of 4.5 at least, in both themes.

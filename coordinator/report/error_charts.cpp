@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review_charts.hpp"
-#include "coordinator/report/review_tables.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -32,6 +32,11 @@ struct QuantityFigures {
   std::vector<ConvergencePoint> convergence;  ///< At most 42, the last of all runs.
 };
 
+/// Adds a value to the largest ones, in descending order, if it is one of these; of equal ones the
+/// first stays.
+/// @param count  Of those that are kept; at least 1.
+void keep_largest(const RunValue& candidate, std::size_t count, std::vector<RunValue>& largest);
+
 /// For draws that are not independent.
 void leave_out_intervals(QuantityFigures& figures);
 

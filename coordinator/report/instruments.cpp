@@ -1,5 +1,3 @@
-#include "coordinator/report/instruments.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/figures.hpp"
 
@@ -40,7 +39,10 @@ void RunningInstruments::add(const RunResult& run) {
   const Runs runs = groups_.add(run);
   if (runs.empty()) return;
   add_objectives(runs);
-  for (std::size_t i = 0; i < objectives_.size(); ++i) add_shares(runs, i);
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    const auto is_miss = [&](const RunResult& of) { return is_beyond(of, i, objectives_[i]); };
+    quantities_[i].beyond.add(count_of(runs, is_miss));
+  }
   if (!std::ranges::all_of(runs, &RunResult::is_completed)) {
     ++counts_.num_not_estimated;
     return;
@@ -64,12 +66,6 @@ void RunningInstruments::add_objectives(Runs runs) {
   }
   if (num_within == counts_.temporal) ++counts_.num_temporal;
   ++counts_.num_instruments;
-}
-
-void RunningInstruments::add_shares(Runs runs, std::size_t i) {
-  Quantity& quantity = quantities_[i];
-  quantity.beyond.add(
-      count_of(runs, [&](const RunResult& run) { return is_beyond(run, i, objectives_[i]); }));
 }
 
 void RunningInstruments::add_values(Runs runs, std::size_t i) {
@@ -177,14 +173,11 @@ std::string temporal_text(const InstrumentStatistics& statistics) {
 }
 
 Table no_instruments(const InstrumentStatistics& statistics) {
-  Table table{.id = "variance-table",
-              .caption = "Variance between instruments and within",
-              .columns = {{"instruments", true}}};
-  if (statistics.realisations > 0) {
-    table.rows.push_back(
-        {fmt::format("none of which all {} realisations are finished", statistics.realisations)});
-  }
-  return table;
+  return {.id = "variance-table",
+          .caption = "Variance between instruments and within",
+          .columns = {{"instruments", true}},
+          .rows = {Row{fmt::format("none of which all {} realisations are finished",
+                                   statistics.realisations)}}};
 }
 
 Row variance_row(const proofmass::Quantity& quantity, const InstrumentQuantity& of) {

@@ -1,5 +1,3 @@
-#include "coordinator/report/replicates.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/figures.hpp"
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 
@@ -30,7 +31,20 @@ namespace proofmass::coordinator {
 /// programs, with the verification matrix: in full precision and SI units.
 /// coordinator/cli/README.md lists the keys.
 /// @param stated  The requirements whose answers are listed beside the matrix, which has them.
-[[nodiscard]] std::string report_json(const Review& review,
-                                      std::span<const StatedRequirement> stated = {});
+[[nodiscard]] nlohmann::ordered_json report_json(const Review& review,
+                                                 std::span<const StatedRequirement> stated = {});
+
+/// The report of a review as one page of HTML, which needs no other file, no network and no script
+/// and allows none. It begins with review_summary() and the verification matrix. The same bytes for
+/// the same review.
+[[nodiscard]] std::string review_html(const Review& review);
+
+/// The style that html_table() and embedded charts need: rules of CSS without their element.
+/// Colours are custom properties, for light and dark.
+[[nodiscard]] std::string review_style();
+
+/// The matrix and the tables of a review report in Markdown (CommonMark with tables), without
+/// charts.
+[[nodiscard]] std::string review_markdown(const Review& review);
 
 }  // namespace proofmass::coordinator

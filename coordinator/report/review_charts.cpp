@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/review_tables.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {

@@ -6,14 +6,16 @@
 #include <cmath>
 #include <utility>
 
-#include "coordinator/report/digest.hpp"
 #include "coordinator/report/json.hpp"
-#include "coordinator/report/review_tables.hpp"
-#include "coordinator/report/status_json.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "core/statistics/correlation.hpp"
+#include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
+#include "core/statistics/sensitivity.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -205,13 +207,15 @@ std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows,
   return std::span(rows).first(std::min(count, rows.size()));
 }
 
-std::size_t position_of(const DrawnRuns& drawn, RunIndex run) {
-  const auto found = std::ranges::lower_bound(drawn.runs, run);
-  if (found == drawn.runs.end() || *found != run) {
+/// Nothing if no run is asked for.
+std::optional<std::size_t> position_of(const DrawnRuns& drawn, std::optional<RunIndex> run) {
+  if (!run) return std::nullopt;
+  const auto found = std::ranges::lower_bound(drawn.runs, *run);
+  if (found == drawn.runs.end() || *found != *run) {
     const std::string last =
         drawn.last_with_estimate ? fmt::to_string(drawn.last_with_estimate->value) : "none";
     throw InvalidArgument(fmt::format("run = {} (must have an estimate, as {} runs up to {} have)",
-                                      run.value, drawn.num_with_estimate, last));
+                                      run->value, drawn.num_with_estimate, last));
   }
   return static_cast<std::size_t>(found - drawn.runs.begin());
 }
@@ -225,33 +229,28 @@ std::size_t rank_of(const std::vector<double>& errors, std::size_t position) {
 
 Json json_of(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
              std::optional<std::size_t> position) {
-  Json json = Json::array();
-  for (const Sensitivity& row : rows) {
+  return array_of(rows, [&](const Sensitivity& row) -> Json {
     const FirstOrderIndex& index = row.first_order;
-    Json entry{{"quantity", drawn.names[row.input]}, {"fraction_of_variance", index.index},
-               {"interval", index.interval},         {"rank_correlation", row.rank_correlation},
-               {"p_value", row.adjusted_p_value},    {"run_value", nullptr},
-               {"run_percentile", nullptr}};
-    if (position) {
-      const std::vector<double>& values = drawn.columns[row.input];
-      entry["run_value"] = values[*position];
-      entry["run_percentile"] = percentile_of(values, values[*position]);
-    }
-    json.push_back(std::move(entry));
-  }
-  return json;
+    const std::vector<double>& values = drawn.columns[row.input];
+    return {{"quantity", drawn.names[row.input]},
+            {"fraction_of_variance", index.index},
+            {"interval", index.interval},
+            {"rank_correlation", row.rank_correlation},
+            {"p_value", row.adjusted_p_value},
+            {"run_value", position ? Json(values[*position]) : Json(nullptr)},
+            {"run_percentile",
+             position ? Json(percentile_of(values, values[*position])) : Json(nullptr)}};
+  });
 }
 
 Json json_of_terms(const DrawnRuns& drawn, std::size_t quantity) {
-  Json json = Json::array();
-  for (const ExplanatoryTerm& term : terms_of(drawn, quantity)) {
-    json.push_back({{"quantity", drawn.names[term.first]},
-                    {"times", term.second ? Json(drawn.names[*term.second]) : Json(nullptr)},
-                    {"slope", term.slope},
-                    {"fraction_of_variance", term.share},
-                    {"p_value", term.p_value}});
-  }
-  return json;
+  return array_of(terms_of(drawn, quantity), [&](const ExplanatoryTerm& term) -> Json {
+    return {{"quantity", drawn.names[term.first]},
+            {"times", term.second ? Json(drawn.names[*term.second]) : Json(nullptr)},
+            {"slope", term.slope},
+            {"fraction_of_variance", term.share},
+            {"p_value", term.p_value}};
+  });
 }
 
 }  // namespace
@@ -308,47 +307,37 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
 }
 
 std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
-                             std::optional<std::size_t> num_rows, Paint paint) {
+                             std::optional<RunIndex> run, std::optional<std::size_t> num_rows,
+                             Paint paint) {
   const TerminalStyle style = document_style(paint);
-  const auto both = sensitivities_of(drawn, quantity);
-  const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
-  Table drivers = driver_table(drawn, of_error, "error", std::nullopt);
-  if (!of_error.empty() || !of_magnitude.empty()) {
-    drivers.notes.push_back("% of variance: with its 95 % interval; rank: rank correlation; " +
-                            note_of_p(both[1].size(), drawn.errors.size()));
-  }
-  return fmt::format(
-      "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", drawn.quantities[quantity].symbol, drawn.runs.size(),
-      limit_line(drawn), left_out(drawn),
-      terminal_text(driver_table(drawn, of_magnitude, "|error|", std::nullopt), style),
-      terminal_text(drivers, style), terminal_text(term_table(drawn, quantity, {}), style),
-      worst_run_text(drawn, quantity, !of_error.empty() || !of_magnitude.empty()));
-}
-
-std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
-                             std::optional<std::size_t> num_rows, Paint paint) {
-  const TerminalStyle style = document_style(paint);
-  const std::size_t position = position_of(drawn, run);
   const Quantity& info = drawn.quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];
+  const std::optional<std::size_t> position = position_of(drawn, run);
   const auto both = sensitivities_of(drawn, quantity);
   const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
+  const bool has_rows = !of_error.empty() || !of_magnitude.empty();
   Table drivers = driver_table(drawn, of_error, "error", position);
-  if (!of_error.empty() || !of_magnitude.empty()) {
-    drivers.notes.push_back("% below: of the runs; " +
-                            note_of_p(both[1].size(), drawn.errors.size()));
+  if (has_rows) {
+    drivers.notes.push_back(
+        (position ? "% below: of the runs; "
+                  : "% of variance: with its 95 % interval; rank: rank correlation; ") +
+        note_of_p(both[1].size(), drawn.errors.size()));
   }
-  return fmt::format("Run {}: error of {} {}, rank {} of {}\n{}{}\n{}\n{}\n{}", run.value,
-                     info.symbol, quantity_text(errors[position], info), rank_of(errors, position),
-                     errors.size(), limit_line(drawn), left_out(drawn),
+  const std::string heading = position
+                                  ? fmt::format("Run {}: error of {} {}, rank {} of {}", run->value,
+                                                info.symbol, quantity_text(errors[*position], info),
+                                                rank_of(errors, *position), errors.size())
+                                  : fmt::format("{}: {} runs", info.symbol, errors.size());
+  return fmt::format("{}\n{}{}\n{}\n{}\n{}{}", heading, limit_line(drawn), left_out(drawn),
                      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
                      terminal_text(drivers, style),
-                     terminal_text(term_table(drawn, quantity, position), style));
+                     terminal_text(term_table(drawn, quantity, position), style),
+                     position ? "" : "\n" + worst_run_text(drawn, quantity, has_rows));
 }
 
 std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,
                               std::span<const double> objectives) {
-  const std::size_t position = position_of(drawn, run);
+  const std::size_t position = *position_of(drawn, run);
   // Where no parameter has an objective, the rank among the runs decides.
   const auto badness = [&](std::size_t quantity) {
     const std::vector<double>& errors = drawn.errors[quantity];
@@ -369,36 +358,99 @@ std::string choice_text(const DrawnRuns& drawn, RunIndex run, std::span<const do
     return fmt::format("Of {}, no parameter having an objective: that of the highest rank\n", name);
   }
   const double ratio =
-      std::abs(drawn.errors[quantity][position_of(drawn, run)]) / objectives[quantity];
+      std::abs(drawn.errors[quantity][*position_of(drawn, run)]) / objectives[quantity];
   return fmt::format(
       "Of {}, as its error is the largest beside its objective: {:.3g} times that\n"
       "(another parameter: --parameter NAME)\n",
       name, ratio);
 }
 
-std::string sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quantities,
-                             std::optional<RunIndex> run, std::optional<std::size_t> num_rows) {
-  std::optional<std::size_t> position;
-  if (run) position = position_of(drawn, *run);
-  Json json{{"run", run ? Json(run->value) : Json(nullptr)},
-            {"num_runs", drawn.runs.size()},
-            {"num_with_estimate", drawn.num_with_estimate},
-            {"confidence", default_confidence},
-            {"parameters", Json::array()}};
-  for (const std::size_t quantity : quantities) {
+Json sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quantities,
+                      std::optional<RunIndex> run, std::optional<std::size_t> num_rows) {
+  const std::optional<std::size_t> position = position_of(drawn, run);
+  const auto of_quantity = [&](std::size_t quantity) -> Json {
     const std::vector<double>& errors = drawn.errors[quantity];
     const auto both = sensitivities_of(drawn, quantity);
-    json["parameters"].push_back(
-        {{"parameter", drawn.quantities[quantity].name},
-         {"unit", drawn.quantities[quantity].unit},
-         {"worst_run", worst_run_of(drawn, quantity).value},
-         {"run_error", position ? Json(errors[*position]) : Json(nullptr)},
-         {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},
-         {"drives_magnitude", json_of(drawn, first_of(both[1], num_rows), position)},
-         {"drives_error", json_of(drawn, first_of(both[0], num_rows), position)},
-         {"terms", json_of_terms(drawn, quantity)}});
+    return {{"parameter", drawn.quantities[quantity].name},
+            {"unit", drawn.quantities[quantity].unit},
+            {"worst_run", worst_run_of(drawn, quantity).value},
+            {"run_error", position ? Json(errors[*position]) : Json(nullptr)},
+            {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},
+            {"drives_magnitude", json_of(drawn, first_of(both[1], num_rows), position)},
+            {"drives_error", json_of(drawn, first_of(both[0], num_rows), position)},
+            {"terms", json_of_terms(drawn, quantity)}};
+  };
+  return {{"run", run ? Json(run->value) : Json(nullptr)},
+          {"num_runs", drawn.runs.size()},
+          {"num_with_estimate", drawn.num_with_estimate},
+          {"confidence", default_confidence},
+          {"parameters", array_of(quantities, of_quantity)}};
+}
+
+namespace {
+
+constexpr std::size_t num_correlated_of_each = 3;
+
+using Correlations = std::vector<std::optional<double>>;  // With the error of each quantity.
+
+Correlations correlations_of(std::span<const double> input, const DrawnRuns& drawn) {
+  Correlations correlations;
+  const double least = 4.0 / std::sqrt(static_cast<double>(input.size()));
+  for (const std::vector<double>& errors : drawn.errors) {
+    correlations.push_back(linear_correlation(input, errors));
+    if (correlations.back() && std::abs(*correlations.back()) < least) correlations.back().reset();
   }
-  return dumped(json, JsonLayout::indented);
+  return correlations;
+}
+
+void add_input(Causes& causes, const std::string& name, Correlations correlations) {
+  if (std::ranges::find(causes.inputs, name) != causes.inputs.end()) return;
+  causes.inputs.push_back(name);
+  causes.correlations.push_back(std::move(correlations));
+}
+
+void add_terms(const DrawnRuns& drawn, std::size_t quantity, Causes& causes) {
+  for (const ExplanatoryTerm& term : terms_of(drawn, quantity)) {
+    const std::string name = term_name(drawn, term);
+    causes.terms.push_back({quantity, name, term});
+    add_input(causes, name, correlations_of(values_of_term(drawn, term), drawn));
+  }
+}
+
+/// The columns that correlate the most with the error of a quantity.
+void add_correlated(const DrawnRuns& drawn, std::size_t quantity,
+                    std::span<const Correlations> of_columns, Causes& causes) {
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < of_columns.size(); ++i) {
+    if (const auto& coefficient = of_columns[i][quantity]) {
+      ranked.emplace_back(-std::abs(*coefficient), i);
+    }
+  }
+  std::ranges::sort(ranked);
+  if (ranked.size() > num_correlated_of_each) ranked.resize(num_correlated_of_each);
+  for (const auto& [strength, column] : ranked) {
+    add_input(causes, drawn.names[column], of_columns[column]);
+  }
+}
+
+}  // namespace
+
+std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) {
+  DrawnRuns drawn = read_drawn_runs(store, campaign, cause_runs_max);
+  if (drawn.runs.size() < sensitivity_values_min) return std::nullopt;
+  const std::vector<Quantity>& quantities = drawn.quantities;
+  for (const Quantity& quantity : quantities) {  // A truth that is drawn itself has no column.
+    const std::string of_truth = "truth_" + quantity.column();
+    std::ranges::replace(drawn.names, of_truth, fmt::format("true {}", quantity.symbol));
+  }
+  Causes causes{.num_runs = drawn.runs.size(), .num_with_estimate = drawn.num_with_estimate};
+  std::vector<Correlations> of_columns;
+  for (const auto& column : drawn.columns) of_columns.push_back(correlations_of(column, drawn));
+  for (std::size_t i = 0; i < drawn.errors.size(); ++i) add_terms(drawn, i, causes);
+  for (std::size_t i = 0; i < drawn.errors.size(); ++i) {
+    add_correlated(drawn, i, of_columns, causes);
+  }
+  return causes;
 }
 
 }  // namespace proofmass::coordinator

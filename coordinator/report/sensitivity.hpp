@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -64,27 +65,22 @@ inline constexpr std::size_t num_rows_by_default = 5;
 
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`
 /// of sensitivities() of each, see num_rows_by_default, and the error as a sum of
-/// explanatory_terms(), and how to ask why the worst run is so. Lines have at most 80 characters.
-/// @throws InvalidArgument below 16 runs.
+/// explanatory_terms(), and how to ask why the worst run is so. Of a run, why it is as far off as
+/// it is: the place of its |error| among the runs, its values of these quantities, each with its
+/// percentile, and what the terms add to its error. Lines have at most 80 characters.
+/// @throws InvalidArgument below 16 runs, or if the run is not among them.
 [[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
+                                           std::optional<RunIndex> run = {},
                                            std::optional<std::size_t> num_rows = {},
                                            Paint paint = Paint::no);
 
-/// Why a run is as far off as it is: the place of its |error| among the runs, and its values of the
-/// quantities that drive |error| and error of the parameter, each with its percentile, and what the
-/// terms add to its error.
-/// @throws InvalidArgument if the run is not among those, or they are below 16.
-[[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
-                                           RunIndex run, std::optional<std::size_t> num_rows = {},
-                                           Paint paint = Paint::no);
-
-/// Both for programs, of these parameters, in full precision and SI units; of the run's values only
+/// That for programs, of these parameters, in full precision and SI units; of the run's values only
 /// if there is one. coordinator/cli/README.md lists the keys.
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
-[[nodiscard]] std::string sensitivity_json(const DrawnRuns& drawn,
-                                           std::span<const std::size_t> quantities,
-                                           std::optional<RunIndex> run,
-                                           std::optional<std::size_t> num_rows = {});
+[[nodiscard]] nlohmann::ordered_json sensitivity_json(const DrawnRuns& drawn,
+                                                      std::span<const std::size_t> quantities,
+                                                      std::optional<RunIndex> run,
+                                                      std::optional<std::size_t> num_rows = {});
 
 /// The parameter whose |error| is the largest in units of its objective; of those without
 /// objectives, the one for which the |error| has the highest rank.

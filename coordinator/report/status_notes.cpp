@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "coordinator/report/json.hpp"
 #include "coordinator/table/figures.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
@@ -57,10 +58,12 @@ Remark comparison_note(const proto::CampaignStatus& campaign) {
 
 }  // namespace
 
-std::string models_text(std::set<std::string> versions, const std::string& of_coordinator) {
+std::string service_line(const proto::StatusReply& status, std::set<std::string> versions) {
   versions.erase("");
-  if (versions.empty()) versions.insert(of_coordinator);
-  return fmt::format("model{} {}", versions.size() > 1 ? "s" : "", fmt::join(versions, ", "));
+  if (versions.empty()) versions.insert(status.model_version());
+  return fmt::format("Proofmass {}, model{} {}, up {}", status.version(),
+                     versions.size() > 1 ? "s" : "", fmt::join(versions, ", "),
+                     duration_text(status.uptime_s()));
 }
 
 std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
@@ -137,6 +140,84 @@ std::vector<Remark> service_notes(const proto::StatusReply& status) {
     add(factory_note(factory), Tone::plain);
   }
   return notes;
+}
+
+namespace {
+
+/// Null where there is nothing to say.
+Json or_null(bool is_known, double value) { return is_known ? Json(value) : Json(nullptr); }
+
+Json factory_object(const proto::FactoryStatus& factory) {
+  const proto::FactoryReport& report = factory.report();
+  const bool is_waiting = report.phase() == proto::FACTORY_PHASE_WAITING;
+  return {{"name", report.name()},
+          {"batch_system", report.batch_system()},
+          {"phase", wire::name_of(report.phase())},
+          {"num_wanted", report.num_wanted()},
+          {"num_registered", report.num_registered()},
+          {"num_queued", report.num_queued()},
+          {"wait_s", or_null(is_waiting, report.wait_s())},
+          {"reason", text_or_null(report.reason())},
+          {"interval_s", report.interval_s()},
+          {"silent_s", factory.silent_s()},
+          {"owner", text_or_null(factory.owner())}};
+}
+
+Json campaign_object(const proto::CampaignStatus& campaign) {
+  Json json{{"name", campaign.name()},
+            {"phase", wire::phase_name(campaign)},
+            {"priority", campaign.priority()}};
+  for (const CampaignCounter& counter : campaign_counters()) {
+    json[std::string(counter.name)] = (campaign.*counter.count)();
+  }
+  json.update({{"rate_hz", campaign.rate_hz()},
+               {"remaining_s", or_null(campaign.has_remaining_s(), campaign.remaining_s())},
+               {"storage_failure", text_or_null(campaign.storage_failure())},
+               {"model_version", text_or_null(campaign.model_version())},
+               {"missing_model", text_or_null(campaign.missing_model())},
+               {"crashes_everywhere", campaign.crashes_everywhere()},
+               {"owner", text_or_null(campaign.owner())}});
+  return json;
+}
+
+Json worker_object(const proto::WorkerStatus& worker) {
+  return {{"worker_id", worker.worker_id()},
+          {"name", worker.name()},
+          {"host", worker.host()},
+          {"process_id", worker.process_id()},
+          {"num_slots", worker.num_slots()},
+          {"num_lent", worker.num_lent()},
+          {"num_results", worker.num_results()},
+          {"silent_s", worker.silent_s()},
+          {"is_quarantined", worker.is_quarantined()},
+          {"cards", text_or_null(worker.cards())},
+          {"card_rate_hz", or_null(worker.card_rate_hz() > 0.0, worker.card_rate_hz())}};
+}
+
+}  // namespace
+
+Json status_json(const proto::StatusReply& status) {
+  const auto of_file = [](const proto::UnservedFile& file) -> Json {
+    return {{"file", file.file()}, {"reason", file.reason()}};
+  };
+  return {{"version", status.version()},
+          {"model_version", status.model_version()},
+          {"uptime_s", status.uptime_s()},
+          {"num_workers", status.num_workers()},
+          {"num_slots", status.num_slots()},
+          {"campaigns", array_of(status.campaigns(), campaign_object)},
+          {"unserved_files", array_of(status.unserved_files(), of_file)},
+          {"num_unserved_files", status.num_unserved_files()},
+          {"quarantined_hosts", status.quarantined_hosts()},
+          {"num_quarantined_hosts", status.num_quarantined_hosts()},
+          {"num_refusals", status.num_refusals()},
+          {"last_refusal", text_or_null(status.last_refusal())},
+          {"last_refusal_s", or_null(status.num_refusals() > 0, status.last_refusal_s())},
+          {"factories", array_of(status.factories(), factory_object)}};
+}
+
+Json workers_json(const proto::WorkersReply& workers) {
+  return {{"workers", array_of(workers.workers(), worker_object)}};
 }
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <set>
 #include <span>
 #include <string>
@@ -33,11 +34,10 @@ struct CampaignCounter {
 /// Of the campaign's runs.
 [[nodiscard]] std::uint64_t percent_done(const proto::CampaignStatus& campaign);
 
-/// `model a-1`, or `models a-1, b-2`.
-/// @param versions        Of the campaigns; empty for one that an older coordinator serves.
-/// @param of_coordinator  Of its built-in model, which stands there if no other is known.
-[[nodiscard]] std::string models_text(std::set<std::string> versions,
-                                      const std::string& of_coordinator);
+/// `Proofmass 0.9, models a-1, b-2, up 3 min 20 s`; the built-in model if no other is known.
+/// @param versions  Of the campaigns' models; empty for one that an older coordinator serves.
+[[nodiscard]] std::string service_line(const proto::StatusReply& status,
+                                       std::set<std::string> versions);
 
 /// About a campaign.
 [[nodiscard]] std::vector<Remark> notes_about(const proto::CampaignStatus& campaign);
@@ -45,5 +45,11 @@ struct CampaignCounter {
 /// About the coordinator itself: files that are not served, refused workers, hosts in quarantine,
 /// factories.
 [[nodiscard]] std::vector<Remark> service_notes(const proto::StatusReply& status);
+
+// How a coordinator stands, for programs: JSON objects with stable keys, units in their names.
+// coordinator/cli/README.md lists them.
+
+[[nodiscard]] nlohmann::ordered_json status_json(const proto::StatusReply& status);
+[[nodiscard]] nlohmann::ordered_json workers_json(const proto::WorkersReply& workers);
 
 }  // namespace proofmass::coordinator

@@ -36,10 +36,9 @@ StopCheck check_with(const StopRule& rule, const Store& store, std::span<const d
   return check_stop_rule(rule, errors);
 }
 
-/// The one with the most runs; empty without a rule.
+/// The one with the most runs.
 std::optional<StopCheckRow> last_check(const Store& store, const StopPlan& plan) {
   std::optional<StopCheckRow> last;
-  if (plan.stop_rule.empty()) return last;
   for (const StopCheckRow& row : store.stop_checks()) {
     if (row.statistic == statistic_of(plan.stop_rule)) last = row;
   }
@@ -200,47 +199,37 @@ std::string width_text(const StopRule& rule, const StopCheckRow& row) {
 
 }  // namespace
 
-bool lacks_stop_check(const Store& store) {
-  const StopPlan plan = store.stop_plan();
-  if (plan.stop_rule.empty()) return false;
-  const auto check = last_check(store, plan);
-  return !check || check->num_runs < store.num_runs();
-}
-
 std::optional<StopOutcome> stop_outcome(const Store& store) {
   const StopPlan plan = store.stop_plan();
   if (plan.stop_rule.empty()) return std::nullopt;
   StopOutcome outcome{.rule = plan.stop_rule, .check = last_check(store, plan), .is_missed = true};
   if (!outcome.check) return outcome;
   const StopRule rule = parse_stop_rule(plan.stop_rule, store.schema());
-  const bool is_reached = outcome.check->check.is_reached;
-  bool holds = is_reached;
-  outcome.answer = is_reached ? "reached" : "not reached";
+  const StopCheckRow& row = *outcome.check;
+  bool holds = row.check.is_reached;
   if (rule.statistic == StopRule::Statistic::verdict) {
-    const RequirementVerdict verdict = verdict_of(rule, outcome.check->check);
+    const RequirementVerdict verdict = verdict_of(rule, row.check);
     holds = verdict == RequirementVerdict::met;
     outcome.answer = name_of(verdict);
+    outcome.text = fmt::format("Stopping  {}\n{}", outcome.rule, verdict_text(rule, row));
+  } else {
+    outcome.answer = holds ? "reached" : "not reached";
+    outcome.text =
+        fmt::format("Stopping  {} {}          after {} runs; {}: {}\n", statistic_of(outcome.rule),
+                    width_text(rule, row), row.num_runs, outcome.rule, outcome.answer);
   }
-  outcome.is_missed = !holds || outcome.check->num_runs < store.num_runs();
+  outcome.is_missed = !holds || row.num_runs < store.num_runs();
   return outcome;
+}
+
+bool lacks_stop_check(const Store& store) {
+  const std::optional<StopOutcome> outcome = stop_outcome(store);
+  return outcome && (!outcome->check || outcome->check->num_runs < store.num_runs());
 }
 
 bool is_rule_missed(const Store& store) {
   const std::optional<StopOutcome> outcome = stop_outcome(store);
   return outcome && outcome->is_missed;
-}
-
-std::string stop_text(const Store& store) {
-  const StopPlan plan = store.stop_plan();
-  const auto check = last_check(store, plan);
-  if (!check) return "";
-  const StopRule rule = parse_stop_rule(plan.stop_rule, store.schema());
-  if (rule.statistic == StopRule::Statistic::verdict) {
-    return fmt::format("Stopping  {}\n{}", plan.stop_rule, verdict_text(rule, *check));
-  }
-  return fmt::format("Stopping  {} {}          after {} runs; {}: {}\n",
-                     statistic_of(plan.stop_rule), width_text(rule, *check), check->num_runs,
-                     plan.stop_rule, check->check.is_reached ? "reached" : "not reached");
 }
 
 }  // namespace proofmass::coordinator

@@ -39,20 +39,18 @@ std::optional<std::uint64_t> summarise_file(
 /// differences.
 void check_stop_checks(const Store& store, std::span<const double> objectives);
 
-/// What came of a campaign's stop rule, for programs.
+/// What came of a campaign's stop rule.
 struct StopOutcome {
   std::string rule = {};                   ///< As it was given.
   std::optional<StopCheckRow> check = {};  ///< That with the most runs; empty if there was none.
   std::string answer = {};  ///< `reached` or `not reached`, or that of a requirement; or empty.
-  bool is_missed = false;   ///< See is_rule_missed().
+  /// Lines of at most 80 characters unless the rule is longer; empty if it was not checked.
+  std::string text = {};
+  bool is_missed = false;  ///< See is_rule_missed().
 };
 
 /// Empty without a rule.
 [[nodiscard]] std::optional<StopOutcome> stop_outcome(const Store& store);
-
-/// What came of a campaign's stop rule, in lines of at most 80 characters unless the rule is
-/// longer; empty if there is none or it was not checked.
-[[nodiscard]] std::string stop_text(const Store& store);
 
 /// True if a campaign has a stop rule that was not checked with as many runs as the campaign is to
 /// have for now.

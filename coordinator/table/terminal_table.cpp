@@ -59,9 +59,53 @@ std::string without_end_blanks(std::string line) {
 /// Writes one table. Columns that are for documents alone are left out from the beginning.
 class TerminalTable {
  public:
-  TerminalTable(const Table& table, const TerminalStyle& style);
+  TerminalTable(const Table& table, const TerminalStyle& style) : table_(table), style_(style) {
+    for (std::size_t i = 0; i < table.columns.size(); ++i) {
+      const Column& column = table.columns[i];
+      if (column.is_for_documents) continue;
+      ShownColumn shown{.column = &column, .index = i};
+      if (!shown.has_own_width() && !columns_.empty()) shown.lead = gap;
+      const std::size_t blanks = shown.has_own_width() ? 1 : shown.lead;
+      shown.width = column.width;
+      const auto make_room = [&](const std::string& text, std::size_t before) {
+        const std::string visible = wire::visible_text(text);
+        const std::size_t width = display_width(visible);
+        shown.width = std::max(shown.width, width + before);
+        shown.needed =
+            std::max(shown.needed, (column.is_text ? longest_word(visible) : width) + before);
+      };
+      const bool is_beside_number =
+          !columns_.empty() && !columns_.back().column->is_text && !column.is_after_line;
+      make_room(column.title, column.is_text || is_beside_number ? blanks : shown.lead);
+      for (const Row& row : table.rows) make_room(row[i].text, blanks);
+      columns_.push_back(shown);
+    }
+    widen_for_groups();
+    fit();
+  }
 
-  [[nodiscard]] std::string text() const;
+  [[nodiscard]] std::string text() const {
+    std::string text;
+    if (!table_.caption.empty()) text += wire::visible_text(table_.caption) + "\n\n";
+    if (are_rows_records_) {
+      text += records();
+    } else if (!columns_.empty()) {
+      text += heading();
+      for (const Row& cells : table_.rows) {
+        if (table_.has_total && &cells == &table_.rows.back()) text += rule();
+        text += row(cells);
+      }
+    }
+    for (const Remark& remark : table_.remarks) {
+      std::string visible = wire::visible_text(remark.text);
+      if (style_.cuts_remarks) visible = shortened(visible, style_.line_width_max);
+      if (display_width(visible) > style_.line_width_max) visible = wrapped(visible, 2, 0);
+      text += in_tone(visible, remark.tone, style_.paint) + "\n";
+    }
+    for (const std::string& note : table_.notes)
+      text += wrapped(wire::visible_text(note), 2, 0) + "\n";
+    return text;
+  }
 
  private:
   /// What a table that is too wide does without, in turn: blanks before numbers; lines of several
@@ -89,215 +133,157 @@ class TerminalTable {
     }
   };
 
-  void widen_for_groups();
-  [[nodiscard]] bool continues_group(std::size_t i) const;
-  void fit();
-  [[nodiscard]] bool is_before_line(std::size_t i) const;
-  [[nodiscard]] std::vector<std::string> lines_in(const ShownColumn& shown, const Cell& cell) const;
-  [[nodiscard]] std::string cell(std::size_t i, const std::string& text, const Cell& cell) const;
-  [[nodiscard]] std::string row(const Row& cells) const;
-  [[nodiscard]] std::string groups() const;
-  [[nodiscard]] std::string rule() const;
-  [[nodiscard]] std::string heading() const;
-  [[nodiscard]] std::string records() const;
+  /// The last column of a group has the room that the columns before it lack for its heading.
+  void widen_for_groups() {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const std::size_t first = i;
+      std::size_t width = columns_[i].width;
+      while (continues_group(i + 1)) width += columns_[++i].width;
+      const std::size_t needed = display_width(columns_[first].column->group);
+      if (needed <= width) continue;
+      columns_[i].width += needed - width;
+      columns_[i].needed = columns_[i].width;
+    }
+  }
+
+  /// Whether a heading of the column before it goes on above it.
+  [[nodiscard]] bool continues_group(std::size_t i) const {
+    return i < columns_.size() && !columns_[i].column->is_after_line &&
+           columns_[i].column->group == columns_[i - 1].column->group;
+  }
+
+  // Takes from the widest column, one at a time.
+  void fit() {
+    std::size_t total = 0;
+    bool have_own_widths = false;
+    for (const ShownColumn& shown : columns_) {
+      total += shown.width + (shown.column->is_after_line ? 1 : 0);
+      have_own_widths = have_own_widths || shown.has_own_width();
+    }
+    // Rows that are written one at a time stay below one another: their numbers keep their places.
+    for (const Cut cut : {Cut::blanks, Cut::lines, Cut::words}) {
+      if (!style_.wraps_cells && cut != Cut::words) continue;
+      const auto to_spare = [&](const ShownColumn& shown) {
+        return shown.width > shown.width_min(cut) ? shown.width : 0;
+      };
+      while (total > style_.line_width_max) {
+        ShownColumn& widest = *std::ranges::max_element(columns_, {}, to_spare);
+        if (to_spare(widest) == 0) break;
+        --widest.width;
+        --total;
+      }
+    }
+    are_rows_records_ = total > style_.line_width_max && !have_own_widths && !table_.rows.empty();
+  }
+
+  [[nodiscard]] bool is_before_line(std::size_t i) const {
+    return i + 1 < columns_.size() && columns_[i + 1].column->is_after_line;
+  }
+
+  [[nodiscard]] std::vector<std::string> lines_in(const ShownColumn& shown,
+                                                  const Cell& cell) const {
+    const std::string text = wire::visible_text(cell.text);
+    const bool is_wrapped =
+        style_.wraps_cells && shown.column->is_text && display_width(text) > shown.room();
+    return is_wrapped ? broken(text, shown.room()) : std::vector{shortened(text, shown.room())};
+  }
+
+  /// One line of what a cell shows.
+  [[nodiscard]] std::string cell(std::size_t i, const std::string& text, const Cell& cell) const {
+    const ShownColumn& shown = columns_[i];
+    const std::size_t taken = shown.lead + display_width(text);
+    std::string blanks(shown.width > taken ? shown.width - taken : 0, ' ');
+    std::string line = shown.column->is_after_line ? "│" : "";
+    line.append(shown.lead, ' ');
+    const std::string painted = in_tone(text, cell.tone, style_.paint);
+    if (shown.column->is_text && !cell.value) return line + painted + blanks;
+    // One blank moves behind the number, unless it is what separates that from the column before
+    // it.
+    const std::size_t kept = shown.has_own_width() ? 1 : 0;
+    if (!is_before_line(i) || blanks.size() <= kept) return line + blanks + painted;
+    blanks.pop_back();
+    return line + blanks + painted + " ";
+  }
+
+  [[nodiscard]] std::string row(const Row& cells) const {
+    std::vector<std::vector<std::string>> shown;
+    std::size_t height = 0;
+    for (const ShownColumn& column : columns_) {
+      shown.push_back(lines_in(column, cells[column.index]));
+      height = std::max(height, shown.back().size());
+    }
+    std::string text;
+    for (std::size_t k = 0; k < height; ++k) {
+      std::string line;
+      for (std::size_t i = 0; i < columns_.size(); ++i) {
+        line += cell(i, k < shown[i].size() ? shown[i][k] : "", cells[columns_[i].index]);
+      }
+      text += without_end_blanks(std::move(line)) + "\n";
+    }
+    return text;
+  }
+
+  /// Each group in the middle of its columns; empty if no column has one.
+  [[nodiscard]] std::string groups() const {
+    std::string line;
+    bool has_group = false;
+    for (std::size_t i = 0; i < columns_.size();) {
+      const std::string& group = columns_[i].column->group;
+      if (columns_[i].column->is_after_line) line += "│";
+      std::size_t width = columns_[i].width;
+      while (continues_group(++i)) width += columns_[i].width;
+      const std::size_t taken = display_width(group);
+      line +=
+          left_aligned(std::string(width > taken ? (width - taken) / 2 : 0, ' ') + group, width);
+      has_group = has_group || !group.empty();
+    }
+    return has_group ? without_end_blanks(std::move(line)) + "\n" : "";
+  }
+
+  /// The horizontal line below the titles, up to the last one; the vertical lines cross it.
+  [[nodiscard]] std::string rule() const {
+    std::size_t count = columns_.size();
+    while (count > 0 && columns_[count - 1].column->title.empty()) --count;
+    std::string rule;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (columns_[i].column->is_after_line) rule += "┼";
+      rule.append(columns_[i].lead, ' ');
+      for (std::size_t k = columns_[i].lead; k < columns_[i].width; ++k) rule += "─";
+    }
+    return rule + "\n";
+  }
+
+  [[nodiscard]] std::string heading() const {
+    Row cells;
+    for (const Column& column : table_.columns) cells.emplace_back(column.title);
+    std::string titles = row(cells);
+    titles.pop_back();  // The end of the line is not painted.
+    return groups() + in_tone(titles, Tone::heading, style_.paint) + "\n" + rule();
+  }
+
+  [[nodiscard]] std::string records() const {
+    std::size_t name_width = 0;
+    for (const ShownColumn& shown : columns_) {
+      name_width = std::max(name_width, display_width(shown.column->title));
+    }
+    std::string text;
+    for (std::size_t row = 0; row < table_.rows.size(); ++row) {
+      text += fmt::format("row {}\n", row + 1);
+      for (const ShownColumn& shown : columns_) {
+        const Cell& cell = table_.rows[row][shown.index];
+        const std::string line = without_end_blanks(
+            fmt::format("  {}  {}", left_aligned(shown.column->title, name_width), cell.text));
+        text += (cell.value ? line : shortened(line, style_.line_width_max)) + "\n";
+      }
+    }
+    return text;
+  }
 
   const Table& table_;
   TerminalStyle style_;
   std::vector<ShownColumn> columns_;
   bool are_rows_records_ = false;  ///< No row fits in a line.
 };
-
-TerminalTable::TerminalTable(const Table& table, const TerminalStyle& style)
-    : table_(table), style_(style) {
-  for (std::size_t i = 0; i < table.columns.size(); ++i) {
-    const Column& column = table.columns[i];
-    if (column.is_for_documents) continue;
-    ShownColumn shown{.column = &column, .index = i};
-    if (!shown.has_own_width() && !columns_.empty()) shown.lead = gap;
-    const std::size_t blanks = shown.has_own_width() ? 1 : shown.lead;
-    shown.width = column.width;
-    const auto make_room = [&](const std::string& text, std::size_t before) {
-      const std::string visible = wire::visible_text(text);
-      const std::size_t width = display_width(visible);
-      shown.width = std::max(shown.width, width + before);
-      shown.needed =
-          std::max(shown.needed, (column.is_text ? longest_word(visible) : width) + before);
-    };
-    const bool is_beside_number =
-        !columns_.empty() && !columns_.back().column->is_text && !column.is_after_line;
-    make_room(column.title, column.is_text || is_beside_number ? blanks : shown.lead);
-    for (const Row& row : table.rows) make_room(row[i].text, blanks);
-    columns_.push_back(shown);
-  }
-  widen_for_groups();
-  fit();
-}
-
-/// The last column of a group has the room that the columns before it lack for its heading.
-void TerminalTable::widen_for_groups() {
-  for (std::size_t i = 0; i < columns_.size(); ++i) {
-    const std::size_t first = i;
-    std::size_t width = columns_[i].width;
-    while (continues_group(i + 1)) width += columns_[++i].width;
-    const std::size_t needed = display_width(columns_[first].column->group);
-    if (needed <= width) continue;
-    columns_[i].width += needed - width;
-    columns_[i].needed = columns_[i].width;
-  }
-}
-
-/// Whether a heading of the column before it goes on above it.
-bool TerminalTable::continues_group(std::size_t i) const {
-  return i < columns_.size() && !columns_[i].column->is_after_line &&
-         columns_[i].column->group == columns_[i - 1].column->group;
-}
-
-// Takes from the widest column, one at a time.
-void TerminalTable::fit() {
-  std::size_t total = 0;
-  bool have_own_widths = false;
-  for (const ShownColumn& shown : columns_) {
-    total += shown.width + (shown.column->is_after_line ? 1 : 0);
-    have_own_widths = have_own_widths || shown.has_own_width();
-  }
-  // Rows that are written one at a time stay below one another: their numbers keep their places.
-  for (const Cut cut : {Cut::blanks, Cut::lines, Cut::words}) {
-    if (!style_.wraps_cells && cut != Cut::words) continue;
-    const auto to_spare = [&](const ShownColumn& shown) {
-      return shown.width > shown.width_min(cut) ? shown.width : 0;
-    };
-    while (total > style_.line_width_max) {
-      ShownColumn& widest = *std::ranges::max_element(columns_, {}, to_spare);
-      if (to_spare(widest) == 0) break;
-      --widest.width;
-      --total;
-    }
-  }
-  are_rows_records_ = total > style_.line_width_max && !have_own_widths && !table_.rows.empty();
-}
-
-bool TerminalTable::is_before_line(std::size_t i) const {
-  return i + 1 < columns_.size() && columns_[i + 1].column->is_after_line;
-}
-
-std::vector<std::string> TerminalTable::lines_in(const ShownColumn& shown, const Cell& cell) const {
-  const std::string text = wire::visible_text(cell.text);
-  const bool is_wrapped =
-      style_.wraps_cells && shown.column->is_text && display_width(text) > shown.room();
-  return is_wrapped ? broken(text, shown.room()) : std::vector{shortened(text, shown.room())};
-}
-
-/// One line of what a cell shows.
-std::string TerminalTable::cell(std::size_t i, const std::string& text, const Cell& cell) const {
-  const ShownColumn& shown = columns_[i];
-  const std::size_t taken = shown.lead + display_width(text);
-  std::string blanks(shown.width > taken ? shown.width - taken : 0, ' ');
-  std::string line = shown.column->is_after_line ? "│" : "";
-  line.append(shown.lead, ' ');
-  const std::string painted = in_tone(text, cell.tone, style_.paint);
-  if (shown.column->is_text && !cell.value) return line + painted + blanks;
-  // One blank moves behind the number, unless it is what separates that from the column before it.
-  const std::size_t kept = shown.has_own_width() ? 1 : 0;
-  if (!is_before_line(i) || blanks.size() <= kept) return line + blanks + painted;
-  blanks.pop_back();
-  return line + blanks + painted + " ";
-}
-
-std::string TerminalTable::row(const Row& cells) const {
-  std::vector<std::vector<std::string>> shown;
-  std::size_t height = 0;
-  for (const ShownColumn& column : columns_) {
-    shown.push_back(lines_in(column, cells[column.index]));
-    height = std::max(height, shown.back().size());
-  }
-  std::string text;
-  for (std::size_t k = 0; k < height; ++k) {
-    std::string line;
-    for (std::size_t i = 0; i < columns_.size(); ++i) {
-      line += cell(i, k < shown[i].size() ? shown[i][k] : "", cells[columns_[i].index]);
-    }
-    text += without_end_blanks(std::move(line)) + "\n";
-  }
-  return text;
-}
-
-/// Each group in the middle of its columns; empty if no column has one.
-std::string TerminalTable::groups() const {
-  std::string line;
-  bool has_group = false;
-  for (std::size_t i = 0; i < columns_.size();) {
-    const std::string& group = columns_[i].column->group;
-    if (columns_[i].column->is_after_line) line += "│";
-    std::size_t width = columns_[i].width;
-    while (continues_group(++i)) width += columns_[i].width;
-    const std::size_t taken = display_width(group);
-    line += left_aligned(std::string(width > taken ? (width - taken) / 2 : 0, ' ') + group, width);
-    has_group = has_group || !group.empty();
-  }
-  return has_group ? without_end_blanks(std::move(line)) + "\n" : "";
-}
-
-/// The horizontal line below the titles, up to the last one; the vertical lines cross it.
-std::string TerminalTable::rule() const {
-  std::size_t count = columns_.size();
-  while (count > 0 && columns_[count - 1].column->title.empty()) --count;
-  std::string rule;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (columns_[i].column->is_after_line) rule += "┼";
-    rule.append(columns_[i].lead, ' ');
-    for (std::size_t k = columns_[i].lead; k < columns_[i].width; ++k) rule += "─";
-  }
-  return rule + "\n";
-}
-
-std::string TerminalTable::heading() const {
-  Row cells;
-  for (const Column& column : table_.columns) cells.emplace_back(column.title);
-  std::string titles = row(cells);
-  titles.pop_back();  // The end of the line is not painted.
-  return groups() + in_tone(titles, Tone::heading, style_.paint) + "\n" + rule();
-}
-
-std::string TerminalTable::records() const {
-  std::size_t name_width = 0;
-  for (const ShownColumn& shown : columns_) {
-    name_width = std::max(name_width, display_width(shown.column->title));
-  }
-  std::string text;
-  for (std::size_t row = 0; row < table_.rows.size(); ++row) {
-    text += fmt::format("row {}\n", row + 1);
-    for (const ShownColumn& shown : columns_) {
-      const Cell& cell = table_.rows[row][shown.index];
-      const std::string line = without_end_blanks(
-          fmt::format("  {}  {}", left_aligned(shown.column->title, name_width), cell.text));
-      text += (cell.value ? line : shortened(line, style_.line_width_max)) + "\n";
-    }
-  }
-  return text;
-}
-
-std::string TerminalTable::text() const {
-  std::string text;
-  if (!table_.caption.empty()) text += wire::visible_text(table_.caption) + "\n\n";
-  if (are_rows_records_) {
-    text += records();
-  } else if (!columns_.empty()) {
-    text += heading();
-    for (const Row& cells : table_.rows) {
-      if (table_.has_total && &cells == &table_.rows.back()) text += rule();
-      text += row(cells);
-    }
-  }
-  for (const Remark& remark : table_.remarks) {
-    std::string visible = wire::visible_text(remark.text);
-    if (style_.cuts_remarks) visible = shortened(visible, style_.line_width_max);
-    if (display_width(visible) > style_.line_width_max) visible = wrapped(visible, 2, 0);
-    text += in_tone(visible, remark.tone, style_.paint) + "\n";
-  }
-  for (const std::string& note : table_.notes)
-    text += wrapped(wire::visible_text(note), 2, 0) + "\n";
-  return text;
-}
 
 }  // namespace
 

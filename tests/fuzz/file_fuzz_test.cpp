@@ -4,7 +4,6 @@
 #include <regex>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/campaign_file/data_file.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "core/definition/csv.hpp"
 #include "core/error.hpp"

@@ -12,15 +12,15 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
-#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/query/query.hpp"
 #include "coordinator/report/report.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/report/summarise.hpp"
-#include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/error.hpp"
@@ -149,17 +149,17 @@ void read_drawn(const fs::path& file) {
   const Store store = Store::open_read_only(file);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   const DrawnRuns drawn = read_drawn_runs(store, *campaign, sensitivity_runs_max);
-  (void)sensitivity_text(drawn, index(Parameter::k2c), 3);
+  (void)sensitivity_text(drawn, index(Parameter::k2c), {}, 3);
   if (drawn.runs.empty()) return;
   const RunIndex run = drawn.runs.front();
   const std::vector<double> objectives = campaign->objectives();
   (void)choice_text(drawn, run, objectives);
-  (void)explanation_text(drawn, worst_quantity_of(drawn, run, objectives), run, 3);
+  (void)sensitivity_text(drawn, worst_quantity_of(drawn, run, objectives), run, 3);
 }
 
 void compare(const fs::path& file, const fs::path& pristine) {
   const std::array<fs::path, 2> files{file, pristine};
-  const std::vector<ComparedMember> members = compare_several(files, never);
+  const std::vector<ComparedCampaign> members = compare_several(files, never);
   (void)comparison_text(members, lettered(2));
   (void)comparison_json(members);
 }

@@ -120,28 +120,27 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
 
 Json check_json(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
                 const Outlook& outlook, const CostEstimate& cost) {
-  Json json{{"file", options.file.string()},
-            {"campaign", campaign.name},
-            {"seed", std::to_string(campaign.seed)},
-            {"num_runs", campaign.num_runs},
-            {"note", campaign.note()},
-            {"num_steps", plan.num_steps()},
-            {"step_name", campaign.model().step_name()},
-            {"one_core_s", cost.one_core_s},
-            {"all_cores_s", cost.all_cores_s},
-            {"num_cores", wire::num_processors()},
-            {"disk_bytes", cost.disk_mb * 1e6},
-            {"num_drawn", outlook.num_drawn},
-            {"num_draws", outlook.num_draws},
-            {"num_without_draw", outlook.num_without_draw},
-            {"num_simulated", outlook.num_simulated},
-            {"num_without_estimate", outlook.missing.total()},
-            {"differences", Json::array()}};
-  for (const auto& [field, own, example] :
-       campaign.differences_from(*example_campaign(campaign.model()))) {
-    json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});
-  }
-  return json;
+  const auto of_difference = [](const DefinitionDifference& of) -> Json {
+    return {{"field", of.field}, {"value", of.first}, {"example", of.second}};
+  };
+  const auto differences = campaign.differences_from(*example_campaign(campaign.model()));
+  return {{"file", options.file.string()},
+          {"campaign", campaign.name},
+          {"seed", std::to_string(campaign.seed)},
+          {"num_runs", campaign.num_runs},
+          {"note", campaign.note()},
+          {"num_steps", plan.num_steps()},
+          {"step_name", campaign.model().step_name()},
+          {"one_core_s", cost.one_core_s},
+          {"all_cores_s", cost.all_cores_s},
+          {"num_cores", wire::num_processors()},
+          {"disk_bytes", cost.disk_mb * 1e6},
+          {"num_drawn", outlook.num_drawn},
+          {"num_draws", outlook.num_draws},
+          {"num_without_draw", outlook.num_without_draw},
+          {"num_simulated", outlook.num_simulated},
+          {"num_without_estimate", outlook.missing.total()},
+          {"differences", array_of(differences, of_difference)}};
 }
 
 std::string check_text(const CheckOptions& options, const Campaign& campaign, const Plan& plan,

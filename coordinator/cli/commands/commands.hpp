@@ -1,7 +1,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -9,7 +8,6 @@
 
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {

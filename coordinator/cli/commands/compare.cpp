@@ -9,6 +9,7 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "core/campaign/independence.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -40,17 +41,18 @@ int compare_databases(const CompareOptions& options, const IsStopped& is_stopped
         fmt::format("DB = {} files (must be at most {})", files.size(), num_compared_max));
   }
   refuse_same_files(files);
-  const std::vector<ComparedMember> members = compare_several(files, is_stopped);
+  const std::vector<ComparedCampaign> members = compare_several(files, is_stopped);
   if (options.format == OutputFormat::json) {
-    print_lines(comparison_json(members));
+    print_json(comparison_json(members));
   } else {
     write_standard_output(
         comparison_text(members, lettered(members.size()), style_of(stdout).paint));
   }
-  for (const ComparedMember& member : members) {
-    if (member.why_not_independent.empty()) continue;
-    throw UsageError(fmt::format("DB = {} (needs independent draws: {})", member.file.string(),
-                                 member.why_not_independent));
+  for (const ComparedCampaign& member : members) {
+    const std::string why = why_not_independent(*member.campaign);
+    if (why.empty()) continue;
+    throw UsageError(
+        fmt::format("DB = {} (needs independent draws: {})", member.file.string(), why));
   }
   return exit_done;
 }

@@ -7,7 +7,6 @@
 #include <map>
 #include <string>
 
-#include "coordinator/archive/result_import.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/option_checks.hpp"

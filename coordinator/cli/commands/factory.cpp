@@ -11,15 +11,11 @@
 #include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/factory/batch_system.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -48,7 +44,6 @@ struct FactoryOptions {
   std::string wrap_command;
   std::uint64_t walltime_min = 480;
   std::uint64_t idle_timeout_s = 300;
-  std::uint64_t interval_s = 30;
   bool ends_when_done = false;
   bool is_dry_run = false;
 };
@@ -87,6 +82,7 @@ std::string worker_command(const FactoryOptions& options) {
 FactoryConfig checked(const FactoryOptions& options) {
   FactoryConfig config = options.factory;
   config.walltime = std::chrono::minutes(options.walltime_min);
+  config.batch_system = options.system.name;
   // A worker's name is this one with an identifier of 64 characters at most.
   constexpr std::size_t name_size_max = 60;
   if (!wire::is_name(config.name) || config.name.size() > name_size_max) {
@@ -132,9 +128,7 @@ class FactoryLoop {
       : options_(options),
         config_(std::move(config)),
         log_(log),
-        report_(report_of({}, config_, {}, std::chrono::steady_clock::now())) {
-    add_constants();
-  }
+        report_(report_of({}, config_, {}, std::chrono::steady_clock::now())) {}
 
   /// One look at coordinator and queue, and what follows from it. What fails is tried again at the
   /// next look.
@@ -163,11 +157,6 @@ class FactoryLoop {
   }
 
  private:
-  void add_constants() {
-    report_.set_batch_system(std::string(options_.system.name));
-    report_.set_interval_s(options_.interval_s);
-  }
-
   void log_waiting(const std::string& reason) const {
     log_({.severity = wire::Severity::warning,
           .kind = "factory_waits",
@@ -187,7 +176,6 @@ class FactoryLoop {
               options_.system, config_, log_);
     const bool was_paused = report_.phase() == proto::FACTORY_PHASE_PAUSED;
     report_ = report_of(state_, config_, view, std::chrono::steady_clock::now());
-    add_constants();
     if (report_.phase() == proto::FACTORY_PHASE_PAUSED && !was_paused) {
       log_({.severity = wire::Severity::error,
             .kind = "factory_paused",
@@ -200,7 +188,7 @@ class FactoryLoop {
     log_waiting(reason);
     if (report_.phase() == proto::FACTORY_PHASE_PAUSED) return;
     report_.set_phase(proto::FACTORY_PHASE_WAITING);
-    report_.set_wait_s(static_cast<double>(options_.interval_s));
+    report_.set_wait_s(static_cast<double>(config_.interval_s));
     report_.set_reason(reason);
   }
 
@@ -243,7 +231,7 @@ int keep_workers(const FactoryOptions& options) {
     if (are_all_over && options.ends_when_done) return exit_done;
     const auto reason = loop.reason_to_pause();
     if (reason && options.ends_when_done) throw Error("factory: " + *reason);
-    const auto next = std::chrono::steady_clock::now() + std::chrono::seconds(options.interval_s);
+    const auto next = std::chrono::steady_clock::now() + std::chrono::seconds(config.interval_s);
     while (stop == StopRequest::none && std::chrono::steady_clock::now() < next) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
@@ -270,7 +258,7 @@ void add_sizing(CLI::App& command, FactoryOptions& options) {
                   "A worker is asked for if there is work for this\nshare of its walltime")
       ->check(wire::in_range(0.001, 1.0))
       ->capture_default_str();
-  command.add_option("--interval", options.interval_s, "Seconds between two looks")
+  command.add_option("--interval", factory.interval_s, "Seconds between two looks")
       ->check(wire::in_range(std::uint64_t{1}, wire::factory_interval_s_max))
       ->capture_default_str();
   command.add_flag("--exit-when-done", options.ends_when_done,

@@ -16,7 +16,7 @@
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/link/whole_file.hpp"

@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 
@@ -17,7 +17,7 @@ int list_databases(const ListOptions& options) {
   const std::vector<std::filesystem::path> here{"."};
   const auto campaigns = list_campaigns(options.places.empty() ? here : options.places);
   if (options.format == OutputFormat::json) {
-    print_lines(listing_json(campaigns));
+    print_json(listing_json(campaigns));
   } else {
     write_standard_output(terminal_text(listing_table(campaigns), style_of(stdout)));
   }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -17,6 +16,7 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
@@ -73,7 +73,7 @@ void require_sound(const std::filesystem::path& part, const MergeOptions& option
 }
 
 std::string count_text(const MergedPart& part) {
-  const std::string num_new = fmt::format("{} run{}", part.num_new, part.num_new == 1 ? "" : "s");
+  const std::string num_new = counted(part.num_new, "run");
   if (part.num_again == 0) return num_new;
   return fmt::format("{}, and {} equal to those of parts before it", num_new, part.num_again);
 }
@@ -112,10 +112,9 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
   }
   json["num_runs"] = whole.num_runs();
   json["num_missing"] = missing.size();
-  json["missing"] = Json::array();
-  for (const RunRange& range : missing.ranges()) {
-    json["missing"].push_back({{"first_run", range.first.value}, {"num_runs", range.count}});
-  }
+  json["missing"] = array_of(missing.ranges(), [](const RunRange& range) -> Json {
+    return {{"first_run", range.first.value}, {"num_runs", range.count}};
+  });
   json["digest"] = digest;
   print_json(json);
 }

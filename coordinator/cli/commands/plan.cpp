@@ -16,8 +16,8 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/cli/shared_options.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/table/figures.hpp"
 #include "core/campaign/allocation.hpp"
@@ -181,6 +181,12 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
     write_standard_output("\n" + terminal_text(session_table(plan), style));
     return;
   }
+  const auto of_loss = [](const PlanLoss& loss) -> Json {
+    return {{"cause", loss.cause},
+            {"session", loss.session},
+            {"detail", loss.detail},
+            {"num_runs", loss.num_runs}};
+  };
   Json json{{"file", options.file.string()},
             {"method", plan.study.scope().method},
             {"note", plan.note},
@@ -191,15 +197,9 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"num_misfits", plan.study.scope().num_misfits},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", plan.bound.mean_budget},
-            {"losses", Json::array()},
+            {"losses", array_of(plan.bound.losses, of_loss)},
             {"parameters", Json::array()},
             {"sessions", Json::array()}};
-  for (const PlanLoss& loss : plan.bound.losses) {
-    json["losses"].push_back({{"cause", loss.cause},
-                              {"session", loss.session},
-                              {"detail", loss.detail},
-                              {"num_runs", loss.num_runs}});
-  }
   const std::vector<Quantity>& quantities = plan.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     json["parameters"].push_back({{"parameter", quantities[i].name},

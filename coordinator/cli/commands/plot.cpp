@@ -3,17 +3,16 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "coordinator/archive/replayed_spectra.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"

@@ -25,7 +25,7 @@
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/text/visible_text.hpp"
@@ -62,11 +62,6 @@ std::string read_standard_input() {
     throw Error(fmt::format("standard input: {}", std::strerror(errno)));
   }
   return text;
-}
-
-std::optional<std::size_t> terminal_columns() {
-  if (isatty(fileno(stdout)) == 0) return std::nullopt;
-  return screen_size_of(stdout).columns;
 }
 
 // `NAME=FILE`; the names differ, and letters in them have no case.
@@ -115,7 +110,8 @@ const std::map<std::string, RowFormat>& formats() {
 
 /// Columns of a table; nothing if any number.
 std::optional<std::size_t> table_columns(const QueryOptions& options) {
-  return options.num_columns ? options.num_columns : terminal_columns();
+  if (options.num_columns || isatty(fileno(stdout)) == 0) return options.num_columns;
+  return screen_size_of(stdout).columns;
 }
 
 int query_remotely(const QueryOptions& options) {

@@ -36,7 +36,9 @@ struct ReplayOptions {
   OutputFormat output_format = OutputFormat::text;  ///< Of what is printed.
 
   /// True if `output` names a directory that files are written to.
-  [[nodiscard]] bool has_directory() const { return num_worst || format == SeriesFormat::csv; }
+  [[nodiscard]] bool has_directory() const {
+    return !output.empty() && (num_worst || format == SeriesFormat::csv);
+  }
 };
 
 /// A directory that is made for output; it goes again if nothing was written to it.
@@ -64,6 +66,7 @@ class OutputDirectory {
 /// The files that a replay of a run writes.
 std::vector<std::filesystem::path> files_of(const ReplayOptions& options, RunIndex run,
                                             const SignalSelection& selection) {
+  if (options.output.empty()) return {};
   if (options.format == SeriesFormat::hdf5) {
     if (!options.num_worst) return {options.output};
     return {options.output / fmt::format("run{}.h5", run.value)};
@@ -97,118 +100,81 @@ std::string text_of(const RunResult& result, const ResultSchema& schema) {
                      name_at(schema.loss_sessions, result.loss.session));
 }
 
+/// A run that was simulated again.
+struct ReplayedRun {
+  const RunResult& stored;
+  std::vector<ResultDifference> differences = {};
+  std::vector<std::filesystem::path> files = {};  ///< That were written.
+};
+
+Json replayed_json(const ReplayedRun& run) {
+  const auto of_difference = [](const ResultDifference& of) -> Json {
+    return {{"column", of.column}, {"stored", of.stored}, {"now", of.computed}};
+  };
+  return {{"run", run.stored.run.value},
+          {"status", name_of(run.stored.status)},
+          {"is_equal", run.differences.empty()},
+          {"differences", array_of(run.differences, of_difference)},
+          {"files", array_of(run.files, [](const auto& file) { return Json(file.string()); })}};
+}
+
+std::string replayed_text(const ReplayedRun& run, const ResultSchema& schema) {
+  std::string text;
+  for (const ResultDifference& difference : run.differences) {
+    text += fmt::format("run {} {}: stored {}, now {}\n", run.stored.run.value, difference.column,
+                        difference.stored, difference.computed);
+  }
+  if (!run.differences.empty()) return text;
+  text = fmt::format("run {} {}: all values equal the stored ones\n", run.stored.run.value,
+                     text_of(run.stored, schema));
+  for (const auto& file : run.files) text += fmt::format("wrote {}\n", file.string());
+  return text;
+}
+
+/// Null if no series are written.
+std::unique_ptr<SeriesOutput> output_of(const ReplayOptions& options, const Store& store,
+                                        const RunResult& stored, const SignalSelection& selection) {
+  if (options.output.empty()) return nullptr;
+  if (options.format == SeriesFormat::csv) return csv_series(options.output, stored.run, selection);
+  return hdf5_series(files_of(options, stored.run, selection).front(),
+                     {.store = store, .result = stored, .program_version = PROOFMASS_VERSION},
+                     selection);
+}
+
 /// Simulates the runs one after the other. What was written of a run stays if a later one fails.
-class ReplayCommand {
- public:
-  ReplayCommand(const ReplayOptions& options, const IsStopped& is_stopped)
-      : options_(options),
-        is_stopped_(is_stopped),
-        store_(Store::open_read_only(options.database)),
-        replay_(store_),
-        selection_(replay_.recording(), options.sessions, options.groups) {}
-
-  void replay_all() const {
-    const std::vector<RunResult> results = chosen();
-    std::optional<OutputDirectory> directory;
-    if (is_written()) {
-      for (const RunResult& result : results) {
-        for (const auto& file : files_of(options_, result.run, selection_)) {
-          check_output_file(file, options_.if_there, "series are written to files");
-        }
-      }
-      if (options_.has_directory()) directory.emplace(options_.output);
+int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
+  check_arguments(options);
+  const Store store = Store::open_read_only(options.database);
+  const Replay replay(store);
+  const SignalSelection selection(replay.recording(), options.sessions, options.groups);
+  const std::vector<RunResult> results =
+      options.run ? std::vector{replay.stored_result(RunIndex{*options.run})}
+                  : replay.worst_results(*options.num_worst, is_stopped);
+  for (const RunResult& result : results) {
+    for (const auto& file : files_of(options, result.run, selection)) {
+      check_output_file(file, options.if_there, "series are written to files");
     }
-    Json json{{"runs", Json::array()}};
-    for (const RunResult& result : results) {
-      const std::vector<ResultDifference> differences = replay_one(result);
-      if (is_json()) {
-        json["runs"].push_back(json_of(result, differences));
-      } else {
-        print_replayed(result, differences);
-      }
-      if (differences.empty()) continue;
-      if (is_json()) print_json(json);
+  }
+  std::optional<OutputDirectory> directory;
+  if (options.has_directory()) directory.emplace(options.output);
+  const bool is_json = options.output_format == OutputFormat::json;
+  Json json{{"runs", Json::array()}};
+  for (const RunResult& stored : results) {
+    const std::unique_ptr<SeriesOutput> output = output_of(options, store, stored, selection);
+    ReplayedRun run{.stored = stored, .differences = replay.run(stored, output.get(), is_stopped)};
+    if (run.differences.empty()) run.files = files_of(options, stored.run, selection);
+    if (is_json) json["runs"].push_back(replayed_json(run));
+    if (!is_json) print_lines(replayed_text(run, store.schema()));
+    if (const std::size_t count = run.differences.size(); count > 0) {
+      if (is_json) print_json(json);
       flush_standard_output();
-      fail(result.run, differences);
-    }
-    if (is_json()) print_json(json);
-  }
-
- private:
-  [[nodiscard]] bool is_written() const { return !options_.output.empty(); }
-
-  [[nodiscard]] std::vector<RunResult> chosen() const {
-    if (options_.run) return {replay_.stored_result(RunIndex{*options_.run})};
-    return replay_.worst_results(*options_.num_worst, is_stopped_);
-  }
-
-  [[nodiscard]] bool is_json() const { return options_.output_format == OutputFormat::json; }
-
-  [[nodiscard]] std::vector<ResultDifference> replay_one(const RunResult& stored) const {
-    std::unique_ptr<SeriesOutput> output;
-    if (is_written()) output = output_of(stored);
-    return replay_.run(stored, output.get(), is_stopped_);
-  }
-
-  [[nodiscard]] Json json_of(const RunResult& stored,
-                             const std::vector<ResultDifference>& differences) const {
-    Json json{{"run", stored.run.value},
-              {"status", name_of(stored.status)},
-              {"is_equal", differences.empty()},
-              {"differences", Json::array()},
-              {"files", Json::array()}};
-    for (const auto& [run, column, value, computed] : differences) {
-      json["differences"].push_back({{"column", column}, {"stored", value}, {"now", computed}});
-    }
-    if (!is_written() || !differences.empty()) return json;
-    for (const auto& file : files_of(options_, stored.run, selection_)) {
-      json["files"].push_back(file.string());
-    }
-    return json;
-  }
-
-  void print_replayed(const RunResult& stored,
-                      const std::vector<ResultDifference>& differences) const {
-    for (const ResultDifference& difference : differences) {
-      print_lines(fmt::format("run {} {}: stored {}, now {}\n", stored.run.value, difference.column,
-                              difference.stored, difference.computed));
-    }
-    if (!differences.empty()) return;
-    print_lines(fmt::format("run {} {}: all values equal the stored ones\n", stored.run.value,
-                            text_of(stored, store_.schema())));
-    if (is_written()) {
-      for (const auto& file : files_of(options_, stored.run, selection_)) {
-        print_lines(fmt::format("wrote {}\n", file.string()));
-      }
+      throw ArchiveError(fmt::format("run {}: {} of its values {} not the stored {}",
+                                     stored.run.value, count, count == 1 ? "is" : "are",
+                                     count == 1 ? "one" : "ones"));
     }
     flush_standard_output();  // The next run may take long.
   }
-
-  [[nodiscard]] std::unique_ptr<SeriesOutput> output_of(const RunResult& stored) const {
-    if (options_.format == SeriesFormat::csv) {
-      return csv_series(options_.output, stored.run, selection_);
-    }
-    return hdf5_series(files_of(options_, stored.run, selection_).front(),
-                       {.store = store_, .result = stored, .program_version = PROOFMASS_VERSION},
-                       selection_);
-  }
-
-  [[noreturn]] static void fail(RunIndex run, const std::vector<ResultDifference>& differences) {
-    throw ArchiveError(fmt::format("run {}: {} of its values {} not the stored {}", run.value,
-                                   differences.size(), differences.size() == 1 ? "is" : "are",
-                                   differences.size() == 1 ? "one" : "ones"));
-  }
-
-  const ReplayOptions& options_;
-  const IsStopped& is_stopped_;
-  Store store_;
-  Replay replay_;
-  SignalSelection selection_;
-};
-
-int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
-  check_arguments(options);
-  ReplayCommand(options, is_stopped).replay_all();
+  if (is_json) print_json(json);
   return exit_done;
 }
 

@@ -5,21 +5,19 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "coordinator/archive/replayed_spectra.hpp"
+#include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/campaign_file/requirements_file.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/cli/shared_options.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -152,7 +150,7 @@ int print_report(const ReportOptions& options) {
   }
   const Paint paint = style_of(stdout).paint;
   if (is_json) {
-    print_lines(report_json(review, stated));
+    print_json(report_json(review, stated));
   } else {
     write_standard_output(stated.empty() ? report_text(review, paint)
                                          : answers_text(review, stated, paint));

@@ -21,8 +21,8 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/output.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/cli/progress_display.hpp"
-#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/worker_processes.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/net/private_endpoint.hpp"
@@ -193,7 +193,7 @@ struct Outcome {
 /// @param start  Null if nothing has begun yet.
 Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options,
                 std::unique_ptr<RunStart> start, const std::atomic<StopRequest>& stop) {
-  const bool is_decided = options.stop.rule.empty() ||
+  const bool is_decided = options.stop.stop_rule.empty() ||
                           (campaign.store.control().phase == wire::CampaignPhase::finished &&
                            !lacks_stop_check(campaign.store));
   if (num_missing(campaign.store, options) == 0 && is_decided) {
@@ -302,7 +302,7 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
     throw UsageError(
         fmt::format("{} (must end at most at campaign.runs = {})", range, campaign.num_runs));
   }
-  if (!options.stop.rule.empty()) throw UsageError(range + " (must not be with --until)");
+  if (!options.stop.stop_rule.empty()) throw UsageError(range + " (must not be with --until)");
 }
 
 void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
@@ -311,7 +311,7 @@ void print_outcome(const Store& store, const Campaign& campaign, RunOutput outpu
     write_standard_output(report_text(review, style_of(stdout).paint));
   }
   if (output == RunOutput::json) {
-    print_lines(report_json(read_review(store, campaign, ReviewDepth::matrix)));
+    print_json(report_json(read_review(store, campaign, ReviewDepth::matrix)));
   }
 }
 
@@ -342,9 +342,7 @@ void add_range_option(CLI::App& command, std::optional<RunRange>& part) {
 }  // namespace
 
 StopPlan stop_plan_of(const RunOptions& options, std::uint64_t num_runs) {
-  StopPlan plan{.stop_rule = options.stop.rule,
-                .num_runs_max = {},
-                .failures_max = options.stop.failures_max};
+  StopPlan plan = options.stop;
   if (!plan.stop_rule.empty()) plan.num_runs_max = num_runs;
   return plan;
 }
@@ -354,7 +352,7 @@ int run_campaign(const RunOptions& options) {
   wire::require_threads(num_service_threads);
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
-  check_until(*campaign, options.stop.rule);
+  check_until(*campaign, options.stop.stop_rule);
   check_part(options, *campaign);
   (void)page_config_of(options.page);  // Before any file is made.
   const std::filesystem::path database = database_of(options);

@@ -22,7 +22,7 @@ struct RunOptions {
   std::string gpus = "none";             ///< Cards of this machine, as for a worker.
   std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
   std::optional<RunRange> part;          ///< Only these runs are computed.
-  StopOptions stop;
+  StopPlan stop;                         ///< Without StopPlan::num_runs_max.
   PageOptions page;
   bool is_quiet = false;
   RunOutput output = RunOutput::tables;

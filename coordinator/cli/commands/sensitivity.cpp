@@ -15,7 +15,6 @@
 #include "coordinator/cli/output.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/dispersion.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -75,19 +74,14 @@ int print_sensitivity(const SensitivityOptions& options) {
     for (std::size_t i = 0; i < drawn.errors.size(); ++i) quantities.push_back(i);
   }
   if (is_json) {
-    print_lines(sensitivity_json(drawn, quantities, explained, options.num_rows));
+    print_json(sensitivity_json(drawn, quantities, explained, options.num_rows));
     return exit_done;
   }
   const Paint paint = style_of(stdout).paint;
-  if (explained) {
-    write_standard_output(
-        explanation_text(drawn, quantities.front(), *explained, options.num_rows, paint));
-    return exit_done;
-  }
   std::string_view separator = "";
   for (const std::size_t quantity : quantities) {
-    write_standard_output(
-        fmt::format("{}{}", separator, sensitivity_text(drawn, quantity, options.num_rows, paint)));
+    write_standard_output(fmt::format(
+        "{}{}", separator, sensitivity_text(drawn, quantity, explained, options.num_rows, paint)));
     separator = "\n";
   }
   return exit_done;

@@ -8,7 +8,6 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/watch.hpp"
 #include "coordinator/cli/output.hpp"
@@ -31,14 +30,14 @@ struct SubmitOptions {
   std::optional<std::string> name;       ///< By default the one in the file.
   std::optional<int> priority;           ///< -100 to 100; as it is without one.
   std::optional<double> audit_fraction;  ///< 0 to 1; as it is without one.
-  StopOptions stop;
+  StopPlan stop;
   bool waits = false;
 };
 
 /// The campaign that the arguments name.
 std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
-  check_until(*campaign, options.stop.rule);
+  check_until(*campaign, options.stop.stop_rule);
   if (options.name) {
     campaign->name = *options.name;
     check_campaign_name(campaign->name, NameOrigin::given);
@@ -58,7 +57,7 @@ proto::RequestEnvelope submit_request(const SubmitOptions& options, const Campai
   }
   if (options.priority) submit.set_priority(*options.priority);
   if (options.audit_fraction) submit.set_audit_fraction(*options.audit_fraction);
-  submit.set_stop_rule(options.stop.rule);
+  submit.set_stop_rule(options.stop.stop_rule);
   if (options.stop.failures_max) submit.set_failures_max(*options.stop.failures_max);
   return request;
 }
@@ -79,10 +78,8 @@ int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
   const proto::RequestEnvelope request = submit_request(options, *campaign);
   return with_connection(options.client, [&](const Ask& ask) {
-    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kDone);
-    print_lines(done_text(reply.done(),
-                          {.name = "submit", .kind = "campaign", .target = campaign->name},
-                          options.client.format));
+    print_done(ask, request, {.name = "submit", .kind = "campaign", .target = campaign->name},
+               options.client.format);
     if (!options.waits) return static_cast<int>(exit_done);
     flush_standard_output();
     const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +10,6 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include "coordinator/archive/comparison.hpp"
@@ -19,9 +19,10 @@
 #include "coordinator/cli/commands/run.hpp"
 #include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/output.hpp"
-#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/cli/sweep_plan.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -100,7 +101,7 @@ Rest rest_of(const Campaign& campaign, const RunOptions& run) {
                            summary->num_finished == num_finished_runs &&
                            store.given_up_runs().empty() && !lacks_stop_check(store) &&
                            store.stop_plan() == stop_plan_of(run, campaign.num_runs);
-  const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.rule.empty();
+  const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.stop_rule.empty();
   if (is_complete && has_all) {
     return {.num_missing = 0, .exit_code = is_rule_missed(store) ? exit_not_met : exit_done};
   }
@@ -124,7 +125,7 @@ Sweep plan_sweep(const SweepOptions& options) {
       throw UsageError(
           fmt::format("vary = {} (makes the same campaign as {})", text_of(values), same->second));
     }
-    check_until(*campaign, swept.run.stop.rule);
+    check_until(*campaign, swept.run.stop.stop_rule);
     swept.rest = rest_of(*campaign, swept.run);
   }
   return sweep;
@@ -192,17 +193,16 @@ int run_all(const Sweep& sweep, bool is_quiet) {
   return gravest;
 }
 
-std::string sweep_text(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
+void print_comparison(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
   std::vector<std::filesystem::path> files;
   std::vector<SweptValues> values;
   for (const SweptCampaign& swept : sweep) {
     files.push_back(*swept.run.database);
     values.push_back(swept.values);
   }
-  const std::vector<ComparedMember> members = compare_several(files, is_stopped);
-  return format == OutputFormat::json
-             ? wire::visible_lines(comparison_json(members, values))
-             : comparison_text(members, sweep_names(values), style_of(stdout).paint);
+  const std::vector<ComparedCampaign> members = compare_several(files, is_stopped);
+  if (format == OutputFormat::json) return print_json(comparison_json(members, values));
+  write_standard_output(comparison_text(members, sweep_names(values), style_of(stdout).paint));
 }
 
 int sweep_campaigns(const SweepOptions& options) {
@@ -216,7 +216,7 @@ int sweep_campaigns(const SweepOptions& options) {
     return exit_code;
   }
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    write_standard_output(sweep_text(sweep, options.format, is_stopped));
+    print_comparison(sweep, options.format, is_stopped);
     return exit_code;
   });
 }
@@ -241,6 +241,142 @@ void add_sweep(CLI::App& app, Command& chosen) {
       ->type_name(wire::directory_type);
   add_run_options(command, options.run);
   add_json_flag(command, options.format);
+}
+
+namespace {
+
+[[noreturn]] void refuse_varied(std::string_view text, std::string_view rule) {
+  throw UsageError(fmt::format("vary = {} ({})", text, rule));
+}
+
+std::string_view without_blanks(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(' ');
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(' ') + 1 - first);
+}
+
+/// Where a list of values is cut: at commas that are in no array, table or string of TOML.
+class ValueScanner {
+ public:
+  [[nodiscard]] bool ends_value(char character) {
+    if (quote_ != 0) {
+      const bool ends_string = character == quote_ && !is_escaped_;
+      is_escaped_ = quote_ == '"' && character == '\\' && !is_escaped_;
+      if (ends_string) quote_ = 0;
+      return false;
+    }
+    if (character == '"' || character == '\'') quote_ = character;
+    if (character == '[' || character == '{') ++depth_;
+    if (character == ']' || character == '}') --depth_;
+    return character == ',' && depth_ == 0;
+  }
+
+ private:
+  char quote_ = 0;
+  bool is_escaped_ = false;
+  int depth_ = 0;
+};
+
+std::vector<std::string> values_in(std::string_view list) {
+  std::vector<std::string> values;
+  ValueScanner scanner;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= list.size(); ++i) {
+    if (i < list.size() && !scanner.ends_value(list[i])) continue;
+    values.emplace_back(without_blanks(list.substr(begin, i - begin)));
+    begin = i + 1;
+  }
+  return values;
+}
+
+bool is_plain(char character) {
+  constexpr std::string_view others = ".,=+-_";
+  return (character >= '0' && character <= '9') || (character >= 'a' && character <= 'z') ||
+         (character >= 'A' && character <= 'Z') || others.find(character) != std::string_view::npos;
+}
+
+}  // namespace
+
+VariedKey parse_varied(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  const std::string_view key = without_blanks(text.substr(0, equals));
+  if (equals == std::string_view::npos || key.empty()) {
+    refuse_varied(text, "must be KEY=VALUE,VALUE,...");
+  }
+  VariedKey varied{.key = std::string(key), .values = values_in(text.substr(equals + 1))};
+  for (std::size_t i = 0; i < varied.values.size(); ++i) {
+    const std::string& value = varied.values[i];
+    if (value.empty()) refuse_varied(text, "must be KEY=VALUE,VALUE,...");
+    if (std::ranges::count(varied.values, value) > 1) {
+      refuse_varied(text, fmt::format("has the value {} twice", value));
+    }
+  }
+  return varied;
+}
+
+std::vector<SweptValues> combinations(std::span<const VariedKey> keys) {
+  std::vector<SweptValues> all(1);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const auto& [key, values] = keys[i];
+    if (std::ranges::count(keys, key, &VariedKey::key) > 1) {
+      throw UsageError(fmt::format("vary = {} (is given twice)", key));
+    }
+    if (values.size() > num_swept_max / all.size()) {
+      throw UsageError(fmt::format("vary = {} (makes more than {} campaigns)", key, num_swept_max));
+    }
+    std::vector<SweptValues> longer;
+    for (const SweptValues& before : all) {
+      for (const std::string& value : values) {
+        longer.push_back(before);
+        longer.back().emplace_back(key, value);
+      }
+    }
+    all = std::move(longer);
+  }
+  if (all.size() < 2) throw UsageError("vary = (must make at least two campaigns)");
+  return all;
+}
+
+std::string text_of(const SweptValues& values) {
+  std::string text;
+  for (const auto& [key, value] : values) {
+    text += fmt::format("{}{}={}", text.empty() ? "" : ",", key, value);
+  }
+  return text;
+}
+
+std::string sweep_file_name(std::string_view stem, const SweptValues& values) {
+  constexpr std::size_t size_max = 200, digest_size = 12;
+  // A quoted and a bare text are the same value.
+  std::string text = text_of(values);
+  std::erase_if(text, [](char character) { return character == '"' || character == '\''; });
+  std::string plain = text;
+  std::ranges::replace_if(
+      plain, [](char character) { return !is_plain(character); }, '_');
+  std::string name = fmt::format("{}-{}", stem, plain);
+  if (plain != text || name.size() > size_max) {
+    Sha256 hash;
+    hash.add_bytes(text);
+    name = fmt::format("{}-{}", name.substr(0, size_max), hash.finish().substr(0, digest_size));
+  }
+  return name + ".db";
+}
+
+MemberNames sweep_names(std::span<const SweptValues> campaigns) {
+  constexpr std::size_t columns_max = 15;
+  MemberNames names;
+  bool are_short = true;
+  for (const auto& [key, value] : campaigns.front()) {
+    names.title += (names.title.empty() ? "" : ",") + key;
+  }
+  for (const SweptValues& values : campaigns) {
+    std::string name;
+    for (const auto& [key, value] : values) name += (name.empty() ? "" : ",") + value;
+    are_short = are_short && display_width(name) <= columns_max;
+    names.names.push_back(std::move(name));
+  }
+  if (are_short && display_width(names.title) <= columns_max) return names;
+  return lettered(campaigns.size());
 }
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -8,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/archive/publication.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/report/json.hpp"

@@ -12,8 +12,9 @@
 #include <thread>
 #include <utility>
 
-#include "coordinator/cli/client_text.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
@@ -73,7 +74,7 @@ void WatchDisplay::update(const proto::StatusReply& status) {
       show_lines(status);
       break;
     case WatchMode::json:
-      fmt::print(stream_, "{}", status_json(status, JsonLayout::one_line));
+      fmt::print(stream_, "{}", dumped(status_json(status), JsonLayout::one_line));
       break;
   }
   std::fflush(stream_);

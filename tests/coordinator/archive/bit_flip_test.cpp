@@ -5,7 +5,6 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
-#include "coordinator/archive/listing.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/summarise.hpp"
@@ -101,9 +100,9 @@ class BitFlips : public test::StoreTest {
   [[nodiscard]] std::string comparison_of(const std::filesystem::path& path) const {
     return printed([&] {
       const std::vector<std::filesystem::path> files{path, file()};
-      std::vector<ComparedMember> members = compare_several(files, test::never_stopped);
+      std::vector<ComparedCampaign> members = compare_several(files, test::never_stopped);
       members.front().file = file();
-      return comparison_json(members);
+      return comparison_json(members).dump(2);
     });
   }
 

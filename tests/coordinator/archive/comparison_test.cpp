@@ -36,7 +36,7 @@ ComparedCampaign compared(const Side& side) {
 }
 
 CampaignComparison compare_campaigns(const Side& first, const Side& second) {
-  std::vector<ComparedMember> members(2);
+  std::vector<ComparedCampaign> members(2);
   members[1].comparison = coordinator::compare_campaigns(compared(first), compared(second));
   adjust_together(members);
   return *members[1].comparison;
@@ -65,20 +65,20 @@ void worsen(Side& side, Parameter parameter, double change) {
   }
 }
 
-/// A comparison as `compare` holds it, of campaigns whose objectives and statistics do not matter.
-std::vector<ComparedMember> both(const CampaignComparison& comparison) {
-  ComparedMember first, second;
-  first.file = "a.db";
-  second.file = "b.db";
-  second.comparison = comparison;
-  first.quantities = second.quantities = test::schema().quantities;
-  first.objectives = second.objectives =
-      std::vector<double>(num_parameters, std::numeric_limits<double>::infinity());
-  first.statistics.num_estimated = comparison.num_first;
-  second.statistics.num_estimated = comparison.num_second;
-  first.statistics.accuracy.resize(num_parameters);
-  second.statistics.accuracy.resize(num_parameters);
-  return {first, second};
+/// A comparison as `compare` holds it, of campaigns whose statistics do not matter.
+std::vector<ComparedCampaign> both(const CampaignComparison& comparison) {
+  std::vector<ComparedCampaign> members(2);
+  members[0].file = "a.db";
+  members[1].file = "b.db";
+  members[1].comparison = comparison;
+  members[0].results.statistics.num_estimated = comparison.first.num_estimated;
+  members[1].results.statistics.num_estimated = comparison.second.num_estimated;
+  for (ComparedCampaign& member : members) {
+    member.campaign = test::campaign_of(1).clone();
+    member.quantities = test::schema().quantities;
+    member.results.statistics.accuracy.resize(num_parameters);
+  }
+  return members;
 }
 
 std::string text_of(const CampaignComparison& comparison) {
@@ -94,8 +94,8 @@ TEST(Comparison, OfPairsIsRunByRun) {
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_TRUE(comparison.is_paired());
   EXPECT_EQ(comparison.why_not_compared, "");
-  EXPECT_EQ(comparison.num_first, 4U);
-  EXPECT_EQ(comparison.num_second, 4U);
+  EXPECT_EQ(comparison.first.num_estimated, 4U);
+  EXPECT_EQ(comparison.second.num_estimated, 4U);
   EXPECT_TRUE(comparison.differences.empty());
   const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
   EXPECT_EQ(changed.first.bias, -2.0);
@@ -140,7 +140,7 @@ TEST(Comparison, FindsASmallChangeOfManyRunsAndCorrectsForThreeTestsOfTenParamet
 TEST(Comparison, CorrectsForAllCampaignsTogether) {
   Side third = side(40);
   worsen(third, Parameter::a_c12, 1e-3);
-  std::vector<ComparedMember> members(3);
+  std::vector<ComparedCampaign> members(3);
   members[1].comparison = coordinator::compare_campaigns(compared(side(40)), compared(side(40)));
   members[2].comparison = coordinator::compare_campaigns(compared(side(40)), compared(third));
   adjust_together(members);
@@ -191,11 +191,11 @@ TEST(Comparison, CountsAllRunsAndTestsPairsAndTheOthersTogether) {
   second.results[1].status = RunStatus::not_finite;
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_TRUE(comparison.is_paired());
-  EXPECT_EQ(comparison.num_first, 8U);
-  EXPECT_EQ(comparison.num_second, 3U);
+  EXPECT_EQ(comparison.first.num_estimated, 8U);
+  EXPECT_EQ(comparison.second.num_estimated, 3U);
   EXPECT_EQ(comparison.num_pairs, 3U);
-  EXPECT_EQ(comparison.num_tested_first, 4U) << "not run 2, which the second campaign has lost";
-  EXPECT_EQ(comparison.num_tested_second, 0U);
+  EXPECT_EQ(comparison.first.num_tested, 4U) << "not run 2, which the second campaign has lost";
+  EXPECT_EQ(comparison.second.num_tested, 0U);
   const ParameterComparison& parameter = comparison.parameters[0];
   EXPECT_DOUBLE_EQ(parameter.first.mean, 4.5);
   EXPECT_DOUBLE_EQ(parameter.second.mean, (2.0 + 4.0 + 5.0) / 3.0);
@@ -217,7 +217,7 @@ TEST(Comparison, CountsAllRunsAndTestsPairsAndTheOthersTogether) {
 // Fewer than the pairs would cost these more than they tell.
 TEST(Comparison, LeavesFewOthersOutOfTheTests) {
   const CampaignComparison comparison = compare_campaigns(side(4), side(7));
-  EXPECT_EQ(comparison.num_tested_second, 0U);
+  EXPECT_EQ(comparison.second.num_tested, 0U);
   for (const ParameterComparison& parameter : comparison.parameters) {
     EXPECT_EQ(parameter.p_values.scale, 1.0);
   }
@@ -254,8 +254,8 @@ TEST(Comparison, OfOtherSeedsIsOfAllRuns) {
   second.campaign.seed = 2;
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_EQ(comparison.why_unpaired, "the seeds differ");
-  EXPECT_EQ(comparison.num_first, 7U);
-  EXPECT_EQ(comparison.num_second, 5U);
+  EXPECT_EQ(comparison.first.num_estimated, 7U);
+  EXPECT_EQ(comparison.second.num_estimated, 5U);
   const ParameterComparison& parameter = comparison.parameters[1];
   EXPECT_EQ(parameter.first.mean, 8.0);
   EXPECT_EQ(parameter.second.mean, 6.0);
@@ -349,11 +349,11 @@ TEST_F(ComparedFile, IsReadWithAllThatCountsAndHeldAgainstItsDigest) {
     update_statistics(store, campaign);
   }
   const std::vector<std::filesystem::path> files{file(), file()};
-  for (const ComparedMember& member : compare_several(files, test::never_stopped)) {
-    EXPECT_EQ(member.num_runs, 9U);
-    EXPECT_EQ(member.statistics.num_estimated, 2U);
+  for (const ComparedCampaign& member : compare_several(files, test::never_stopped)) {
+    EXPECT_EQ(member.campaign->num_runs, 9U);
+    EXPECT_EQ(member.results.statistics.num_estimated, 2U);
     EXPECT_EQ(
-        member.missing,
+        member.results.missing,
         (MissingEstimates{
             .num_not_converged = 1, .num_not_finite = 1, .num_no_draw = 1, .num_given_up = 1}));
   }
@@ -373,12 +373,12 @@ TEST(Letters, GoOnWithTwoAfterZ) {
 }
 
 TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
-  std::vector<ComparedMember> members = both(compare_campaigns(side(8), side(6)));
-  members[1].missing = {.num_not_finite = 2, .num_given_up = 1};
+  std::vector<ComparedCampaign> members = both(compare_campaigns(side(8), side(6)));
+  members[1].results.missing = {.num_not_finite = 2, .num_given_up = 1};
   EXPECT_THAT(comparison_text(members, lettered(2)),
               HasSubstr("6 runs of the same draws\n"
                         "Left out of B, without an estimate: 2 not finite, 1 given up.\n"));
-  const auto json = nlohmann::json::parse(comparison_json(members));
+  const auto json = comparison_json(members);
   EXPECT_EQ(json["num_first_without_estimate"], 0);
   EXPECT_EQ(json["num_second_without_estimate"], 3);
 }

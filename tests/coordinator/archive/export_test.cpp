@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/archive/listing.hpp"
-#include "coordinator/archive/resimulation.hpp"
+#include "coordinator/archive/replay.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"

@@ -2,7 +2,6 @@
 #include <Eigen/Geometry>
 
 #include "coordinator/archive/replay.hpp"
-#include "coordinator/archive/replayed_spectra.hpp"
 #include "core/microscope/instrument/drawn_quantities.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/signal/noise_shape.hpp"

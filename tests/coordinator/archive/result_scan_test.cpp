@@ -1,9 +1,7 @@
-#include "coordinator/archive/result_scan.hpp"
-
 #include <fmt/format.h>
 
 #include "coordinator/archive/verification.hpp"
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"

@@ -1,5 +1,3 @@
-#include "coordinator/cli/client_text.hpp"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "coordinator/cli/client.hpp"
+#include "coordinator/report/json.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "core/runs.hpp"
 #include "tests/proto/wire/requests.hpp"
 
@@ -370,8 +371,7 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"interval_s", 30},
                          {"silent_s", 12.0},
                          {"owner", "anna"}}}}};
-  EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::indented)), expected);
-  EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::one_line)), expected);
+  EXPECT_EQ(Json::parse(status_json(some_status()).dump()), expected);
 }
 
 TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
@@ -382,7 +382,7 @@ TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
   status.mutable_campaigns(0)->clear_model_version();
   status.clear_factories();
   *status.add_factories()->mutable_report() = test::factory_report("fleet", 30);
-  const Json json = Json::parse(status_json(status, JsonLayout::indented));
+  const Json json = Json::parse(status_json(status).dump());
   EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["missing_model"].is_null());
@@ -393,12 +393,12 @@ TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
 }
 
 TEST(StatusJson, HasAListAlsoWithoutCampaigns) {
-  EXPECT_TRUE(Json::parse(status_json({}, JsonLayout::indented))["campaigns"].is_array());
-  EXPECT_TRUE(Json::parse(status_json({}, JsonLayout::indented))["factories"].is_array());
+  EXPECT_TRUE(Json::parse(status_json({}).dump())["campaigns"].is_array());
+  EXPECT_TRUE(Json::parse(status_json({}).dump())["factories"].is_array());
 }
 
 TEST(StatusJson, MayStandOnOneLine) {
-  const std::string text = status_json(some_status(), JsonLayout::one_line);
+  const std::string text = dumped(status_json(some_status()), JsonLayout::one_line);
   EXPECT_EQ(std::ranges::count(text, '\n'), 1);
   EXPECT_TRUE(text.ends_with("}\n"));
 }
@@ -419,8 +419,8 @@ TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
                          {"cards", "1 card (CUDA 13.0)"},
                          {"card_rate_hz", nullptr}}}}};
   one.set_cards("1 card (CUDA 13.0)");
-  EXPECT_EQ(Json::parse(workers_json(reply_of({one}))), expected);
-  EXPECT_TRUE(Json::parse(workers_json({}))["workers"].is_array());
+  EXPECT_EQ(Json::parse(workers_json(reply_of({one})).dump()), expected);
+  EXPECT_TRUE(Json::parse(workers_json({}).dump())["workers"].is_array());
 }
 
 }  // namespace

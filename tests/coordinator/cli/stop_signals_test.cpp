@@ -1,5 +1,3 @@
-#include "coordinator/cli/stop_signals.hpp"
-
 #include <poll.h>
 #include <signal.h>
 #include <stdlib.h>

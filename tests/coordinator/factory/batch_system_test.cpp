@@ -1,5 +1,4 @@
-#include "coordinator/factory/batch_system.hpp"
-
+#include "coordinator/factory/factory.hpp"
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
 #include "tests/test.hpp"

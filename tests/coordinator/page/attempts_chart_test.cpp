@@ -1,8 +1,7 @@
-#include "coordinator/page/attempts_chart.hpp"
-
 #include <set>
 #include <string>
 
+#include "coordinator/page/page_views.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {

@@ -13,9 +13,14 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/report/report_tables.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/model.hpp"
+#include "proto/text/visible_text.hpp"
+#include "tests/coordinator/charts/markup_reading.hpp"
+#include "tests/coordinator/report/review_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -316,7 +321,7 @@ class ResultsReadingTest : public test::StoreTest {
     (void)store.write(entries);
   }
   static std::uint64_t worst_run(const ResultsReading& reading) {
-    return reading.results().statistics().accuracy[0].worst_run.value;
+    return reading.statistics().accuracy[0].worst_run.value;
   }
 };
 
@@ -329,7 +334,7 @@ TEST_F(ResultsReadingTest, ReadsEveryResultOnceAPartAtATime) {
   for (const std::uint64_t num_read : {100U, 200U, 250U, 250U}) {
     reading.read_further(store, 100);
     EXPECT_EQ(reading.num_read(), num_read);
-    EXPECT_EQ(reading.results().statistics().num_runs, num_read);
+    EXPECT_EQ(reading.statistics().num_runs, num_read);
   }
   EXPECT_EQ(worst_run(reading), 249U);
 }
@@ -343,7 +348,7 @@ TEST_F(ResultsReadingTest, FindsWhatComesLaterInFrontOfWhatItHas) {
   finish(store, 300, 310);
   for (int i = 0; i < 4; ++i) reading.read_further(store, 60);
   EXPECT_EQ(reading.num_read(), 160U);
-  EXPECT_EQ(reading.results().statistics().num_runs, 160U);
+  EXPECT_EQ(reading.statistics().num_runs, 160U);
 }
 
 // Each of a thousand gaps has to be looked up, and the lookups are bounded, too.
@@ -371,6 +376,27 @@ TEST_F(ResultsReadingTest, KnowsItsCampaign) {
   const ResultsReading reading(store);
   EXPECT_TRUE(reading.is_of(store));
   EXPECT_FALSE(reading.is_of(other));
+}
+
+using ReviewedReading = test::ReviewTest;
+
+// A review reads the same results in passes, and its statistics are of another method.
+TEST_F(ReviewedReading, ShowsTheTableOfAReview) {
+  const Store store = store_with(150);
+  ResultsReading reading(store);
+  EXPECT_THAT(reading.html(), HasSubstr("no data"));
+  reading.read_further(store, 150);
+  const std::string html = reading.html();
+  EXPECT_EQ(test::malformed_part(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
+                          Not(HasSubstr("<html"))));
+  const Review review = review_of(store, 150);
+  for (const Row& row : accuracy_table(review).rows) {
+    for (const Cell& cell : row) {
+      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
+    }
+  }
+  EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
 }
 
 }  // namespace

@@ -1,5 +1,3 @@
-#include "coordinator/page/metrics.hpp"
-
 #include <gmock/gmock.h>
 
 #include <map>
@@ -7,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "coordinator/page/page.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 
 namespace proofmass::coordinator {

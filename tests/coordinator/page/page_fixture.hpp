@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "coordinator/page/snapshot_board.hpp"
+#include "coordinator/page/page.hpp"
 #include "tests/proto/wire/requests.hpp"
 
 namespace proofmass::test {

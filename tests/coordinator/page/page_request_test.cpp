@@ -1,5 +1,4 @@
-#include "coordinator/page/page_request.hpp"
-
+#include "coordinator/page/page_access.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {

@@ -1,5 +1,4 @@
-#include "coordinator/page/page_site.hpp"
-
+#include "coordinator/page/page.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 #include "tests/test.hpp"
 

@@ -1,8 +1,8 @@
-#include "coordinator/page/snapshot_board.hpp"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
+
+#include "coordinator/page/page.hpp"
 
 namespace proofmass::coordinator {
 namespace {

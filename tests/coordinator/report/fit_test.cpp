@@ -1,5 +1,3 @@
-#include "coordinator/report/fit.hpp"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 

@@ -2,7 +2,7 @@
 // the model, and with it model_version.
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/test.hpp"
 

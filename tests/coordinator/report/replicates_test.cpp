@@ -1,5 +1,3 @@
-#include "coordinator/report/replicates.hpp"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/run_groups.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
-#include "coordinator/report/verification_matrix.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "proto/text/visible_text.hpp"

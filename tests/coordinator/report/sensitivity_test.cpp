@@ -34,14 +34,14 @@ DrawnRuns made_up_runs() {
 
 TEST(SensitivityText, SaysHowManyRunsItIsComputedFrom) {
   DrawnRuns drawn = made_up_runs();
-  const std::string none = sensitivity_text(drawn, index(Parameter::k2c), 1);
+  const std::string none = sensitivity_text(drawn, index(Parameter::k2c), {}, 1);
   EXPECT_THAT(none, Not(HasSubstr("Computed from")));
   drawn.num_with_estimate = 5000;
-  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 1),
+  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), {}, 1),
               StartsWith("K2c/K1c²: 1000 runs\nComputed from 1000 of 5000 runs with an estimate: "
                          "the first 1000\n\n"));
   drawn.num_first = 999;
-  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {999}, 1),
+  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), RunIndex{999}, 1),
               HasSubstr(" of 1000\nComputed from 1000 of 5000 runs with an estimate: the "
                         "first 999 and this one\n\n"))
       << "rank";
@@ -61,7 +61,8 @@ TEST(ExplanationText, RefusesARunBetweenThoseThatAreThere) {
   DrawnRuns drawn = made_up_runs();
   for (RunIndex& run : drawn.runs) run.value *= 2;
   drawn.last_with_estimate = drawn.runs.back();
-  EXPECT_THROW((void)explanation_text(drawn, index(Parameter::k2c), {5}, 1), InvalidArgument);
+  EXPECT_THROW((void)sensitivity_text(drawn, index(Parameter::k2c), RunIndex{5}, 1),
+               InvalidArgument);
 }
 
 using DrawnRunsTest = test::StoreTest;

@@ -1,8 +1,7 @@
 #include "coordinator/report/summarise.hpp"
 
-#include "coordinator/report/digest.hpp"
 #include "coordinator/report/error_figures.hpp"
-#include "coordinator/report/live_results.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
@@ -61,9 +60,9 @@ TEST_F(Summarise, AsksForTheRunsOfTheNextCheck) {
 // 64 magnitudes of 1 and 63 of 3 have a mean within 8.8496 % (scipy).
 TEST_F(Summarise, TellsWhatTheRuleAskedForAndWhatItFound) {
   Store store = finished(128, plan_of(1000), 1.0, 3.0);
-  EXPECT_EQ(stop_text(store), "") << "not checked yet";
+  EXPECT_EQ(stop_outcome(store)->text, "") << "not checked yet";
   (void)next_runs(store);
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  mean(k2c) within 8.85 %, half its 95 % interval\n"
             "          after 128 runs; mean(k2c) within 5%: not reached\n");
 }
@@ -75,7 +74,7 @@ TEST_F(Summarise, DecidesARequirement) {
   Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 1);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_FALSE(is_rule_missed(store));
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  k2c < 2 for 90% with 95% decided\n"
             "          met after 128 runs; exceeding: 1\n"
             "          at most 5.083 % of all draws, with 95 %\n");
@@ -88,7 +87,7 @@ TEST_F(Summarise, DecidesARequirementOnAllObjectives) {
   Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 0, 0);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_FALSE(is_rule_missed(store));
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  all objectives for 90% with 95% decided\n"
             "          met after 128 runs; holding: 127\n"
             "          at least 94.92 % of all draws, with 95 %\n");
@@ -116,7 +115,7 @@ TEST_F(Summarise, CountsWhereAllObjectivesHold) {
   Store store = finished(128, plan, 0.0, 1.0);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_EQ(store.stop_checks().back().check.estimate, 0.5);
-  EXPECT_EQ(stop_text(store),
+  EXPECT_EQ(stop_outcome(store)->text,
             "Stopping  all objectives within 17.9 %, half its 95 % interval\n"
             "          in 64 of 128 runs, 41 to 59 % of all draws\n"
             "          after 128 runs; all objectives within 50%: reached\n");
@@ -372,38 +371,6 @@ TEST(MagnitudeBins, ShowTenPercent) {
   for (int i = 0; i < 90; ++i) bins.add(1.5);
   for (int i = 0; i < 10; ++i) bins.add(0.75);
   EXPECT_THAT(bins.histogram().counts, ElementsAre(10, 0, 0, 90));
-}
-
-/// Results of a database, one after the other.
-class LiveResultsTest : public test::ReviewTest {
- protected:
-  static LiveResults results_in(const Store& store) {
-    LiveResults results(test::campaign_of(1), test::schema());
-    store.for_each_result([&](const RunResult& result) { results.add(result); });
-    return results;
-  }
-};
-
-// A review reads the same results in passes, and its statistics are of another method.
-TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
-  const Store store = store_with(150);
-  const std::string html = results_in(store).html();
-  EXPECT_EQ(test::malformed_part(html), "");
-  EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
-                          Not(HasSubstr("<html"))));
-  const Review review = review_of(store, 150);
-  for (const Row& row : accuracy_table(review).rows) {
-    for (const Cell& cell : row) {
-      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
-    }
-  }
-  EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
-}
-
-TEST(LiveResults, AreEmptyAtFirst) {
-  const LiveResults results(test::campaign_of(1), test::schema());
-  EXPECT_EQ(test::malformed_part(results.html()), "");
-  EXPECT_THAT(results.html(), HasSubstr("no data"));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include <cstdlib>
 
-#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/query/query.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/schema.hpp"

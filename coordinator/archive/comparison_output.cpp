@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "coordinator/archive/comparison.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/table/figures.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {
@@ -31,9 +33,9 @@ void share(std::vector<Shared>& all, const std::string& text, const std::string&
 
 /// Keys of the definitions in which not all campaigns agree, and the campaigns with each value.
 std::vector<std::pair<std::string, std::vector<Shared>>> differing_keys(
-    std::span<const ComparedMember> members, const MemberNames& names) {
+    std::span<const ComparedCampaign> members, const MemberNames& names) {
   std::vector<std::pair<std::string, std::vector<Shared>>> keys;
-  for (const ComparedMember& member : members.subspan(1)) {
+  for (const ComparedCampaign& member : members.subspan(1)) {
     for (const auto& [field, of_first, of_other] : member.comparison->differences) {
       const bool is_new =
           std::ranges::none_of(keys, [&](const auto& key) { return key.first == field; });
@@ -51,7 +53,7 @@ std::vector<std::pair<std::string, std::vector<Shared>>> differing_keys(
   return keys;
 }
 
-Table definition_table(std::span<const ComparedMember> members, const MemberNames& names) {
+Table definition_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   const auto keys = differing_keys(members, names);
   if (keys.empty()) return {.remarks = {{"The definitions agree."}}};
   Table table{.columns = {{"the definitions differ in", true}, {"value", true}, {"of", true}}};
@@ -64,27 +66,22 @@ Table definition_table(std::span<const ComparedMember> members, const MemberName
   return table;
 }
 
-std::string how_compared(const ComparedMember& member, const ComparedMember& first) {
+std::string how_compared(const ComparedCampaign& member, const ComparedCampaign& first) {
   const CampaignComparison& comparison = *member.comparison;
   if (!comparison.why_not_compared.empty()) return "not at all";
-  if (!member.digest.empty() && member.digest == first.digest) return "identical results";
+  const std::string& digest = member.results.digests.results;
+  if (!digest.empty() && digest == first.results.digests.results) return "identical results";
   if (!comparison.is_paired()) return "as a whole, as " + comparison.why_unpaired;
   return fmt::format("run by run, {} {} of the same draws", comparison.num_pairs,
                      comparison.num_pairs == 1 ? "run" : "runs");
 }
 
-/// Runs of a campaign with an estimate that are in no pair.
-struct Unpaired {
-  std::size_t num_runs = 0;
-  std::size_t num_alone = 0;   ///< Of them: not computed in the other campaign.
-  std::size_t num_tested = 0;  ///< Of these.
-};
-
-/// Says what becomes of them.
-void add_unpaired(const Unpaired& runs, std::string_view name, std::string_view other,
-                  Table& table) {
-  if (runs.num_runs == 0) return;
-  const std::size_t num_missing = runs.num_runs - runs.num_alone;
+/// Says what becomes of the runs of a campaign with an estimate that are in no pair.
+void add_unpaired(const ComparedRuns& runs, std::size_t num_pairs, std::string_view name,
+                  std::string_view other, Table& table) {
+  const std::size_t num_unpaired = runs.num_estimated - num_pairs;
+  if (num_unpaired == 0) return;
+  const std::size_t num_missing = num_unpaired - runs.num_alone;
   std::string what = "were not computed in " + std::string(other);
   if (runs.num_alone == 0) {
     what = "have no estimate in " + std::string(other);
@@ -92,7 +89,7 @@ void add_unpaired(const Unpaired& runs, std::string_view name, std::string_view 
     what += fmt::format(" or, {} of them, have no estimate there", num_missing);
   }
   table.notes.push_back(fmt::format(
-      "{} runs of {} {}: they count in bias, std and tail, not in change; {}", runs.num_runs, name,
+      "{} runs of {} {}: they count in bias, std and tail, not in change; {}", num_unpaired, name,
       what,
       runs.num_tested == 0 ? "they are in no test"
                            : fmt::format("the {} not computed are tested as a whole, and p is "
@@ -101,10 +98,10 @@ void add_unpaired(const Unpaired& runs, std::string_view name, std::string_view 
 }
 
 /// Names the quantities that only one of two campaigns has, which are not compared.
-void add_own_quantities(const ComparedMember& first, const ComparedMember& other,
+void add_own_quantities(const ComparedCampaign& first, const ComparedCampaign& other,
                         std::string_view first_name, std::string_view other_name, Table& table) {
-  const auto add = [&](const ComparedMember& one, std::string_view name, const ComparedMember& two,
-                       std::string_view without) {
+  const auto add = [&](const ComparedCampaign& one, std::string_view name,
+                       const ComparedCampaign& two, std::string_view without) {
     const std::vector<std::string> own = lacking(one.quantities, two.quantities);
     if (own.empty()) return;
     table.notes.push_back(fmt::format("not compared, as {} has them and {} has not: {}", name,
@@ -120,18 +117,18 @@ std::string label(const MemberNames& names, std::size_t member) {
   return names.title == lettered(0).title ? name : fmt::format("{}={}", names.title, name);
 }
 
-Table campaign_table(std::span<const ComparedMember> members, const MemberNames& names) {
+Table campaign_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   Table table{.columns = {{names.title, true},
                           {"file", true},
                           {"runs"},
                           {"compared with " + names.names.front(), true}}};
   for (std::size_t i = 0; i < members.size(); ++i) {
-    const ComparedMember& member = members[i];
+    const ComparedCampaign& member = members[i];
     table.rows.push_back({names.names[i], member.file.string(),
-                          std::to_string(member.statistics.num_estimated),
+                          std::to_string(member.results.statistics.num_estimated),
                           member.comparison ? how_compared(member, members.front()) : ""});
     if (member.comparison && !member.comparison->why_not_compared.empty()) {
-      const bool is_of_first = !members.front().why_not_independent.empty();
+      const bool is_of_first = !why_not_independent(*members.front().campaign).empty();
       const std::string note =
           fmt::format("{} cannot be compared: {}", names.names[is_of_first ? 0 : i],
                       member.comparison->why_not_compared);
@@ -140,19 +137,13 @@ Table campaign_table(std::span<const ComparedMember> members, const MemberNames&
     if (member.comparison && member.comparison->num_pairs > 0) {
       const CampaignComparison& of = *member.comparison;
       const std::string first = label(names, 0), other = label(names, i);
-      add_unpaired({.num_runs = of.num_first - of.num_pairs,
-                    .num_alone = of.num_alone_first,
-                    .num_tested = of.num_tested_first},
-                   first, other, table);
-      add_unpaired({.num_runs = of.num_second - of.num_pairs,
-                    .num_alone = of.num_alone_second,
-                    .num_tested = of.num_tested_second},
-                   other, first, table);
+      add_unpaired(of.first, of.num_pairs, first, other, table);
+      add_unpaired(of.second, of.num_pairs, other, first, table);
     }
     add_own_quantities(members.front(), member, names.names.front(), names.names[i], table);
-    if (member.missing.total() == 0) continue;
+    if (member.results.missing.total() == 0) continue;
     table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.", names.names[i],
-                                         reasons_text(member.missing))});
+                                         reasons_text(member.results.missing))});
   }
   return table;
 }
@@ -163,12 +154,12 @@ std::string figure_with_sign(double value) {
   return (value < 0.0 ? "-" : "+") + figure;
 }
 
-bool has_changes(const ComparedMember& member) {
+bool has_changes(const ComparedCampaign& member) {
   return member.comparison && member.comparison->why_not_compared.empty();
 }
 
 /// How a quantity differs from the first campaign. Null where that is not compared.
-const ParameterComparison* change_in(const ComparedMember& member, const std::string& quantity) {
+const ParameterComparison* change_in(const ComparedCampaign& member, const std::string& quantity) {
   if (!has_changes(member)) return nullptr;
   const std::vector<ParameterComparison>& all = member.comparison->parameters;
   const auto found = std::ranges::find_if(
@@ -178,22 +169,22 @@ const ParameterComparison* change_in(const ComparedMember& member, const std::st
 
 /// Errors of a campaign in the runs that are compared: of the first one, with the first other that
 /// can be. Null if it has none.
-const ComparedAccuracy* accuracy_of(std::span<const ComparedMember> members, std::size_t member,
+const ComparedAccuracy* accuracy_of(std::span<const ComparedCampaign> members, std::size_t member,
                                     const std::string& quantity) {
   if (member > 0) {
     const ParameterComparison* const change = change_in(members[member], quantity);
     return change == nullptr ? nullptr : &change->second;
   }
-  for (const ComparedMember& other : members) {
+  for (const ComparedCampaign& other : members) {
     if (const auto* const change = change_in(other, quantity)) return &change->first;
   }
   return nullptr;
 }
 
 /// The quantities of all campaigns, each once, those of the first one first.
-std::vector<Quantity> all_quantities(std::span<const ComparedMember> members) {
+std::vector<Quantity> all_quantities(std::span<const ComparedCampaign> members) {
   std::vector<Quantity> all;
-  for (const ComparedMember& member : members) {
+  for (const ComparedCampaign& member : members) {
     for (const Quantity& quantity : member.quantities) {
       const bool is_new = std::ranges::find(all, quantity.name, &Quantity::name) == all.end();
       if (is_new) all.push_back(quantity);
@@ -218,7 +209,7 @@ std::string percent(std::size_t count, std::size_t of) {
 /// @param add_cells    Called with the row, the campaign, the parameter and its place among those
 ///                     of the campaign; cells that it does not add are empty.
 template <typename AddCells>
-Table table_of(std::span<const ComparedMember> members, const MemberNames& names,
+Table table_of(std::span<const ComparedCampaign> members, const MemberNames& names,
                std::string caption, std::vector<Column> columns, const AddCells& add_cells) {
   Table table{.caption = std::move(caption),
               .columns = {{"parameter", true, 10}, {"unit", true, 9}, {names.title, true, 9}}};
@@ -241,7 +232,7 @@ Table table_of(std::span<const ComparedMember> members, const MemberNames& names
   return table;
 }
 
-Table bias_table(std::span<const ComparedMember> members, const MemberNames& names) {
+Table bias_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity, std::size_t) {
     const double scale = quantity.display_scale;
     const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity.name);
@@ -268,7 +259,7 @@ Table bias_table(std::span<const ComparedMember> members, const MemberNames& nam
   return table;
 }
 
-Table scatter_table(std::span<const ComparedMember> members, const MemberNames& names) {
+Table scatter_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity, std::size_t) {
     const double scale = quantity.display_scale;
     const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity.name);
@@ -280,8 +271,8 @@ Table scatter_table(std::span<const ComparedMember> members, const MemberNames& 
     add_p(change.adjusted_p_values.scale, row);
     const auto& factor = change.smallest_scale_factor;
     row.emplace_back(factor ? measured_figure(100.0 * (*factor - 1.0)) + " %" : "-");
-    row.emplace_back(percent(change.first.num_in_tail, comparison.num_first));
-    row.emplace_back(percent(change.second.num_in_tail, comparison.num_second));
+    row.emplace_back(percent(change.first.num_in_tail, comparison.first.num_estimated));
+    row.emplace_back(percent(change.second.num_in_tail, comparison.second.num_estimated));
     add_p(change.adjusted_p_values.tail, row);
   };
   const std::string& first = names.names.front();
@@ -309,18 +300,18 @@ Table scatter_table(std::span<const ComparedMember> members, const MemberNames& 
 }
 
 /// Of all runs of each campaign, which has them even if it cannot be compared.
-Table magnitude_table(std::span<const ComparedMember> members, const MemberNames& names) {
+Table magnitude_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity,
                              std::size_t i) {
     const double scale = quantity.display_scale;
-    const double objective = members[member].objectives[i];
+    const double objective = members[member].campaign->objectives()[i];
     row.emplace_back(std::isfinite(objective) ? given_figure(objective / scale) : "-");
-    const std::uint64_t num_runs = members[member].statistics.num_estimated;
+    const std::uint64_t num_runs = members[member].results.statistics.num_estimated;
     if (num_runs == 0) {
       row.insert(row.end(), 4, Cell("-"));
       return;
     }
-    const AccuracyStatistic& accuracy = members[member].statistics.accuracy[i];
+    const AccuracyStatistic& accuracy = members[member].results.statistics.accuracy[i];
     row.emplace_back(measured_figure(accuracy.worst / scale));
     row.emplace_back(measured_figure(accuracy.mean / scale));
     row.emplace_back(num_runs < 2 ? "-" : measured_figure(accuracy.standard_deviation / scale));
@@ -354,7 +345,7 @@ MemberNames lettered(std::size_t count) {
   return names;
 }
 
-std::string comparison_text(std::span<const ComparedMember> members, const MemberNames& names,
+std::string comparison_text(std::span<const ComparedCampaign> members, const MemberNames& names,
                             Paint paint) {
   const TerminalStyle style = document_style(paint);
   std::string text = terminal_text(campaign_table(members, names), style) + "\n" +
@@ -364,6 +355,113 @@ std::string comparison_text(std::span<const ComparedMember> members, const Membe
             terminal_text(scatter_table(members, names), style);
   }
   return text + "\n" + terminal_text(magnitude_table(members, names), style);
+}
+
+namespace {
+
+Json json_of(const ComparedAccuracy& accuracy) {
+  return {{"bias", accuracy.bias},
+          {"standard_deviation", accuracy.standard_deviation},
+          {"mean_magnitude", accuracy.mean},
+          {"worst_magnitude", accuracy.worst},
+          {"num_in_tail", accuracy.num_in_tail}};
+}
+
+Json json_of(const ChangePValues& p_values) {
+  return {{"bias", p_values.location}, {"scatter", p_values.scale}, {"tail", p_values.tail}};
+}
+
+Json json_of(const ParameterComparison& parameter) {
+  return {{"parameter", parameter.quantity.name},
+          {"unit", parameter.quantity.unit},
+          {"tail_limit", parameter.tail_limit},
+          {"first", json_of(parameter.first)},
+          {"second", json_of(parameter.second)},
+          {"bias_change", parameter.bias_change},
+          {"bias_change_interval", parameter.bias_interval},
+          {"smallest_scatter_factor", parameter.smallest_scale_factor},
+          {"p_values", json_of(parameter.p_values)},
+          {"adjusted_p_values", json_of(parameter.adjusted_p_values)}};
+}
+
+/// The comparison of a campaign with the first, complete and in SI units.
+Json comparison_object(const ComparedCampaign& first, const ComparedCampaign& second) {
+  const CampaignComparison& comparison = *second.comparison;
+  const auto of_difference = [](const DefinitionDifference& of) -> Json {
+    return {{"field", of.field}, {"first", of.first}, {"second", of.second}};
+  };
+  const auto of_parameter = [](const ParameterComparison& of) { return json_of(of); };
+  const bool is_compared = comparison.why_not_compared.empty();
+  return {
+      {"first", first.file.string()},
+      {"second", second.file.string()},
+      {"differences", array_of(comparison.differences, of_difference)},
+      {"is_paired", comparison.is_paired()},
+      {"why_unpaired", text_or_null(comparison.why_unpaired)},
+      {"why_not_compared", text_or_null(comparison.why_not_compared)},
+      {"num_first", comparison.first.num_estimated},
+      {"num_second", comparison.second.num_estimated},
+      {"num_pairs", comparison.is_paired() ? Json(comparison.num_pairs) : Json(nullptr)},
+      {"num_tested_first", comparison.first.num_tested},
+      {"num_tested_second", comparison.second.num_tested},
+      {"is_identical", second.results.digests.results == first.results.digests.results},
+      {"num_first_without_estimate", first.results.missing.total()},
+      {"num_second_without_estimate", second.results.missing.total()},
+      {"confidence", default_confidence},
+      {"only_in_first", lacking(first.quantities, second.quantities)},
+      {"only_in_second", lacking(second.quantities, first.quantities)},
+      {"parameters", is_compared ? array_of(comparison.parameters, of_parameter) : Json::array()}};
+}
+
+Json accuracy_json(const ComparedCampaign& member, std::size_t i, double objective) {
+  const Quantity& quantity = member.quantities[i];
+  const CampaignStatistics& statistics = member.results.statistics;
+  const AccuracyStatistic& accuracy = statistics.accuracy[i];
+  const auto if_runs = [&](std::uint64_t least, const auto& value) {
+    return statistics.num_estimated >= least ? Json(value) : Json(nullptr);
+  };
+  return {{"parameter", quantity.name},
+          {"unit", quantity.unit},
+          {"objective", objective},  // Infinity becomes null.
+          {"worst", if_runs(1, accuracy.worst)},
+          {"mean", if_runs(1, accuracy.mean)},
+          {"standard_deviation", if_runs(2, accuracy.standard_deviation)},
+          {"num_beyond_objective", if_runs(1, accuracy.num_beyond_objective)}};
+}
+
+Json member_json(const ComparedCampaign& member, const ComparedCampaign& first) {
+  Json json{{"file", member.file.string()},
+            {"num_runs", member.campaign->num_runs},
+            {"num_finished", member.results.statistics.num_runs},
+            {"num_with_estimate", member.results.statistics.num_estimated},
+            {"num_without_estimate", member.results.missing.total()},
+            {"digest", member.results.digests.results},
+            {"parameters", Json::array()},
+            {"comparison", nullptr}};
+  const std::vector<double> objectives = member.campaign->objectives();
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    json["parameters"].push_back(accuracy_json(member, i, objectives[i]));
+  }
+  if (member.comparison) json["comparison"] = comparison_object(first, member);
+  return json;
+}
+
+}  // namespace
+
+Json comparison_json(std::span<const ComparedCampaign> members,
+                     std::span<const std::vector<KeyText>> varied) {
+  if (members.size() == 2 && varied.empty()) return comparison_object(members[0], members[1]);
+  Json json{{"confidence", default_confidence}, {"campaigns", Json::array()}};
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    Json member = member_json(members[i], members.front());
+    if (!varied.empty()) {
+      Json values = Json::object();
+      for (const auto& [key, value] : varied[i]) values[key] = value;
+      member["varied"] = values;
+    }
+    json["campaigns"].push_back(std::move(member));
+  }
+  return json;
 }
 
 }  // namespace proofmass::coordinator
