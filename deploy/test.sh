@@ -12,7 +12,7 @@ if [[ ${1:-} == --all ]]; then
   selection=()
   targets+=(
     unoptimised_recorded_bits_test proofmass_benchmarks proofmass_store_benchmark
-    proofmass_fuzz_corpus proofmass_fuzz_files
+    proofmass_fuzz_corpus
   )
   shift
 fi

@@ -20,7 +20,6 @@ import threading
 import time
 
 TIME_MAX_S = 600.0
-PEERS_PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are.
 SETTLE_S = 1.0  # So that what registration costs is not counted as idle.
 
 
@@ -200,24 +199,13 @@ def measure_swarm(service, num_runs, num_workers, idle_s):
     return figures
 
 
-def measure_peers(num_runs):
-    script = pathlib.Path(__file__).parent / "peers" / "peers.py"
-    output = subprocess.run([PEERS_PYTHON, script, str(num_runs)], check=False, text=True,
-                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL).stdout
-    peers = [json.loads(line) for line in output.splitlines() if line.startswith("{")]
-    for peer in peers:
-        if "error" in peer:
-            print(f"not measured: {peer['error']}", file=sys.stderr)
-    return peers
-
-
 def row(name, value, unit, limit=None):
     return {"name": name, "value": value, "unit": unit, "limit": limit}
 
 
 def rows_of(figures):
     batches, single, swarm = figures["batches"], figures["one_by_one"], figures["swarm"]
-    rows = [
+    return [
         row(f"in batches, {batches['num_runs']} runs, 2 workers", batches["ms_per_run"], "ms/run",
             0.02),
         row("  processor time of the coordinator", batches["coordinator_cpu_ms_per_run"], "ms/run"),
@@ -237,9 +225,6 @@ def rows_of(figures):
         row("  workers lost", swarm["num_workers_lost"], "", 0),
         row("  memory of the coordinator, at most", swarm["coordinator_memory_mb"], "MB", 300.0),
     ]
-    rows += [row(f"{peer['system']}, {peer['num_runs']} runs", peer["ms_per_run"], "ms/run")
-             for peer in figures["peers"] if "system" in peer]
-    return rows
 
 
 def is_missed(line):
@@ -261,7 +246,6 @@ def read_options():
     parser.add_argument("--single-workers", type=int, default=64, help="one by one")
     parser.add_argument("--swarm-workers", type=int, default=1000)
     parser.add_argument("--idle-s", type=float, default=10.0, help="how long the swarm is idle")
-    parser.add_argument("--peer-runs", type=int, default=20_000, help="0: without other systems")
     parser.add_argument("--directory", type=pathlib.Path, help="for campaign databases")
     parser.add_argument("--json", type=pathlib.Path, help="file for the figures")
     return parser.parse_args()
@@ -281,7 +265,6 @@ def main():
         "one_by_one": with_service(measure_one_by_one, options.single_runs,
                                    options.single_workers),
         "swarm": with_service(measure_swarm, options.runs, options.swarm_workers, options.idle_s),
-        "peers": measure_peers(options.peer_runs) if options.peer_runs > 0 else [],
     }
     figures["machine"]["load_after"] = os.getloadavg()[0]
     rows = rows_of(figures)

@@ -20,7 +20,12 @@
 namespace proofmass::test {
 namespace {
 
-constexpr std::uint64_t num_files = 20 * num_file_uses;
+/// PROOFMASS_FILES in the environment for another number.
+std::uint64_t num_files() {
+  const char* const number = std::getenv("PROOFMASS_FILES");
+  return number == nullptr ? 20 * num_file_uses : std::stoull(number);
+}
+
 constexpr std::uint64_t num_texts = 1000;
 
 TEST(MutatedCampaignFiles, AreReadOrRefused) {
@@ -28,7 +33,7 @@ TEST(MutatedCampaignFiles, AreReadOrRefused) {
   std::filesystem::create_directories(directory / "seeds");
   std::filesystem::create_directories(directory / "used");
   const auto originals = make_seed_files(directory / "seeds");
-  for (std::uint64_t seed = 1; seed <= num_files; ++seed) {
+  for (std::uint64_t seed = 1; seed <= num_files(); ++seed) {
     FileMutator mutator(seed);
     mutator.make(originals, directory / "used/x.db");
     const auto use = static_cast<FileUse>(seed % num_file_uses);

@@ -1,4 +1,4 @@
-// What the fuzzer found and began from, and many changes of it, without the fuzzer.
+// What the fuzzer begins from, and many changes of it, without the fuzzer.
 
 #include "tests/fuzz/fuzz_input.hpp"
 #include "tests/fuzz/mutator.hpp"
@@ -9,19 +9,7 @@ namespace proofmass::test {
 namespace {
 
 constexpr std::uint64_t num_shards = 4;
-constexpr std::uint64_t num_mutations = 100'000;
-
-const std::map<std::string, std::string>& corpus() {
-  static const auto files = [] {
-    std::map<std::string, std::string> result;
-    for (const auto& entry : std::filesystem::directory_iterator(PROOFMASS_FUZZ_CORPUS)) {
-      std::ifstream stream(entry.path(), std::ios::binary);
-      result[entry.path().filename().string()] = {std::istreambuf_iterator<char>(stream), {}};
-    }
-    return result;
-  }();
-  return files;
-}
+constexpr std::uint64_t num_mutations = 50'000;
 
 TEST(FuzzInput, IsAListOfSteps) {
   const std::vector<Step> steps{
@@ -54,21 +42,6 @@ TEST(FuzzInput, MayEndAnywhere) {
             "ab");
 }
 
-// If this fails, the protocol has changed: run proofmass_fuzz_corpus.
-TEST(FuzzCorpus, HoldsTheMessagesOfToday) {
-  for (const auto& [name, bytes] : seed_inputs()) {
-    ASSERT_TRUE(corpus().contains(name)) << name;
-    EXPECT_TRUE(corpus().at(name) == bytes) << name;
-  }
-}
-
-TEST(FuzzCorpus, BreaksNothing) {
-  for (const auto& [name, bytes] : corpus()) {
-    SCOPED_TRACE(name);
-    (void)run_fuzz_input(bytes);
-  }
-}
-
 TEST(FuzzCorpus, ReachesAllThatItIsMeantToReach) {
   FuzzSummary sum;
   for (const auto& [name, bytes] : seed_inputs()) sum += run_fuzz_input(bytes);
@@ -87,7 +60,7 @@ class FuzzMutations : public testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(FuzzMutations, BreakNothing) {
   std::vector<std::string> inputs;
-  for (const auto& [name, bytes] : corpus()) inputs.push_back(bytes);
+  for (const auto& [name, bytes] : seed_inputs()) inputs.push_back(bytes);
   Mutator mutator(inputs, /*seed=*/GetParam() + 1);
   FuzzSummary sum;
   for (std::uint64_t i = 0; i < num_mutations / num_shards; ++i) {

@@ -1,4 +1,4 @@
-// Writes the seeds of the fuzzer: `proofmass_fuzz_corpus tests/fuzz/corpus`.
+// Writes the seeds of the fuzzer: `proofmass_fuzz_corpus DIRECTORY`.
 
 #include <fmt/format.h>
 

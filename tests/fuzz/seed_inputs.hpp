@@ -5,8 +5,8 @@
 
 namespace proofmass::test {
 
-/// Inputs of the fuzzer made of real messages, by the name of their file in corpus/. Made anew
-/// when the protocol changes: `proofmass_fuzz_corpus DIRECTORY` writes them.
+/// Inputs of the fuzzer made of real messages, by the name of the file that
+/// `proofmass_fuzz_corpus DIRECTORY` makes of each.
 [[nodiscard]] std::map<std::string, std::string> seed_inputs();
 
 }  // namespace proofmass::test

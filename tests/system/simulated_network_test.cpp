@@ -17,7 +17,7 @@ namespace proofmass::test {
 namespace {
 
 constexpr std::uint64_t num_shards = 4;
-constexpr std::uint64_t num_seeds = 8'000;
+constexpr std::uint64_t num_seeds = 4'000;
 
 std::optional<std::uint64_t> number_in(const char* variable) {
   const char* const text = std::getenv(variable);

@@ -85,18 +85,6 @@ TEST(WorkerOptions, ComeFromTheEnvironment) {
   EXPECT_EQ(options.end_time_unix_s, 1'800'000'000);
 }
 
-TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
-  const test::ScratchDirectory directory;
-  const std::string file = (directory / "worker.toml").string();
-  std::ofstream(file) << "connect = \"tcp://c:5\"\nthreads = 2\nmax-walltime = \"2h\"\n"
-                         "insecure-plain = true\n";
-  const Options options = parsed({"--config", file, "--threads", "4"});
-  EXPECT_EQ(options.endpoint, "tcp://c:5");
-  EXPECT_EQ(options.num_threads, 4U);
-  EXPECT_EQ(options.walltime_max, 2h);
-  EXPECT_TRUE(options.is_plain_waived);
-}
-
 TEST(WorkerOptions, MustBeOfTheKnownKinds) {
   const auto error_with = [&](const std::string& name, const std::string& value) {
     return error_of({"--connect", "ipc:///tmp/a", name, value});
@@ -169,13 +157,6 @@ Outcome run(std::vector<std::string> arguments) {
   close(ends[0]);
   outcome.exit_code = exit_code_of(process);
   return outcome;
-}
-
-TEST(WorkerProgram, NeedsItsKeys) {
-  const Outcome outcome = run({"--connect", "tcp://10.0.0.1:5555", "--keys", "/nowhere"});
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.text.find("key directory = /nowhere (No such file"), std::string::npos)
-      << outcome.text;
 }
 
 // Found by the second process, whose exit code is handed on.

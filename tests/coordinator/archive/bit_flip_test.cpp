@@ -141,17 +141,17 @@ class BitFlips : public test::StoreTest {
 
 TEST_F(BitFlips, LeaveAReportAsItIsOrMakeItRefused) {
   expect_what_was_stored_or_refused(
-      1, 700, [&](const std::filesystem::path& path) { return report_of(path); });
+      1, 250, [&](const std::filesystem::path& path) { return report_of(path); });
 }
 
 TEST_F(BitFlips, LeaveExportsAsTheyAreOrMakeThemRefused) {
   expect_what_was_stored_or_refused(
-      2, 400, [&](const std::filesystem::path& path) { return export_of(path); });
+      2, 150, [&](const std::filesystem::path& path) { return export_of(path); });
 }
 
 TEST_F(BitFlips, LeaveAComparisonAsItIsOrMakeItRefused) {
   expect_what_was_stored_or_refused(
-      4, 150, [&](const std::filesystem::path& path) { return comparison_of(path); });
+      4, 75, [&](const std::filesystem::path& path) { return comparison_of(path); });
 }
 
 // Nothing but an Error comes out, and nothing aborts.

@@ -147,27 +147,6 @@ TEST(ChosenRuns, AreInTheMiddleOfEachPart) {
   EXPECT_EQ(chosen_runs(first_runs(400), 0.01), expected);
 }
 
-TEST(ResultDifferences, AreOfBitsThatMeanSomething) {
-  const RunResult stored = test::result_of(3, RunStatus::not_finite);
-  RunResult computed = stored;
-  computed.estimate = {99.0};  // Without a meaning.
-  EXPECT_THAT(differences_of(stored, computed, test::schema()), IsEmpty());
-  computed.truth[0] = 0.5;
-  computed.num_draws = 7;
-  computed.num_rounds = 9;
-  const std::vector<ResultDifference> differences =
-      differences_of(stored, computed, test::schema());
-  ASSERT_EQ(differences.size(), 3U);
-  EXPECT_EQ(differences[0].column, "num_draws");
-  EXPECT_EQ(differences[1].column, "num_rounds");
-  EXPECT_EQ(differences[1].stored, "3");
-  EXPECT_EQ(differences[1].computed, "9");
-  EXPECT_EQ(differences[2].run, RunIndex{3});
-  EXPECT_EQ(differences[2].column, "truth_a_c11_delta_x_m");
-  EXPECT_EQ(differences[2].stored, "1.3333333333333333");
-  EXPECT_EQ(differences[2].computed, "0.5");
-}
-
 TEST(ResultDifferences, OfAnotherStatusAreThatAlone) {
   const RunResult stored = test::result_of(3);
   RunResult computed = test::result_of(3, RunStatus::no_draw);
@@ -178,19 +157,6 @@ TEST(ResultDifferences, OfAnotherStatusAreThatAlone) {
   EXPECT_EQ(differences[0].column, "status");
   EXPECT_EQ(differences[0].stored, "completed");
   EXPECT_EQ(differences[0].computed, "no_draw");
-}
-
-// More threads than batches, and a last batch that is not full.
-TEST(Resimulation, FindsTheSameWithAnyNumberOfThreads) {
-  const MicroscopeCampaign campaign = test::quick_campaign(35);
-  std::vector<RunResult> results = test::simulated(campaign);
-  for (const std::size_t run : {std::size_t{34}, std::size_t{2}}) results[run].truth[1] += 1.0;
-  for (const std::size_t num_threads : {std::size_t{1}, std::size_t{2}, std::size_t{5}}) {
-    const auto differences = simulate_again(campaign, results, num_threads, test::never_stopped);
-    ASSERT_EQ(differences.size(), 2U);
-    EXPECT_EQ(differences[0].run, RunIndex{2});
-    EXPECT_EQ(differences[1].run, RunIndex{34});
-  }
 }
 
 // The threads that end because another one failed do not hide its reason.

@@ -23,77 +23,7 @@ class DerivedChecks : public test::VerificationTest {
     EXPECT_EQ(holds, failing.empty());
     return failing;
   }
-
-  struct Change {
-    std::string sql;
-    std::vector<std::string> failing;  ///< Checks.
-    std::vector<std::string> details;  ///< What those of the first one begin with.
-  };
-  void expect_found(const std::vector<Change>& changes) {
-    if (!std::filesystem::exists(file())) make_file();
-    const std::string whole = test::content_of(file());
-    for (const auto& [sql, failing, details] : changes) {
-      test::write_file(file(), whole);
-      EXPECT_EQ(failing_after(sql), failing) << sql;
-      const std::vector<std::string>& found = check(failing.front()).details;
-      ASSERT_THAT(found, SizeIs(details.size())) << sql;
-      for (std::size_t i = 0; i < details.size(); ++i) {
-        EXPECT_THAT(found[i], StartsWith(details[i])) << sql;
-      }
-    }
-  }
 };
-
-TEST_F(DerivedChecks, FindAStatisticThatDoesNotFollowFromTheResults) {
-  make_file();
-  const std::string mean =
-      text("SELECT format('%!.17g', mean) FROM statistic WHERE parameter = 'k2d'");
-  EXPECT_THAT(failing_after("UPDATE statistic SET mean = 1"), ElementsAre("statistics"));
-  EXPECT_EQ(check("statistics").finding, "not what follows from definition and results");
-  ASSERT_THAT(check("statistics").details, SizeIs(10));
-  const std::string of_k2d = check("statistics").details[8];
-  ASSERT_THAT(of_k2d, StartsWith("statistic.mean of k2d = 1 (must be "));
-  EXPECT_DOUBLE_EQ(std::stod(of_k2d.substr(of_k2d.find("must be ") + 8)), std::stod(mean));
-}
-
-TEST_F(DerivedChecks, FindWhatDoesNotFollow) {
-  const std::string interval =
-      "summary.within_objectives_lower and _upper (must be those of num_within_objectives)";
-  std::vector<std::string> all_and_more(10, "statistic has a row too many: ");
-  all_and_more.emplace_back("and ");
-  std::vector<std::string> lacking(10, "statistic lacks ");
-  std::vector<std::string> lacking_more = lacking;
-  lacking_more.emplace_back("and 11 more");
-  expect_found(
-      {{"INSERT INTO run_warning VALUES (0, 'spin', 'k2d', 0.5)",
-        {"statistics"},
-        {"run_warning has a row too many: spin on k2d in run 0"}},
-       // By more than rounding.
-       {"UPDATE statistic SET skewness = skewness * (1 + 2e-12) WHERE parameter = 'a_d12'",
-        {"statistics"},
-        {"statistic.skewness of a_d12"}},
-       {"UPDATE statistic SET bias_lower = NULL WHERE parameter = 'a_c13'",
-        {"statistics"},
-        {"statistic.bias_lower of a_c13 = NULL (must be "}},
-       {"DELETE FROM statistic", {"statistics"}, lacking},
-       {"DELETE FROM statistic; DELETE FROM budget_entry", {"statistics"}, lacking_more},
-       {"DELETE FROM summary", {"statistics"}, all_and_more},
-       {"UPDATE budget_entry SET term = 'own' WHERE term = 'residual_y'",
-        {"statistics"},
-        {"budget_entry lacks residual_y", "budget_entry has a row too many: own"}},
-       {"UPDATE summary SET num_no_draw = 5, num_estimated = 13, num_not_converged = 2,"
-        " num_not_finite = 3, num_given_up = 4",
-        {"statistics"},
-        {"summary.num_estimated = 13 (must be 18)", "summary.num_not_converged = 2 (must be 0)",
-         "summary.num_not_finite = 3 (must be 0)", "summary.num_no_draw = 5 (must be 0)", interval,
-         "summary.num_given_up = 4 (must be at most 0)"}},
-       {"UPDATE summary SET num_finished = 17",
-        {"statistics"},
-        {"summary.num_finished = 17 (must be 18, the sum of its kinds)"}},
-       {"INSERT INTO audit VALUES (5, 1, 0, '0000000000000000', '1111111111111111', 0)",
-        {"audit", "integrity"},
-        {"run 5: "}}});
-}
 
 // Nobody can tell which results these are of.
 TEST_F(DerivedChecks, DoNotHoldStatisticsOfOtherResults) {
@@ -195,26 +125,6 @@ class DerivedStopChecks : public DerivedChecks {
 TEST_F(DerivedStopChecks, Hold) {
   EXPECT_THAT(failing_after(""), IsEmpty());
   EXPECT_EQ(check("stop_checks").finding, "1 of a stop rule");
-}
-
-TEST_F(DerivedStopChecks, FindWhatDoesNotFollow) {
-  const std::string check = " of std(a_c13) after 18 runs = ";
-  expect_found(
-      {{"UPDATE stop_check SET estimate = 1, upper = NULL",
-        {"stop_checks"},
-        {"stop_check.estimate" + check + "1 (must be ",
-         "stop_check.upper" + check + "NULL (must be "}},
-       {"DELETE FROM stop_check", {"stop_checks"}, {"stop_check lacks std(a_c13) after 18 runs"}},
-       {"INSERT INTO stop_check VALUES ('max(k2c)', 18, 1, 1, 1, 0, 1, '');"
-        "INSERT INTO stop_check VALUES ('p9(k2c)', 128, 1, 1, 1, 0, 1, '');"
-        "INSERT INTO stop_check VALUES ('mean(k2c)', 10, 1, 1, 1, 0.1, 1, '')",
-        {"stop_checks"},
-        {"stop_check.statistic = max(k2c) (must be that of a stop rule)",
-         "stop_check.num_runs of p9(k2c) = 128 (must be at most 18)",
-         "stop_check.estimate of mean(k2c) after 10 runs = 1 (must",
-         "stop_check.lower of mean(k2c) after 10 runs",
-         "stop_check.upper of mean(k2c) after 10 runs",
-         "stop_check.relative_half_width of mean(k2c)"}}});
 }
 
 // Nothing of a plan that was changed is deleted, and it asked for another width.

@@ -68,17 +68,6 @@ void expect_same(const MicroscopeCampaign& read, const MicroscopeCampaign& writt
   EXPECT_THAT(definition_differences(read, written), IsEmpty());
 }
 
-TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
-  for (const MicroscopeCampaign& campaign :
-       {MicroscopeCampaign{}, hardy2013_campaign(), unusual_campaign()}) {
-    const std::string definition = canonical_definition(campaign);
-    const MicroscopeCampaign read = test::parse_campaign(
-        "stored definition", definition, campaign.environment_table, campaign.table_columns);
-    expect_same(read, campaign);
-    EXPECT_EQ(canonical_definition(read), definition);
-  }
-}
-
 // But one that came later, at its nominal value: the text of older campaigns remains what it was.
 TEST(CanonicalDefinition, StatesEveryField) {
   MicroscopeCampaign campaign;
@@ -128,22 +117,6 @@ TEST(CommentedCampaign, LeavesThePresetInCharge) {
   const MicroscopeCampaign campaign =
       read_microscope(folder / "c.toml", {.assignments = {"noise.preset=flight_suref"}});
   EXPECT_EQ(campaign.scenario.noise.linear_x.white_asd, 4.49e-12);
-}
-
-TEST(ParseStoredCampaign, RefusesWhatIsNoValidCampaign) {
-  const auto refusal = [](std::string_view definition, std::vector<std::vector<double>> columns) {
-    try {
-      (void)test::parse_campaign("stored definition", definition, {}, std::move(columns));
-    } catch (const DefinitionError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_EQ(refusal("[noise]\nscale = -1", {}),
-            "stored definition:2: noise.scale = -1 (must be >= 0)");
-  EXPECT_EQ(refusal("", {{1.0}}),
-            "stored definition: dispersion = 1 columns "
-            "(laws of kind table are 0)");
 }
 
 std::vector<std::string> differences_after(const std::function<void(MicroscopeCampaign&)>& change) {

@@ -195,16 +195,5 @@ TEST_F(ClientOfAPlayedCoordinator, DoesNotWaitForAPeerThatBreaksOffFromTheFirst)
   EXPECT_EQ(reply.get(), broken_off());
 }
 
-TEST_F(ClientOfAPlayedCoordinator, GivesUpOnACoordinatorThatIsSilent) {
-  PlayedCoordinator coordinator(endpoint_.address());
-  ClientConnection patient(config());
-  auto reply = ask(patient);
-  coordinator.answer(coordinator.receive().request_id(), "x");
-  EXPECT_EQ(reply.get(), "x");
-  // Connecting takes less than this, so the silence is what ends it.
-  ClientConnection client(config(0.5));
-  EXPECT_EQ(ask(client).get(), failed("no answer within 0.5 s"));
-}
-
 }  // namespace
 }  // namespace proofmass::coordinator

@@ -2,8 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "coordinator/cli/client.hpp"
@@ -183,29 +181,6 @@ TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
             std::string::npos);
 }
 
-TEST(StatusTable, HasAtMost79Columns) {
-  proto::CampaignStatus wide = campaign(std::string(128, 'x'), num_runs_max);
-  wide.set_phase(proto::CAMPAIGN_PHASE_CANCELLED);
-  wide.set_priority(-100);
-  wide.set_num_runs(num_runs_max);
-  for (const double number : {1e-12, 1.0, 59.0 * 60.0 + 59.0, 1e300}) {
-    wide.set_rate_hz(number);
-    wide.set_remaining_s(number);
-    proto::StatusReply status = status_with({wide});
-    status.set_version(std::string(128, 'v'));
-    status.set_num_slots(std::numeric_limits<std::uint64_t>::max());
-    expect_width_at_most(status_text(status, {.line_width_max = 79}), 79);
-  }
-}
-
-TEST(StatusTable, CutsNothingInAFile) {
-  proto::StatusReply status = status_with({campaign(std::string(128, 'x'), 1)});
-  status.set_model_version(std::string(128, 'm'));
-  const std::string table = status_text(status, {});
-  EXPECT_NE(table.find(std::string(128, 'x') + " "), std::string::npos) << table;
-  EXPECT_NE(table.find(std::string(128, 'm') + ","), std::string::npos) << table;
-}
-
 TEST(StatusTable, MarksTroubleAndNothingElse) {
   proto::CampaignStatus status = campaign("mine", 1);
   status.set_storage_failure("disk full");
@@ -229,20 +204,6 @@ TEST(StatusTable, MarksTroubleAndNothingElse) {
   EXPECT_EQ(std::ranges::count(text, '\033'), 14) << "and the titles";
 }
 
-TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
-  proto::WorkerStatus second = worker(1234, "local-2");
-  second.set_silent_s(3.0 * 3600.0);
-  second.set_is_quarantined(true);
-  EXPECT_EQ(terminal_text(workers_table(reply_of({worker(7, "local-1"), second})),
-                          {.line_width_max = 79}),
-            R"(      id  worker         host               pid slots    lent  results    heard
-───────────────────────────────────────────────────────────────────────────────
-       7  local-1        n7                4711     4      64     1234      2 s
-    1234  local-2        n1234             4711     4      64     1234      3 h
-1234: in quarantine, is lent nothing: too many crashes on n1234
-)");
-}
-
 TEST(WorkersTable, SaysWhichCardsThereAreAndHowFastTheyAre) {
   proto::WorkerStatus with_cards = worker(7, "gpu");
   with_cards.set_cards("2 NVIDIA H100 80GB HBM3 (CUDA 13.0)");
@@ -252,32 +213,6 @@ TEST(WorkersTable, SaysWhichCardsThereAreAndHowFastTheyAre) {
   EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2054 runs/s");
 }
 
-TEST(WorkersTable, HasAtMost79Columns) {
-  constexpr auto most = std::numeric_limits<std::uint64_t>::max();
-  proto::WorkerStatus wide = worker(most, std::string(128, 'x'));
-  wide.set_host(std::string(128, 'y'));
-  wide.set_process_id(most);
-  wide.set_num_slots(most);
-  wide.set_num_lent(most);
-  wide.set_num_results(most);
-  wide.set_silent_s(1e300);
-  expect_width_at_most(terminal_text(workers_table(reply_of({wide})), {.line_width_max = 79}), 79);
-}
-
-TEST(CampaignLine, SaysHowFarItIsAndHowFast) {
-  proto::CampaignStatus status = campaign("hardy2013", 42);
-  EXPECT_EQ(campaign_line(status), "hardy2013 active: 42 of 100 runs, 42 %");
-  status.set_rate_hz(0.5);
-  status.set_remaining_s(116.0);
-  EXPECT_EQ(campaign_line(status),
-            "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left");
-  status.set_num_audited(1);
-  status.set_num_given_up(2);
-  EXPECT_EQ(campaign_line(status),
-            "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left; 2 runs given "
-            "up: crashed too often; 1 result compared with a second computation: all equal");
-}
-
 TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
   proto::CampaignStatus status = campaign("a", 40);
   status.set_phase(proto::CAMPAIGN_PHASE_FINISHED);
@@ -285,142 +220,6 @@ TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
   EXPECT_TRUE(campaign_line(status).starts_with("a finished: 40 of 100 runs"));
   status.set_num_given_up(51);
   EXPECT_TRUE(campaign_line(status).starts_with("a failed: 40 of 100 runs"));
-}
-
-}  // namespace
-
-namespace {
-
-using Json = nlohmann::json;
-
-proto::StatusReply some_status() {
-  proto::CampaignStatus campaign =
-      test::campaign_status("a", 11, 100, proto::CAMPAIGN_PHASE_PAUSED);
-  campaign.set_priority(-1);
-  campaign.set_num_without_estimate(2);
-  campaign.set_num_given_up(3);
-  campaign.set_num_lent(4);
-  campaign.set_num_duplicates(5);
-  campaign.set_num_audited(6);
-  campaign.set_num_mismatches(7);
-  campaign.set_rate_hz(0.5);
-  campaign.set_remaining_s(2.5);
-  campaign.set_storage_failure("disk full");
-  campaign.set_missing_model("ruler-1");
-  campaign.set_model_version("ruler-1");
-  campaign.set_owner("anna");
-  proto::StatusReply status = test::status_with({campaign});
-  status.set_version("0.1.0");
-  status.set_model_version("m-2");
-  status.set_uptime_s(1.5);
-  status.set_num_workers(2);
-  status.set_num_slots(3);
-  status.set_num_campaigns(1);
-  status.set_num_refusals(3);
-  status.set_last_refusal("w: no");
-  status.set_last_refusal_s(4.5);
-  add_unserved("d/a.db", "is locked", status);
-  status.set_num_unserved_files(2);
-  status.add_quarantined_hosts("n7");
-  status.set_num_quarantined_hosts(1);
-  *status.add_factories() = factory(proto::FACTORY_PHASE_WAITING, 60.5, "qsub: queue full");
-  return status;
-}
-
-TEST(StatusJson, HoldsEverythingUnderStableKeys) {
-  const Json expected{{"version", "0.1.0"},
-                      {"model_version", "m-2"},
-                      {"uptime_s", 1.5},
-                      {"num_workers", 2},
-                      {"num_slots", 3},
-                      {"campaigns",
-                       {{{"name", "a"},
-                         {"phase", "paused"},
-                         {"priority", -1},
-                         {"num_runs", 100},
-                         {"num_done", 11},
-                         {"num_without_estimate", 2},
-                         {"num_given_up", 3},
-                         {"num_lent", 4},
-                         {"num_duplicates", 5},
-                         {"num_audited", 6},
-                         {"num_mismatches", 7},
-                         {"rate_hz", 0.5},
-                         {"remaining_s", 2.5},
-                         {"storage_failure", "disk full"},
-                         {"model_version", "ruler-1"},
-                         {"missing_model", "ruler-1"},
-                         {"crashes_everywhere", false},
-                         {"owner", "anna"}}}},
-                      {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
-                      {"num_unserved_files", 2},
-                      {"quarantined_hosts", {"n7"}},
-                      {"num_quarantined_hosts", 1},
-                      {"num_refusals", 3},
-                      {"last_refusal", "w: no"},
-                      {"last_refusal_s", 4.5},
-                      {"factories",
-                       {{{"name", "fleet"},
-                         {"batch_system", "pbs"},
-                         {"phase", "waiting"},
-                         {"num_wanted", 3},
-                         {"num_registered", 2},
-                         {"num_queued", 1},
-                         {"wait_s", 60.5},
-                         {"reason", "qsub: queue full"},
-                         {"interval_s", 30},
-                         {"silent_s", 12.0},
-                         {"owner", "anna"}}}}};
-  EXPECT_EQ(Json::parse(status_json(some_status()).dump()), expected);
-}
-
-TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
-  proto::StatusReply status = some_status();
-  status.mutable_campaigns(0)->clear_remaining_s();
-  status.mutable_campaigns(0)->clear_storage_failure();
-  status.mutable_campaigns(0)->clear_missing_model();
-  status.mutable_campaigns(0)->clear_model_version();
-  status.clear_factories();
-  *status.add_factories()->mutable_report() = test::factory_report("fleet", 30);
-  const Json json = Json::parse(status_json(status).dump());
-  EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
-  EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
-  EXPECT_TRUE(json["campaigns"][0]["missing_model"].is_null());
-  EXPECT_TRUE(json["campaigns"][0]["model_version"].is_null());
-  for (const std::string key : {"wait_s", "reason", "owner"}) {
-    EXPECT_TRUE(json["factories"][0][key].is_null()) << key;
-  }
-}
-
-TEST(StatusJson, HasAListAlsoWithoutCampaigns) {
-  EXPECT_TRUE(Json::parse(status_json({}).dump())["campaigns"].is_array());
-  EXPECT_TRUE(Json::parse(status_json({}).dump())["factories"].is_array());
-}
-
-TEST(StatusJson, MayStandOnOneLine) {
-  const std::string text = dumped(status_json(some_status()), JsonLayout::one_line);
-  EXPECT_EQ(std::ranges::count(text, '\n'), 1);
-  EXPECT_TRUE(text.ends_with("}\n"));
-}
-
-TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
-  proto::WorkerStatus one = worker(3, "w");
-  one.set_is_quarantined(true);
-  const Json expected{{"workers",
-                       {{{"worker_id", 3},
-                         {"name", "w"},
-                         {"host", "n3"},
-                         {"process_id", 4711},
-                         {"num_slots", 4},
-                         {"num_lent", 64},
-                         {"num_results", 1234},
-                         {"silent_s", 2.9},
-                         {"is_quarantined", true},
-                         {"cards", "1 card (CUDA 13.0)"},
-                         {"card_rate_hz", nullptr}}}}};
-  one.set_cards("1 card (CUDA 13.0)");
-  EXPECT_EQ(Json::parse(workers_json(reply_of({one})).dump()), expected);
-  EXPECT_TRUE(Json::parse(workers_json({}).dump())["workers"].is_array());
 }
 
 }  // namespace

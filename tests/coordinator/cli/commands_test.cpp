@@ -29,8 +29,6 @@ TEST(CampaignStart, DefinesAsManyRunsAsTheFileHasUntilAStopRuleIsChecked) {
   EXPECT_EQ(served.store.definition(), canonical_definition(campaign_of(128)));
 }
 
-using ::testing::UnorderedElementsAre;
-
 MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
   MicroscopeCampaign campaign;
   campaign.name = name;
@@ -132,13 +130,6 @@ TEST(CostEstimate, CountsAnIncompleteBatchAsAWhole) {
   EXPECT_EQ(estimated_cost(campaign, 100 * batch_size, 2.5).one_core_s, 250.0);
   EXPECT_EQ(estimated_cost(campaign, num_at_once, 2.5).all_cores_s, 2.5);
   EXPECT_EQ(estimated_cost(campaign, num_at_once + 1, 2.5).all_cores_s, 5.0);
-}
-
-TEST(CostEstimate, FitsATerminalOf80Columns) {
-  constexpr double long_s = 99 * 86400.0 + 23 * 3600.0;
-  std::istringstream lines(
-      cost_text({.one_core_s = long_s, .all_cores_s = long_s, .disk_mb = 290000.5}));
-  for (std::string line; std::getline(lines, line);) EXPECT_LT(line.size(), 80U) << line;
 }
 
 using Values = std::vector<std::string>;

@@ -60,34 +60,6 @@ class Answering : public test::ServiceTest {
   std::optional<test::PlayingClient> client;
 };
 
-TEST_F(Answering, GivesOutputErrorsAndExitCodeOfTheCommand) {
-  start_with("echo hello; echo wrong >&2; exit 3");
-  const AnswerReply answer = answer_to(question());
-  EXPECT_EQ(answer.size(), 6U);
-  EXPECT_EQ(answer.sha256(), sha256_of_hello);
-  EXPECT_EQ(answer.offset(), 0U);
-  EXPECT_EQ(answer.exit_code(), 3U);
-  EXPECT_EQ(answer.error_text(), "wrong\n");
-  EXPECT_EQ(part(answer, 0), "hello\n");
-  EXPECT_EQ(part(answer, 4), "o\n");
-  EXPECT_EQ(part(answer, 6), "");
-  EXPECT_TRUE(std::filesystem::is_empty(config.answer_directory));
-}
-
-TEST_F(Answering, TellsTheCommandFileOptionsAndStatement) {
-  start_with("printf '<%s>' \"$@\"");
-  const std::string file = (directory / "a.db").string();
-  const auto command = [&](const proto::RequestEnvelope& request) {
-    return part(answer_to(request), 0);
-  };
-  EXPECT_EQ(command(question(proto::QUESTION_REPORT, {"--json", "--requirement=a b; \"$(c)\""})),
-            "<report><--json><--requirement=a b; \"$(c)\"><--><" + file + ">");
-  EXPECT_EQ(command(question(proto::QUESTION_QUERY, {}, "--json SELECT 'x'")),
-            "<query><--><" + file + "><--json SELECT 'x'>");
-  EXPECT_EQ(command(question(proto::QUESTION_SENSITIVITY, {"--run=3"})),
-            "<sensitivity><--run=3><--><" + file + ">");
-}
-
 TEST_F(Answering, HasNoSettingsOfTheCoordinator) {
   setenv("PROOFMASS_CONFIG", "/somewhere", 1);
   start_with("env");
@@ -198,16 +170,6 @@ TEST_F(Answering, GivesOneAnswerToAllWhoAskTheSameAtTheSameTime) {
       EXPECT_EQ(reply.answer_part().content(), content);
     }
   }
-}
-
-TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
-  start_with("echo 'database = x (is damaged)' >&2; exit 1");
-  const std::filesystem::path copy = directory / "copy.db";
-  const test::Answer answer =
-      test::answer_of({"fetch", "a", copy, "--connect", service->clients_endpoint()});
-  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
-  EXPECT_THAT(answer.error, StartsWith("database = x (is damaged)"));
-  EXPECT_FALSE(std::filesystem::exists(directory / "copy.db.part"));
 }
 
 // The script copies the file that it is to back up.

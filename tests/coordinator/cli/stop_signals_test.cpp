@@ -132,25 +132,6 @@ TEST_F(SignalThreadTest, LeavesSignalsAsTheyWere) {
   _exit(static_cast<int>(request.load()));
 }
 
-/// Ends this process with the exit code of work that a database ends, after a signal or without
-/// one; 99 if its error is thrown.
-[[noreturn]] void exit_after_store_error(bool is_interrupted) {
-  try {
-    _exit(run_until_stopped([=](const IsStopped&) -> int {
-      if (is_interrupted) (void)raise(SIGINT);
-      throw StoreError("campaign database = a.db (interrupted)");
-    }));
-  } catch (const StoreError&) {
-    _exit(99);
-  }
-}
-
-TEST(StopSignalsDeathTest, MakeWhatADatabaseThenSaysAnInterruption) {
-  EXPECT_EXIT(exit_after_store_error(true), testing::ExitedWithCode(exit_interrupted),
-              "proofmass: interrupted");
-  EXPECT_EXIT(exit_after_store_error(false), testing::ExitedWithCode(99), "");
-}
-
 /// A program in the place of the worker's, or of a model's.
 std::filesystem::path script(const test::ScratchDirectory& directory, const std::string& text) {
   const auto file = directory / "worker";
@@ -211,17 +192,6 @@ WorkerProcesses::Exit exit_of(const std::string& text) {
   }
 }
 
-TEST(WorkerProcesses, SayHowAWorkerEnded) {
-  const auto failed = exit_of("exit 3");
-  EXPECT_EQ(failed.name, "local-1");
-  EXPECT_EQ(failed.text, "exit code 3");
-  EXPECT_EQ(failed.reason, wire::LossReason::failed);
-  const auto crashed = exit_of("kill -SEGV $$");
-  EXPECT_EQ(crashed.text, "killed by signal 11 (Segmentation fault)");
-  EXPECT_EQ(crashed.reason, wire::LossReason::crashed);
-  EXPECT_EQ(exit_of("kill -KILL $$").reason, wire::LossReason::preempted);
-}
-
 TEST(WorkerProcesses, GiveAWorkerItsNameItsCoordinatorAndItsParent) {
   const auto exit = exit_of(
       "[ \"$1 $2 $3 $4 $5 $6 $7 $8 $9\" = \"--connect ipc:///nowhere --name local-1 --threads 1 "
@@ -243,16 +213,6 @@ TEST(WorkerProcesses, KeepSettingsOfOtherWorkersFromAWorker) {
 TEST(WorkerProcesses, AWorkerIsEndedBySignalsThatAreBlockedHere) {
   const SignalThread signals;
   EXPECT_EQ(exit_of("kill -TERM $$").text, "killed by signal 15 (Terminated)");
-}
-
-TEST(WorkerProcesses, SayThatAProgramCannotBeStarted) {
-  WorkerProcesses processes("/nowhere/worker", "ipc:///nowhere");
-  try {
-    processes.start("local-1");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "/nowhere/worker: cannot be started: No such file or directory");
-  }
 }
 
 }  // namespace

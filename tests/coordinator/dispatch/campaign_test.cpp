@@ -10,30 +10,11 @@ using Ranges = std::vector<RunRange>;
 
 class CampaignTest : public DispatchFixture {};
 
-TEST_F(CampaignTest, OfHigherPriorityIsLentFirst) {
-  add_campaign(one, 1);
-  add_campaign(two, 1, 5);
-  add_worker(first);
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
-  deliver(first, two, {0});
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), one.value);
-  outbox.forget();
-}
-
 TEST_F(CampaignTest, TheOlderOfEqualPriorityIsLentFirst) {
   add_campaign(two, 1);
   add_campaign(one, 1);
   add_worker(first);
   EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
-}
-
-TEST_F(CampaignTest, OnlyWhatIsNotFinishedIsLent) {
-  StoredCampaign stored = stored_campaign(10);
-  stored.finished = {{{0}, 4}, {{5}, 4}};
-  stored.given_up = {{{9}, 1}};
-  on_campaign(state, one, stored, now, outbox);
-  add_worker(first, 4);
-  EXPECT_EQ(taken_lease(first), (RunRange{{4}, 1}));
 }
 
 TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
@@ -132,28 +113,6 @@ TEST_F(CampaignTest, ThatIsResumedIsNotAskedBackAnyMore) {
   heartbeat(first, {held(one, {{0}, 2})});
 }
 
-TEST_F(CampaignTest, ThatIsPausedLetsOthersGoOn) {
-  add_campaign(one, 10, 5);
-  add_campaign(two, 10);
-  add_worker(first);
-  on_pause(state, one, outbox);
-  outbox.forget();
-  give_back(first, held(one, {{0}, 1}));
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
-  outbox.forget();
-}
-
-TEST_F(CampaignTest, ThatIsPausedIsFinishedByItsLastResults) {
-  add_campaign(one, 1);
-  add_worker(first);
-  on_pause(state, one, outbox);
-  outbox.forget();
-  deliver(first, one, {0});
-  commit(one);
-  EXPECT_EQ(campaign(one).phase, Phase::finished);
-  outbox.forget();
-}
-
 TEST_F(CampaignTest, ThatIsCancelledIsForgotten) {
   add_campaign(one, 10);
   add_busy_worker(first, 2);
@@ -226,11 +185,6 @@ TEST_F(CampaignTest, ThatIsRemovedBeforeItsEndLeavesOnlyResultsOfWorkers) {
   on_compared(state, one, {0}, first, true, now, outbox);  // It was under way.
 }
 
-TEST_F(CampaignTest, ABillionRunsCostNothing) {
-  add_campaign(one, num_runs_max);
-  EXPECT_EQ(campaign(one).pending.at({1}).num_ranges(), 1U);
-}
-
 // Workers that are registered and say what cannot be. Nothing that they say may end the service:
 // each test ends with a check of the state.
 
@@ -267,93 +221,6 @@ TEST_F(HostileTest, TheLargestAttemptFollowsItself) {
   crash(first);
   deliver(second, one, {0, 1}, attempt_max);
   EXPECT_EQ(outbox.take_stored().size(), 2U);
-}
-
-TEST_F(HostileTest, ARunIsListedTwice) {
-  add_campaign(one, 10);
-  say_hello(first, hello());
-  heartbeat(first, {held(one, {{0}, 4}), held(one, {{2}, 4}, 2), held(one, {{0}, 10}, 3)});
-  check_invariants(state);
-  EXPECT_EQ(state.workers.at(first).num_lent, 10U);
-  heartbeat(first, {held(one, {{5}, 1}), held(one, {{5}, 1}, 9)},
-            {make_computed_batch(one, {{{5}, 1}, {{5}, 1}}, 1),
-             make_computed_batch(one, {{{0}, 10}}, 2)});
-  check_invariants(state);
-  now += 20s;
-  heartbeat(first, {held(one, {{5}, 1}, 9)});
-}
-
-TEST_F(HostileTest, WhatIsSetAsideIsHeldAndComputedAsWell) {
-  add_campaign(one, 10);
-  say_hello(first, hello());
-  proto::Heartbeat heartbeat =
-      make_heartbeat(4096, {held(one, {{0}, 6})}, {make_computed_batch(one, {{{0}, 6}}, 1)});
-  for (const auto& runs : {held(one, {{3}, 6}, 4), held(one, {{3}, 1}, 5), held(two, {{0}, 1})}) {
-    *heartbeat.add_set_aside() = runs;
-  }
-  on_heartbeat(state, first, heartbeat, 1, now, outbox);
-  check_invariants(state);
-  crash(first);
-}
-
-TEST_F(HostileTest, RunsAreGivenBackThatAreNotLent) {
-  add_campaign(one, 10);
-  add_worker(first);
-  on_give_back(
-      state, first,
-      make_give_back(LossReason::failed, {held(one, {{0}, num_runs_max}), held(one, {{0}, 1}),
-                                          held(two, {{0}, 1}), held(one, {{5}, 5}, attempt_max)}),
-      now, outbox);
-  check_invariants(state);
-  on_bye(state, first, LossReason::failed, now, outbox);
-  deliver(first, one, {0});
-  EXPECT_TRUE(outbox.take_stored().empty()) << "it is not registered any more";
-}
-
-TEST_F(HostileTest, AResultIsInItsBatchTwice) {
-  add_campaign(one, 10);
-  add_busy_worker(first);
-  deliver(first, one, {0, 0, 1, 0, 99, 99});
-  EXPECT_EQ(outbox.take_stored(), (Runs{{0}, {1}}));
-  deliver(first, one, {0, 0});
-  EXPECT_TRUE(outbox.take_compared().empty()) << "they are repeated";
-}
-
-// Times that a worker claims are the only clock of its batches.
-TEST_F(HostileTest, RunsTakeForEver) {
-  add_campaign(one, 10);
-  add_worker(first);
-  wire::ComputedRun slow = computed(0);
-  slow.elapsed_s = 1e300;
-  on_results(state, first, one, {1}, {slow}, now, outbox);
-  heartbeat(first, {held(one, {{1}, 1})}, {make_computed_batch(one, {{{1}, 1}}, 1)});
-  now += 5s;
-  on_tick(state, now, outbox);
-  EXPECT_TRUE(state.workers.contains(first));
-}
-
-// One heartbeat once kept a whole new campaign from all others.
-TEST_F(HostileTest, RunsAreClaimedThatWereNeverLent) {
-  add_campaign(one, 2000);
-  const WorkerId stranger{7};
-  say_hello(stranger, hello(1, "elsewhere"));
-  proto::Heartbeat heartbeat = make_heartbeat(0, {held(one, {{0}, 2000})});
-  *heartbeat.add_set_aside() = held(one, {{0}, 2000}, 2);
-  on_heartbeat(state, stranger, heartbeat, 1, now, outbox);
-  EXPECT_TRUE(state.leases.empty());
-  on_removed(state, one, outbox);
-  add_campaign(one, 2000);
-  EXPECT_TRUE(state.leases.empty()) << "nor later, of what is set aside";
-}
-
-TEST_F(HostileTest, WhatWasLentBeforeMayBeClaimedAndNoMore) {
-  add_campaign(one, 10);
-  const WorkerId stranger{7};
-  add_worker(stranger, 4, "elsewhere");
-  on_gone(state, stranger, LossReason::silent, now, outbox);
-  say_hello(stranger, hello(4, "elsewhere"));
-  on_heartbeat(state, stranger, make_heartbeat(0, {held(one, {{0}, 10})}), 9, now, outbox);
-  EXPECT_EQ(runs_held_text(state, stranger), "0..3");
 }
 
 // Others computed the campaign, and it was idle, for as long as one worker liked.
@@ -411,18 +278,6 @@ TEST_F(HostileTest, ATruthIsMadeUpOfARunThatWasNotLent) {
   add_worker(first);
   deliver(first, one, {7});
   EXPECT_EQ(outbox.take_stored(), Runs{{7}}) << "as the run draws it";
-}
-
-TEST_F(HostileTest, ACampaignIsRemovedAndAddedWhileAResultIsCompared) {
-  add_campaign(one, 2);
-  add_worker(first);
-  complete(first, one, {0});
-  deliver(first, one, {0});
-  ASSERT_EQ(outbox.take_compared().size(), 1U);
-  on_removed(state, one, outbox);
-  add_campaign(one, 2);
-  on_compared(state, one, {0}, first, true, now, outbox);
-  EXPECT_EQ(campaign(one).num_comparing, 0U);
 }
 
 }  // namespace

@@ -189,22 +189,6 @@ class HeartbeatTest : public DispatchFixture {
   }
 };
 
-TEST_F(HeartbeatTest, ALeaseThatNeverArrivedIsLentAgain) {
-  lend_one();
-  now += 11s;
-  heartbeat(first);  // The lease may be under way.
-  outbox.expect_nothing_more();
-
-  now += 1s;
-  heartbeat(first);
-  EXPECT_EQ(outbox.take_events(),
-            Strings{"runs_lost worker=1 runs=0 attempt=1 reason=never_arrived"});
-  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::never_arrived);
-  const auto again = outbox.take_sent<proto::RunLease>(first);
-  EXPECT_EQ(wire::runs_of(again), (RunRange{{0}, 1}));
-  EXPECT_EQ(again.attempt(), 2U);
-}
-
 TEST_F(HeartbeatTest, ALeaseIsNotMissedInAHeartbeatThatHasWaited) {
   lend_one();
   state.is_behind = true;
@@ -212,13 +196,6 @@ TEST_F(HeartbeatTest, ALeaseIsNotMissedInAHeartbeatThatHasWaited) {
   heartbeat(first);
   EXPECT_EQ(state.leases.size(), 1U);
   outbox.expect_nothing_more();
-}
-
-TEST_F(HeartbeatTest, ALeaseThatIsHeldStays) {
-  lend_one();
-  now += 1h;
-  heartbeat(first, {held(one, {{0}, 1})});
-  EXPECT_EQ(state.leases.size(), 1U);
 }
 
 TEST_F(HeartbeatTest, AnOpenRunThatAWorkerHoldsIsLentToIt) {
@@ -298,14 +275,6 @@ TEST_F(HeartbeatTest, ACampaignThatHasEndedIsForgotten) {
   const auto forget = outbox.take_sent<proto::Forget>(first);
   EXPECT_EQ(forget.campaign(), two.value);
   EXPECT_EQ(forget.num_runs(), 5U);
-}
-
-TEST_F(HeartbeatTest, RunsThatAreGivenBackAreLentAgain) {
-  lend_one();
-  give_back(first, held(one, {{0}, 1}), LossReason::preempted);
-  EXPECT_EQ(outbox.take_events(), Strings{"runs_lost worker=1 runs=0 attempt=1 reason=preempted"});
-  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::preempted);
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).attempt(), 2U);
 }
 
 // A message that was long under way must not take back what has been lent anew since.

@@ -238,21 +238,6 @@ TEST_F(LendingTest, LearnsTheTimeOfARunFromBatchesThatAreNotShort) {
   EXPECT_EQ(campaign(two).run_time_s, 300.0) << "nothing else is known";
 }
 
-TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {
-  MicroscopeCampaign definition;
-  definition.num_runs = 3;
-  definition.dispersions[5] = {.law = Law::table, .file = "f", .column = "a"};
-  definition.dispersions[9] = {.law = Law::table, .file = "f", .column = "b"};
-  definition.table_columns = {{1.0, 2.0, 3.0}, {10.0, 20.0, 30.0}};
-  StoredCampaign stored = stored_campaign(3);
-  stored.definition = std::make_shared<const MicroscopeCampaign>(definition);
-  stored.finished = {{{0}, 1}};
-  on_campaign(state, one, stored, now, outbox);
-  add_worker(first, 2);
-  EXPECT_EQ(vector_of(outbox.take_sent<proto::RunLease>(first).table_values()),
-            (std::vector<double>{2.0, 20.0, 3.0, 30.0}));
-}
-
 // Runs that a lost worker held come before those that were never lent.
 TEST_F(LendingTest, GivesRunsThatWereLentBeforeFirst) {
   add_campaign(one, 10);
@@ -427,17 +412,6 @@ TEST_F(TailTest, TheAttemptGrowsAlsoAfterCopiesThatWereLost) {
   on_bye(state, first, LossReason::preempted, now, outbox);
   EXPECT_TRUE(campaign(one).pending.contains(Attempt{3}));
   EXPECT_TRUE(campaign(one).copies.empty());
-  outbox.forget();
-}
-
-TEST_F(TailTest, TheFirstResultCountsAndTheOtherWorkerIsAskedBack) {
-  begin_copies();
-  deliver(second, one, {1}, 2);
-  EXPECT_EQ(outbox.take_stored(), Runs{{1}});
-  EXPECT_EQ(taken_back(first), (Ranges{{{1}, 1}}));
-  deliver(first, one, {1});
-  EXPECT_EQ(outbox.take_compared(), Runs{{1}});
-  EXPECT_EQ(campaign(one).num_duplicates, 1U);
   outbox.forget();
 }
 

@@ -30,22 +30,6 @@ class ModelsTest : public DispatchFixture {
   }
 };
 
-TEST_F(ModelsTest, AreLentToWorkersThatHaveThem) {
-  add_campaign_of_other_model(one, 10);
-  add_worker(first, 4);  // Is lent nothing, whatever happens.
-  heartbeat(first);
-  add_campaign(two, 10);
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).campaign(), two.value);
-  add_worker_with_other(second, 4);
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(second).campaign(), one.value) << "the first of both";
-  complete(second, one, {0, 1, 2, 3});
-  for (const auto& [id, lease] : state.leases) {
-    EXPECT_EQ(lease.campaign, lease.worker == first ? two : one);
-  }
-  EXPECT_EQ(campaign(one).lent.runs().size(), 4U);
-  EXPECT_EQ(campaign(two).lent.runs().size(), 4U);
-}
-
 // However long it takes: an idle worker that cannot help takes nothing off another one.
 TEST_F(ModelsTest, AreNotCopiedToWorkersWithoutThem) {
   state.config.lease_duration_max = std::chrono::seconds(1);

@@ -13,21 +13,6 @@ class ResultTest : public DispatchFixture {
   }
 };
 
-TEST_F(ResultTest, IsAcknowledgedAfterTheCommitAndNotBefore) {
-  deliver(first, one, {0});
-  ASSERT_EQ(outbox.stored().size(), 1U);
-  EXPECT_EQ(outbox.stored()[0].campaign, one);
-  EXPECT_EQ(outbox.stored()[0].worker, session_of(first));
-  EXPECT_EQ(outbox.stored()[0].attempt, Attempt{1});
-  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 2}));
-  EXPECT_EQ(outbox.num_sent(), 0U);
-
-  commit(one);
-  const auto ack = outbox.take_sent<proto::ResultAck>(first);
-  EXPECT_EQ(ack.campaign(), one.value);
-  EXPECT_EQ(wire::runs_of(ack), Runs{{0}});
-}
-
 // Once it was stored, the file would be called damaged for ever.
 TEST_F(ResultTest, ThatNoSimulationYieldsIsRefused) {
   wire::ComputedRun impossible = computed(0);
@@ -96,22 +81,6 @@ TEST_F(ResultTest, OfARunThatIsLentToAnotherIsTakenAndTheOtherOneAskedBack) {
   outbox.forget();
 }
 
-TEST_F(ResultTest, OfARunThatIsPendingIsTaken) {
-  deliver(first, one, {7});
-  EXPECT_EQ(outbox.take_stored(), Runs{{7}});
-  outbox.forget();
-}
-
-TEST_F(ResultTest, OfARunThatWasGivenUpIsTaken) {
-  StoredCampaign stored = stored_campaign(2);
-  stored.given_up = {{{0}, 1}};
-  on_campaign(state, two, stored, now, outbox);
-  deliver(first, two, {0});
-  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
-  EXPECT_TRUE(campaign(two).given_up.empty());
-  outbox.forget();
-}
-
 TEST_F(ResultTest, OfACampaignThatIsNotServedIsKept) {
   deliver(first, two, {0});
   const auto not_served = outbox.take_sent<proto::NotServed>(first);
@@ -142,16 +111,6 @@ TEST_F(ResultTest, OfOtherQuantitiesThanTheCampaignsIsRefused) {
   outbox.forget();
 }
 
-TEST_F(ResultTest, WithoutAnEstimateIsCounted) {
-  on_results(state, first, one, {1},
-             {computed(0, RunStatus::no_draw), computed(1, RunStatus::not_converged),
-              computed(2, RunStatus::not_finite)},
-             now, outbox);
-  EXPECT_EQ(campaign(one).num_without_estimate, 3U);
-  EXPECT_EQ(outbox.take_stored().size(), 3U);
-  outbox.forget();
-}
-
 TEST_F(ResultTest, LastOneEndsTheCampaignAndWorkersForgetIt) {
   complete(first, one, {0, 1, 2, 3, 4, 5, 6, 7, 8});
   deliver(first, one, {9});
@@ -163,21 +122,6 @@ TEST_F(ResultTest, LastOneEndsTheCampaignAndWorkersForgetIt) {
   EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
   EXPECT_EQ(outbox.take_events(),
             Strings{"campaign_finished runs=10 given_up=0 duplicates=0 compared=0"});
-}
-
-TEST_F(ResultTest, ThatCannotBeStoredStopsTheLendingUntilItIs) {
-  on_store_failed(state, one, "no space", outbox);
-  on_store_failed(state, one, "no space", outbox);
-  EXPECT_EQ(outbox.take_events(), Strings{"storage_failed reason=\"no space\""});
-  deliver(first, one, {0});
-  ASSERT_EQ(outbox.take_stored(), Runs{{0}});
-  outbox.expect_nothing_more();  // Neither an acknowledgement nor a lease.
-
-  on_committed(state, one, Runs{{0}}, now, outbox);
-  (void)outbox.take_sent<proto::ResultAck>(first);
-  on_store_recovered(state, one, now, outbox);
-  EXPECT_EQ(taken_lease(first), (RunRange{{1}, 2}));
-  EXPECT_EQ(outbox.take_events(), Strings{"storage_recovered delivered=0"});
 }
 
 }  // namespace

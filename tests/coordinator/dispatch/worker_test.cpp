@@ -20,16 +20,6 @@ class WorkerTest : public DispatchFixture {
   }
 };
 
-TEST_F(WorkerTest, IsWelcomed) {
-  say_hello(first, hello(3));
-  const auto welcome = outbox.take_sent<proto::Welcome>(first);
-  EXPECT_EQ(welcome.worker_id(), first.value);
-  EXPECT_EQ(welcome.heartbeat_interval_s(), 5.0);
-  EXPECT_EQ(outbox.take_events(),
-            Strings{"worker_registered worker=1 name=w host=host pid=100 slots=3"});
-  EXPECT_EQ(state.num_slots, 3U);
-}
-
 TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
   add_campaign(one, 10);
   add_worker(first);
@@ -74,48 +64,6 @@ TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
   now += 500ms;
   say_hello(first, hello());
   (void)outbox.take_sent<proto::Welcome>(first);
-}
-
-TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
-  add_campaign(one, 1);
-  const auto expect_reject = [&] {
-    const auto reject = outbox.take_sent<proto::Reject>(first);
-    EXPECT_EQ(reject.reason(), proto::REJECT_REASON_NOT_REGISTERED);
-    EXPECT_EQ(reject.text(), "this worker is not registered");
-    outbox.expect_nothing_more();
-  };
-  on_heartbeat(state, first, make_heartbeat(1), 1, now, outbox);
-  expect_reject();
-  deliver(first, one, {0});
-  expect_reject();
-  give_back(first, held(one, {{0}, 1}));
-  expect_reject();
-  on_campaign_request(state, first, one, 0, now, outbox);
-  expect_reject();
-  reject_unregistered(first, outbox);
-  expect_reject();
-  on_bye(state, first, LossReason::preempted, now, outbox);
-  crash(first);
-}
-
-TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
-  add_campaign(one, 1);
-  add_busy_worker(first);
-  on_campaign_request(state, first, one, 7, now, outbox);
-  const auto sent = outbox.take_definition();
-  EXPECT_EQ(sent.worker, first);
-  EXPECT_EQ(sent.campaign, one);
-  EXPECT_EQ(sent.offset, 7U);
-  EXPECT_EQ(sent.definition, campaign(one).definition);
-}
-
-TEST_F(WorkerTest, IsToldWhichCampaignsAreNotServed) {
-  add_worker(first);
-  on_campaign_request(state, first, one, 0, now, outbox);
-  EXPECT_EQ(outbox.take_sent<proto::NotServed>(first).campaign(), one.value);
-  on_ended(state, one, 1);
-  on_campaign_request(state, first, one, 0, now, outbox);
-  EXPECT_EQ(outbox.take_sent<proto::Forget>(first).campaign(), one.value);
 }
 
 TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
@@ -209,17 +157,6 @@ TEST_F(WorkerTest, ThatIsSuspectIsLentNothing) {
   (void)outbox.take_sent<proto::RunLease>(first);
 }
 
-TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
-  add_campaign(one, 1);
-  add_busy_worker(first);
-  add_worker(second);
-  on_bye(state, first, LossReason::walltime, now, outbox);
-  EXPECT_EQ(outbox.take_sent<proto::RunLease>(second).attempt(), 2U);
-  EXPECT_EQ(outbox.take_events(), (Strings{"worker_left worker=1 name=w reason=walltime",
-                                           "runs_lost worker=1 runs=0 attempt=1 reason=walltime"}));
-  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::walltime);
-}
-
 TEST_F(WorkerTest, FilesKnowTheWorkersThatWereLentRunsAndHowTheyEnded) {
   const auto known = [&] {
     std::set<std::pair<CampaignId, SessionId>> all;
@@ -259,18 +196,6 @@ TEST_F(WorkerTest, ThatIsAwaitedAndDoesNotComeHasEnded) {
   ASSERT_EQ(ended.size(), 1U);
   EXPECT_EQ(ended[0].session, session_of(second));
   EXPECT_EQ(ended[0].reason, LossReason::silent);
-  outbox.forget();
-}
-
-TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
-  add_campaign(one, 3);
-  add_busy_worker(first, 2);
-  EXPECT_EQ(runs_held_text(state, first), "0..1");
-  EXPECT_EQ(runs_held_text(state, second), "none");
-  add_campaign(two, 1);
-  EXPECT_EQ(runs_held_text(state, first), "hardy2013:0..1");
-  on_gone(state, first, LossReason::protocol, now, outbox);
-  EXPECT_EQ(runs_held_text(state, first), "none");
   outbox.forget();
 }
 

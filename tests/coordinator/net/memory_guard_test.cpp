@@ -94,27 +94,6 @@ class MemoryGuardTest : public testing::Test {
   std::size_t size_at_start = ResidentMemory().size();
 };
 
-TEST_F(MemoryGuardTest, FreesWhatSocketsHold) {
-  const MemoryGuard guard((size_at_start + 60 * mebibyte) / 3 * 4, actions());
-  {
-    const std::lock_guard lock(mutex);
-    held.assign(100 * mebibyte, 'x');
-  }
-  EXPECT_EQ(wait_for_events(1), std::vector<std::string>{"sockets_reset"});
-  EXPECT_LT(ResidentMemory().size(), size_at_start + 20 * mebibyte);
-}
-
-// Looked for again after a pause, in which peers get in again.
-TEST_F(MemoryGuardTest, ClosesSocketsThatHoldTooManyDescriptors) {
-  lacks_descriptors = true;
-  const MemoryGuard guard(std::size_t{1} << 40, actions());
-  EXPECT_EQ(wait_for_events(1), std::vector<std::string>{"sockets_reset"});
-  const auto begin = std::chrono::steady_clock::now();
-  lacks_descriptors = true;
-  EXPECT_EQ(wait_for_events(2), (std::vector<std::string>{"sockets_reset", "sockets_reset"}));
-  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
-}
-
 TEST_F(MemoryGuardTest, TellsOnceOfWhatItCannotFree) {
   const std::vector<char> needed(100 * mebibyte, 'x');
   const MemoryGuard guard((size_at_start + 60 * mebibyte) / 3 * 4, actions());

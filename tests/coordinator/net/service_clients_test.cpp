@@ -58,18 +58,6 @@ TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
   EXPECT_EQ(store.stop_plan(), expected);
 }
 
-TEST_F(ServiceClients, ExtendACampaignThatKeepsItsPriority) {
-  start_with({});
-  (void)submit("a", 3, {.priority = 7, .audit_fraction = 0.5});
-  (void)submit("a", 5);
-  EXPECT_EQ(client->status().campaigns(0).num_runs(), 5U);
-  EXPECT_EQ(client->status().campaigns(0).priority(), 7);
-  end(StopRequest::now);
-  const Store store = Store::open_read_only(directory / "a.db");
-  EXPECT_EQ(store.control().priority, 7);
-  EXPECT_EQ(store.control().audit_fraction, 0.5);
-}
-
 TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
   {
     ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
@@ -106,12 +94,6 @@ TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
       "start one with --directory");
 }
 
-TEST_F(ServiceClients, SeeThatACampaignWithAStopRuleIsPaused) {
-  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
-  start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(control(ControlAction::pause), "campaign a: paused, 3 runs, 0 of them done");
-}
-
 // Its last runs are still under way, and count.
 TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
   plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 0};
@@ -133,12 +115,6 @@ TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
             "too_many_failures without_estimate=1 failures_max=0 campaign=a");
 }
 
-TEST_F(ServiceClients, SubmitACancelledCampaignAgain) {
-  start_with({test::campaign_of("a", 3)});
-  (void)control(ControlAction::cancel);
-  EXPECT_EQ(submit("a", 3), "campaign a: active, 3 runs, 0 of them done");
-}
-
 // The runs are there already: what is open again is whether they are enough.
 TEST_F(ServiceClients, GiveAFinishedCampaignAnotherRule) {
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 1, .failures_max = {}};
@@ -148,14 +124,6 @@ TEST_F(ServiceClients, GiveAFinishedCampaignAnotherRule) {
   (void)wait_for_event("campaign_summarised runs=1");
   const std::string reply = submit("a", 1, {.stop_rule = "mean(k2c) within 1%"});
   EXPECT_EQ(reply, "campaign a: active, 1 runs, 1 of them done");
-}
-
-TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
-  start_with({test::campaign_of("a", 3)});
-  (void)control(ControlAction::pause);
-  end(StopRequest::now);
-  start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_PAUSED);
 }
 
 /// A submission of so many runs with a table, as bytes.
@@ -169,35 +137,6 @@ std::string large_submission(std::uint64_t id, const std::string& name, std::siz
 proto::RequestEnvelope part_of(const std::string& bytes, std::size_t offset) {
   return test::request_of(
       test::part(bytes.size(), offset, bytes.substr(offset, wire::request_part_size_max)));
-}
-
-// One client's parts come out of order, another's in between.
-TEST_F(ServiceClients, SubmitLargeCampaignsInParts) {
-  start_with({});
-  PlayingClient other(service->clients_endpoint());
-  const std::string mine = large_submission(7, "mine", 100'000);
-  const std::string others = large_submission(7, "others", 100'001);
-  ASSERT_GT(mine.size(), 3 * wire::request_part_size_max);
-  const auto next_offset = [](PlayingClient& from) {
-    const proto::ReplyEnvelope reply = from.receive();
-    EXPECT_EQ(reply.request_id(), 7U);
-    EXPECT_TRUE(reply.has_part());
-    return reply.part().next_offset();
-  };
-  client->send(7, part_of(mine, wire::request_part_size_max));
-  EXPECT_EQ(next_offset(*client), 0U);
-  for (std::size_t offset = 0; offset < mine.size();) {
-    client->send(7, part_of(mine, offset));
-    other.send(7, part_of(others, offset));
-    EXPECT_EQ(next_offset(other), std::min(others.size(), offset + wire::request_part_size_max));
-    offset = next_offset(*client);
-  }
-  for (PlayingClient* const asker : {&*client, &other}) {
-    const proto::ReplyEnvelope reply = asker->receive_final();
-    EXPECT_EQ(reply.request_id(), 7U);
-    EXPECT_TRUE(reply.has_done());
-  }
-  EXPECT_EQ(client->status().campaigns_size(), 2);
 }
 
 TEST_F(ServiceClients, GetOneCampaignForASubmissionThatTheyRepeat) {
@@ -313,18 +252,6 @@ TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
   end(StopRequest::now);
   EXPECT_EQ(Store::open_read_only(directory / "a.db").control().priority, 5);
   EXPECT_EQ(num_summaries, 1);
-}
-
-TEST_F(ServiceClients, AreToldTheEndByAServiceThatEndsWhenAllIsDone) {
-  config.end = ServiceEnd::when_done;
-  start_with({test::campaign_of("a", 1)});
-  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_ACTIVE);
-  PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  (void)wait_for_event("campaign_summarised");
-  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_FINISHED);
-  wait_for_end();
 }
 
 }  // namespace

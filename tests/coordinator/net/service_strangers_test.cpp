@@ -4,9 +4,6 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include <fstream>
-
-#include "proto/link/keys.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -86,71 +83,6 @@ TEST_F(ServiceStrangers, AreToldWhatIsWrongAndClosedOut) {
   EXPECT_THAT(
       reject_of(1004, of_another_version),
       Pair(proto::REJECT_REASON_INCOMPATIBLE, StartsWith("protocol_version = 99 (must be ")));
-}
-
-TEST_F(ServiceStrangers, CannotSendMoreThanAMessageMayHave) {
-  config.workers_endpoint = "tcp://127.0.0.1:*";
-  start({test::campaign_of("a", 1)});
-  PlayingWorker bad(service->workers_endpoint());
-  (void)bad.register_here();
-  bad.send_frames({std::string(wire::message_size_max + 1, 'x')});  // The socket cuts it off.
-  PlayingWorker good(service->workers_endpoint(), 2001);
-  EXPECT_EQ(good.borrow().num_runs(), 1U);
-  // It is free to come back and behave.
-  EXPECT_EQ(bad.register_here().worker_id(), 1U);
-}
-
-TEST_F(ServiceStrangers, AreClosedOutIfTheyUseTwoSessionsOnOneConnection) {
-  start({test::campaign_of("a", 1)});
-  PlayingWorker bad(endpoint.address());
-  (void)bad.register_here();
-  proto::Envelope bye = bad.next_envelope(test::make_bye(LossReason::drained));
-  bye.set_session(4711);
-  bad.send_frames({wire::encode(bye)});
-  EXPECT_EQ(bad.receive<proto::Reject>().text(),
-            "session = 4711 (must be one connection's and one key's)");
-}
-
-/// A coordinator with keys, on loopback.
-class ServiceKeys : public test::ServiceTest {
- protected:
-  ServiceKeys() : keys(directory / "keys") {
-    std::filesystem::create_directory(keys);
-    coordinator_keys = wire::make_key_pair();
-    wire::write_key_pair(keys, wire::coordinator_key_name, wire::KeyRole::coordinator,
-                         *coordinator_keys);
-    config.workers_endpoint = "tcp://127.0.0.1:*";
-    config.keys = keys;
-  }
-
-  void authorize(std::string_view list, const std::vector<wire::KeyPair>& pairs) const {
-    std::ofstream file(keys / list);
-    for (const wire::KeyPair& pair : pairs) file << pair.public_key.text() << " somebody\n";
-  }
-
-  [[nodiscard]] wire::ClientSecurity security_of(const wire::KeyPair& pair) const {
-    return {.identity =
-                wire::CurveIdentity{.keys = pair, .coordinator = coordinator_keys->public_key}};
-  }
-
-  std::filesystem::path keys;
-  std::optional<wire::KeyPair> coordinator_keys;
-};
-
-TEST_F(ServiceKeys, CannotTakeASessionThatAnotherKeyHas) {
-  const wire::KeyPair owner = wire::make_key_pair();
-  const wire::KeyPair thief = wire::make_key_pair();
-  authorize(wire::authorized_workers_name, {owner, thief});
-  authorize(wire::authorized_clients_name, {});
-  start({test::campaign_of("a", 10)});
-  PlayingWorker first(service->workers_endpoint(), 1001, security_of(owner));
-  const proto::RunLease lease = first.borrow();
-  PlayingWorker second(service->workers_endpoint(), 1001, security_of(thief));
-  second.say_hello();
-  EXPECT_EQ(second.receive<proto::Reject>().text(),
-            "session = 1001 (must be one connection's and one key's)");
-  first.deliver(lease);
-  EXPECT_EQ(wire::runs_of(first.receive<proto::ResultAck>()).size(), lease.num_runs());
 }
 
 }  // namespace

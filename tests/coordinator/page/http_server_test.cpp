@@ -238,16 +238,6 @@ TEST_F(CrowdedHttpServer, ClosesThatOfTheAddressWithMost) {
   EXPECT_EQ(next.rest(), "");
 }
 
-TEST_F(CrowdedHttpServer, KeepsThoseThatShowedTheToken) {
-  RawClient trusted(server->port());
-  (void)trusted.ask("/a?token");
-  const Stuck stuck(server->port());
-  wait_for_requests(2);
-  EXPECT_THAT(answer_to_next(), HasSubstr("small"));  // In the place of `stuck`.
-  EXPECT_THAT(answer_to_next(), HasSubstr("small"));
-  EXPECT_THAT(trusted.ask("/a"), HasSubstr("small"));
-}
-
 TEST_F(CrowdedHttpServer, RefusesWhatIsTooManyIfAllAreAnsweringAToken) {
   const Stuck first(server->port(), "/large?token");
   const Stuck second(server->port(), "/large?token");

@@ -64,9 +64,6 @@ class QueryTest : public StoreTest {
   [[nodiscard]] double number_of(const std::string& sql) const {
     return std::get<double>(rows_of(sql).at(0).at(0));
   }
-  [[nodiscard]] std::int64_t integer_of(const std::string& sql) const {
-    return std::get<std::int64_t>(rows_of(sql).at(0).at(0));
-  }
   /// Text of the QueryError; empty if there is none.
   [[nodiscard]] std::string error_of(const std::string& sql) const {
     RecordingWriter writer;

@@ -136,16 +136,6 @@ TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   EXPECT_THAT(lines_of(text), Each(FitsATerminal()));
 }
 
-TEST(Summary, TellsHowTheRunsEnded) {
-  Review review = review_of(MicroscopeCampaign{}, paper_statistics(90));
-  review.results.statistics.num_estimated = 80;
-  review.results.missing = {
-      .num_not_converged = 3, .num_not_finite = 2, .num_no_draw = 1, .num_lost = 4};
-  EXPECT_THAT(summary_text(review),
-              HasSubstr("Runs      90 finished of 100, 80 completed\n"
-                        "          3 not converged, 2 not finite, 1 without draw, 4 lost\n"));
-}
-
 // The largest counts, the longest name and errors of any size.
 TEST(Report, FitsATerminal) {
   constexpr std::uint64_t most = 1'000'000'000;
@@ -262,21 +252,6 @@ TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
   EXPECT_EQ(stored("shuffled.db"), in_run_order);
 }
 
-TEST_F(StoredReport, IsStoredAgainAfterMoreRuns) {
-  Store store = Store::create(file(), test::campaign_of(10), "");
-  store.commit(test::deliveries_of(0, 5));
-  update_statistics(store, MicroscopeCampaign{});
-  store.commit(test::deliveries_of(5, 9));
-  update_statistics(store, MicroscopeCampaign{});
-  EXPECT_EQ(store.summary()->num_finished, 9U);
-  EXPECT_EQ(store.summary()->digests.results, digest_of(store));
-
-  const Entry given_up = GivenUpRun{.run = {9}};
-  store.write({&given_up, 1});
-  update_statistics(store, MicroscopeCampaign{});
-  EXPECT_EQ(store.summary()->num_given_up, 1U);
-}
-
 /// What is said of so many runs, so many of them at 1e-3 and the others at 1e-4.
 std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t num_beyond) {
   RequirementAnswer answer;
@@ -357,36 +332,6 @@ TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
   EXPECT_EQ(answer.check.num_exceedances, 4U);
   EXPECT_EQ(answer.check.num_without_estimate, 2U);
   EXPECT_EQ(answer.missing, (MissingEstimates{.num_no_draw = 1, .num_given_up = 1}));
-}
-
-// 64 runs without an exceedance are enough for 95 % with 95 % if their number was fixed (59), and
-// too few for a rule that lets one look and go on (79): see decide().
-TEST_F(StoredRequirement, IsOfAFixedSizeUntilTheCampaignIsExtended) {
-  const std::vector<std::string> texts{"k2c < 1e9 for 95% with 95%"};
-  const auto answer = [&](const Store& store) {
-    return read_review(store, test::campaign_of(64), ReviewDepth::matrix,
-                       numbered_requirements(texts))
-        .matrix[0];
-  };
-  Store store = Store::create(file(), test::campaign_of(60), "");
-  EXPECT_EQ(store.num_runs_fixed(), 60U);
-  store.extend(test::campaign_of(64), "");  // Nobody can have seen a result.
-  EXPECT_EQ(store.num_runs_fixed(), 64U);
-  store.commit(test::deliveries_of(0, 63));
-  EXPECT_FALSE(answer(store).check.is_of_fixed_size);  // It may yet be stopped.
-  EXPECT_EQ(answer(store).check.verdict, RequirementVerdict::undecided);
-  EXPECT_EQ(answer(store).check.num_runs_at_best, 64U);
-  store.commit(test::deliveries_of(63, 64));
-  EXPECT_TRUE(answer(store).check.is_of_fixed_size);
-  EXPECT_EQ(answer(store).check.verdict, RequirementVerdict::met);
-  store.extend(test::campaign_of(70), "");
-  store.commit(test::deliveries_of(64, 70));
-  EXPECT_EQ(store.num_runs_fixed(), 64U);
-  EXPECT_FALSE(answer(store).check.is_of_fixed_size);
-  EXPECT_EQ(answer(store).check.verdict, RequirementVerdict::undecided);
-  EXPECT_THAT(requirement_text(answer(store)),
-              testing::HasSubstr("Rule         sequential: holds however often one looks and "
-                                 "goes on\n"));
 }
 
 TEST_F(StoredRequirement, IsSequentialWithAStopRule) {

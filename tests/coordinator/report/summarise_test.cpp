@@ -43,30 +43,6 @@ class Summarise : public test::StoreTest {
   }
 };
 
-// Magnitudes 1 and 1.01 have a mean within 0.1 %; the mean of the errors themselves is near 0.
-TEST_F(Summarise, EndsOnceTheMagnitudesAreKnownWellEnough) {
-  Store store = finished(128, plan_of(1000), 1.0, 1.01);
-  EXPECT_EQ(next_runs(store), std::nullopt);
-  EXPECT_FALSE(is_rule_missed(store));
-}
-
-// Magnitudes 1 and 3: a mean of 2 ± 1.98/√127, which is 9 %.
-TEST_F(Summarise, AsksForTheRunsOfTheNextCheck) {
-  Store store = finished(128, plan_of(1000), 1.0, 3.0);
-  EXPECT_EQ(next_runs(store), 192U);
-  EXPECT_TRUE(is_rule_missed(store));
-}
-
-// 64 magnitudes of 1 and 63 of 3 have a mean within 8.8496 % (scipy).
-TEST_F(Summarise, TellsWhatTheRuleAskedForAndWhatItFound) {
-  Store store = finished(128, plan_of(1000), 1.0, 3.0);
-  EXPECT_EQ(stop_outcome(store)->text, "") << "not checked yet";
-  (void)next_runs(store);
-  EXPECT_EQ(stop_outcome(store)->text,
-            "Stopping  mean(k2c) within 8.85 %, half its 95 % interval\n"
-            "          after 128 runs; mean(k2c) within 5%: not reached\n");
-}
-
 // All magnitudes are 1 but for run 3, which has no estimate: one of 128 exceeds. The bound is the
 // sequential one, 5.0833 % (scipy.optimize.brentq of the evidence).
 TEST_F(Summarise, DecidesARequirement) {
@@ -120,26 +96,6 @@ TEST_F(Summarise, CountsWhereAllObjectivesHold) {
             "          in 64 of 128 runs, 41 to 59 % of all draws\n"
             "          after 128 runs; all objectives within 50%: reached\n");
   EXPECT_TRUE(stop_check_differences(store, MicroscopeCampaign{}.objectives()).empty());
-}
-
-TEST_F(Summarise, AsksForNoMoreRunsThanThereMayBe) {
-  Store store = finished(128, plan_of(150), 1.0, 3.0);
-  EXPECT_EQ(next_runs(store), 150U);
-}
-
-TEST_F(Summarise, EndsWithTheLastRunThatThereMayBe) {
-  Store store = finished(150, plan_of(150), 1.0, 3.0);
-  EXPECT_EQ(next_runs(store), std::nullopt);
-  EXPECT_TRUE(is_rule_missed(store));
-}
-
-// Of the runs that were asked for, whether they have an estimate or not.
-TEST_F(Summarise, RecordsAfterHowManyRunsItChecked) {
-  Store store = finished(128, plan_of(1000), 1.0, 3.0);
-  (void)next_runs(store);
-  EXPECT_EQ(store.stop_checks().back().num_runs, 128U);
-  EXPECT_EQ(store.summary()->num_finished, 128U);
-  EXPECT_EQ(store.summary()->num_estimated, 127U);
 }
 
 // Or a program that stops before the check would say that the rule holds.

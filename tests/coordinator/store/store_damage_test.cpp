@@ -16,22 +16,6 @@ using test::run_and_kill;
 
 using StoreCrash = test::StoreTest;
 
-TEST_F(StoreCrash, LeavesEveryCommittedResult) {
-  run_and_kill([&] {
-    Store store = Store::create(file(), campaign_of(100), "definition");
-    store.commit(deliveries_of(0, 10));
-    store.commit(deliveries_of(50, 60));
-    ::raise(SIGKILL);
-  });
-  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 20u);
-
-  Store store = Store::open(file());
-  EXPECT_EQ(store.definition(), "definition");
-  EXPECT_THAT(store.finished_runs(),
-              ElementsAre(RunRange{RunIndex{0}, 10}, RunRange{RunIndex{50}, 10}));
-  EXPECT_EQ(store.commit(deliveries_of(0, 100)).num_new, 80u);
-}
-
 TEST_F(StoreCrash, InTheMiddleOfReadingHoldsNobodyBack) {
   run_and_kill([&] {
     Store store = create(100);
@@ -50,25 +34,6 @@ TEST_F(StoreCrash, WhileCreatingIsRepairedByCreatingAgain) {
   create(3);
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   EXPECT_EQ(Store::open(file()).num_runs(), 3u);
-}
-
-TEST_F(StoreCrash, OfTheDiskFailsTheCommitAndKeepsTheEarlierOnes) {
-  Store store = create(5000);
-  store.commit(deliveries_of(0, 100));
-  {
-    const FileSizeLimit limit(300'000);
-    const std::string error = store_error_of([&] { store.commit(deliveries_of(100, 5000)); });
-    EXPECT_EQ(error, message("disk I/O error; what was committed before is safe"));
-    EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 100}));
-  }
-  EXPECT_EQ(store.commit(deliveries_of(100, 5000)).num_new, 4900u);
-  EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 5000}));
-}
-
-TEST_F(StoreCrash, OfTheDiskWhileCreatingLeavesNoFile) {
-  const FileSizeLimit limit(10'000);
-  EXPECT_THAT(store_error_of([&] { create(1); }), HasSubstr("(disk I/O error; "));
-  EXPECT_TRUE(file_names().empty());
 }
 
 // Files whose content no program of ours wrote: each is refused with a StoreError, or carried on
@@ -141,15 +106,6 @@ class StoreStop : public test::StoreTest {
   void SetUp() override { create(10); }
 };
 
-TEST_F(StoreStop, PlanIsKept) {
-  EXPECT_EQ(Store::open_read_only(file()).stop_plan(), StopPlan{});
-  const StopPlan plan{.stop_rule = "std(a_c13) within 5%", .num_runs_max = 5000, .failures_max = 0};
-  Store::open(file()).set_stop_plan(plan);
-  EXPECT_EQ(Store::open_read_only(file()).stop_plan(), plan);
-  Store::open(file()).set_stop_plan({});
-  EXPECT_EQ(Store::open_read_only(file()).stop_plan(), StopPlan{});
-}
-
 // Also if the process ends in between.
 TEST_F(StoreStop, PlanThatIsNewLeavesAFinishedCampaignActiveUntilItsRuleIsChecked) {
   Store store = Store::open(file());
@@ -220,60 +176,6 @@ TEST_F(StoreIntegrity, IsMissedByAnIndexThatLacksARow) {
   EXPECT_THAT(finding(), HasSubstr("is damaged: row 1 missing from index"));
 }
 
-TEST_F(StoreIntegrity, IsMissedByAnotherSchema) {
-  change("CREATE INDEX own ON run_result (num_rounds)");
-  EXPECT_EQ(finding(), "has what is no part of a campaign: index own");
-  change("DROP INDEX own; DROP VIEW budget");
-  EXPECT_EQ(finding(), "lacks view budget");
-  change("CREATE VIEW budget AS SELECT 1");
-  EXPECT_EQ(finding(), "has another definition of view budget");
-}
-
-// What anybody can change with SQL, and what is said of it.
-TEST_F(StoreIntegrity, IsMissedByWhatDoesNotFollowFromTheRowsBelow) {
-  std::string all_exact = "run_index = run_index";
-  for (const test::ParameterInfo& info : test::parameter_infos()) {
-    const std::string name = std::string(info.name) + std::string(info.unit_suffix);
-    all_exact += ", estimate_" + name + " = truth_" + name;
-  }
-  Store::open(file()).commit(deliveries_of(7, 8));
-  EXPECT_EQ(finding(), "") << "a second result";
-  const std::string whole = test::content_of(file());
-  const std::string digest = text("SELECT stored_digest FROM audit");
-  const std::string remedy = "; restore it from a copy";
-  const std::vector<std::pair<std::string, std::string>> cases{
-      {"UPDATE delivery SET worker_key = 99 WHERE run_index = 17",
-       "row 17 of delivery refers to no row of worker" + remedy},
-      {"UPDATE run_result SET estimate_k2c_s2_m = 1e9 WHERE run_index = 5",
-       "overrun does not follow from the result of run 5"},
-      {"UPDATE run_result SET " + all_exact + " WHERE run_index = 999",
-       "overrun has a run too many"},
-      {"UPDATE worst_run SET magnitude = 1e9 WHERE parameter = 'a_d12' AND run_index = 999",
-       "worst_run does not follow from the results of a_d12"},
-      {"UPDATE worker SET num_results = 999",
-       "worker.num_results of worker_key 1 = 999 (must be 1000, its deliveries)" + remedy},
-      {"UPDATE worker SET compute_s = 500.000001",
-       "worker.compute_s of worker_key 1 = 500.000001 (must be 500, of its deliveries)" + remedy},
-      {"UPDATE worker SET last_result_unix_s = NULL; UPDATE delivery SET received_unix_s = 7",
-       "worker.last_result_unix_s of worker_key 1 = NULL (must be 7, of its deliveries)" + remedy},
-      {"INSERT INTO worker (worker, host, num_results) VALUES ('w', 'h', 1)",
-       "worker.num_results of worker_key 2 = 1 (must be 0, its deliveries)" + remedy},
-      {"UPDATE delivery SET compute_s = -5 WHERE run_index = 3",
-       "delivery.compute_s of run 3 = -5 (must be finite and at least 0)" + remedy},
-      {"UPDATE delivery SET compute_s = 9e999 WHERE run_index = 3",
-       "delivery.compute_s of run 3 = inf (must be finite and at least 0)" + remedy},
-      {"UPDATE audit SET is_equal = 0",
-       "audit.is_equal of run 7 by worker_key 1 = 0 (must be 1, as the digests)" + remedy},
-      {"UPDATE audit SET stored_digest = '0000000000000000'",
-       "audit.stored_digest of run 7 by worker_key 1 = 0000000000000000 (must be " + digest + ")" +
-           remedy}};
-  for (const auto& [sql, what] : cases) {
-    test::write_file(file(), whole);
-    change(sql);
-    EXPECT_EQ(finding(), "is damaged: " + what) << sql;
-  }
-}
-
 // The first delivery of each run counts for its worker; sums are of commits of any size.
 TEST_F(StoreIntegrity, IsThatOfWorkersWhoseSumsWereRoundedAnotherWay) {
   const std::filesystem::path path = directory() / "rounded.db";
@@ -313,15 +215,6 @@ TEST_F(StoreBackup, IsTheSameCampaignInOneFile) {
   EXPECT_EQ(results_in(copied).size(), 1000u);
   copied.check_integrity();
   EXPECT_EQ(Database(copy(), Access::read_only).text("PRAGMA journal_mode"), "delete");
-}
-
-TEST_F(StoreBackup, LeavesNothingIfItIsInterrupted) {
-  const Store store = Store::open_read_only(file());
-  const auto interrupt = [] { throw StoreError("interrupted"); };
-  EXPECT_EQ(store_error_of([&] { store.back_up(copy(), interrupt); }), "interrupted");
-  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-  store.back_up(copy());
-  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 1000u);
 }
 
 TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {

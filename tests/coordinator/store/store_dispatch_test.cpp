@@ -33,11 +33,6 @@ TEST_F(StoreDispatch, GivesEachFileANumberThatItKeeps) {
   EXPECT_LT(id.value, std::uint64_t{1} << 63);
 }
 
-TEST_F(StoreDispatch, NamesTheProgramThatMadeTheFile) {
-  EXPECT_THAT(create().build(),
-              ::testing::MatchesRegex("proofmass [0-9.]+, [A-Za-z]+ [0-9.]+, .+"));
-}
-
 TEST_F(StoreDispatch, KeepsHowTheCampaignIsServed) {
   EXPECT_EQ(create().control(), CampaignControl{});
   for (const auto phase : {wire::CampaignPhase::paused, wire::CampaignPhase::finished,
@@ -54,44 +49,6 @@ TEST_F(StoreDispatch, RefusesAnAuditOfMoreThanAllRuns) {
   Store store = create();
   EXPECT_EQ(store_error_of([&] { write(store, {CampaignControl{.audit_fraction = 1.5}}); }),
             message("CHECK constraint failed: audit_fraction BETWEEN 0.0 AND 1.0"));
-}
-
-TEST_F(StoreDispatch, KeepsWhichCoordinatorsBeganAndEnded) {
-  const wire::Epoch killed{0xffffffffffffffff};
-  const wire::Epoch ended{1};
-  Store store = create();
-  const auto begin = [&](wire::Epoch epoch) {
-    store.begin_coordinator(
-        {.epoch = epoch, .host = "node-0", .process_id = 12, .version = "0.1.0"});
-  };
-  begin(killed);
-  begin(ended);
-  store.end_coordinator(ended);
-  EXPECT_EQ(
-      text("SELECT group_concat(epoch || ' ' || host || ' ' || process_id || ' ' || version ||"
-           " ' ' || (ended_utc IS NOT NULL), ';') FROM coordinator_start"),
-      "ffffffffffffffff node-0 12 0.1.0 0;0000000000000001 node-0 12 0.1.0 1");
-  begin(ended);  // A coordinator may open a file again that it has closed.
-  EXPECT_EQ(text("SELECT group_concat(epoch || ' ' || (ended_utc IS NOT NULL), ';')"
-                 " FROM coordinator_start"),
-            "ffffffffffffffff 0;0000000000000001 0");
-}
-
-TEST_F(StoreDispatch, KnowsWhichWorkersMayComeBack) {
-  const wire::SessionId session_2{2};
-  Store store = create();
-  write(store, {worker_1(), WorkerJoined{.session = session_2, .name = "b", .host = "node-2"}});
-  EXPECT_THAT(store.attached_sessions(), ElementsAre(session_2, session_1));
-
-  write(store, {WorkerEnded{.session = session_1, .reason = wire::LossReason::out_of_memory}});
-  EXPECT_THAT(Store::open_read_only(file()).attached_sessions(), ElementsAre(session_2));
-  EXPECT_EQ(text("SELECT worker || ' ' || host || ' ' || process_id || ' ' || num_slots || ' ' || "
-                 "end_reason FROM worker WHERE session = 'fedcba9876543210'"),
-            "worker-1 node-1 4711 8 out_of_memory");
-
-  write(store, {worker_1()});  // It was not gone after all.
-  EXPECT_THAT(store.attached_sessions(), ElementsAre(session_2, session_1));
-  EXPECT_EQ(integer("SELECT count(*) FROM worker"), 2);
 }
 
 // A peer may say any number.

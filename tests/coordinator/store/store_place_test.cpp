@@ -79,28 +79,11 @@ class StorePlace : public test::WriterTest {
   }
 };
 
-TEST_F(StorePlace, AFileThatIsRemovedWithAllBesideItIsCopied) {
-  expect_copy_after(
-      [&] {
-        for (const std::string& name : file_names()) std::filesystem::remove(directory() / name);
-      },
-      "was removed or renamed");
-}
-
 // Whatever has the name is not touched until the operator moves it away.
 TEST_F(StorePlace, AFileThatIsReplacedByAnotherCampaignIsCopied) {
   expect_copy_after([&] { replace_by_another(); }, "was replaced by another file");
   EXPECT_EQ(num_readable(backup()), 10u) << "the file under its other name";
   EXPECT_EQ(Store::open_read_only(file().string() + "~").num_runs(), 7u);
-}
-
-TEST_F(StorePlace, AFileThatIsReplacedByWhatIsNoDatabaseIsCopied) {
-  expect_copy_after(
-      [&] {
-        std::filesystem::remove(file());
-        test::write_file(file(), std::string(10'000, 'x'));
-      },
-      "was replaced by another file");
 }
 
 TEST_F(StorePlace, AFileWhoseLogIsRemovedIsCopied) {
@@ -201,16 +184,6 @@ TEST_F(StorePlace, AReaderDoesNotHoldUpTheCopy) {
     EXPECT_NE(error_of_rest(store), "");
     EXPECT_EQ(num_readable(copy()), 20u);
   });
-}
-
-TEST_F(StorePlace, AFileThatIsClosedWithoutItsNameIsCopied) {
-  {
-    Store store = create(100);
-    store.commit(deliveries_of(0, 10));
-    std::filesystem::remove(file());
-  }
-  EXPECT_EQ(num_readable(copy()), 10u);
-  EXPECT_THAT(file_names(), ElementsAre(copy().filename().string()));
 }
 
 // Otherwise a restarted coordinator would begin anew, and the copy would be forgotten.

@@ -103,25 +103,6 @@ TEST_F(StoreRest, ACopyOfACampaignThatWentOnAfterItsRestIsRefused) {
   EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone));
 }
 
-TEST_F(StoreRest, AClosedFileNeedsNoLog) {
-  { create(64).commit(deliveries_of(0, 64)); }
-  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-  EXPECT_EQ(text("SELECT is_log_needed FROM campaign"), "0");
-  { (void)Store::open(file()); }
-  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-}
-
-TEST_F(StoreRest, OfAFileThatSomebodyReadsIsRefusedWithTheReason) {
-  Store store = create(64);
-  {
-    const Reader reader(file());
-    store.commit(deliveries_of(0, 64));
-    EXPECT_THAT(store.rest().value_or(""), HasSubstr("somebody reads an old state"));
-  }
-  EXPECT_EQ(store.rest(), std::nullopt);
-  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
-}
-
 // SQLite would remove a log of which all is in the file; the mark in the file says that it is
 // needed.
 TEST_F(StoreRest, AFileWhoseMarkCannotBeClearedKeepsItsLog) {
@@ -137,22 +118,6 @@ TEST_F(StoreRest, AFileWhoseMarkCannotBeClearedKeepsItsLog) {
   { (void)Store::open(file()); }
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 64u);
-}
-
-TEST_F(StoreRest, AFileClosedWhileSomebodyReadsIsFoldedInByWhoeverOpensItNext) {
-  {
-    Store store = create(64);
-    store.commit(deliveries_of(0, 32));
-    ASSERT_EQ(store.rest(), std::nullopt);
-    const Reader reader(file());
-    store.commit(deliveries_of(32, 64));
-    const Store closed = std::move(store);
-  }
-  // The mark could not reach the file, nor could the log: both are beside it.
-  ASSERT_GT(std::filesystem::file_size(file().string() + "-wal"), 0u);
-  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 64u);
-  { const Store next = Store::open(file()); }
-  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
 }
 
 TEST_F(StoreRest, ACoordinatorGoesOnWithoutTheLogAndSaysSo) {

@@ -12,7 +12,6 @@ namespace {
 
 using detail::Access;
 using detail::Database;
-using detail::Statement;
 using test::result_of;
 using test::session_1;
 
@@ -150,40 +149,6 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
   }
 }
 
-TEST_F(StoreTest, YieldsResultsInRunOrderWhateverTheOrderOfArrival) {
-  Store store = create(300);
-  for (const std::uint64_t run : {299u, 0u, 256u, 2u, 1u}) {
-    const Delivery delivery = delivery_of(run);
-    store.commit({&delivery, 1});
-  }
-  std::vector<std::uint64_t> runs;
-  store.for_each_result([&](const RunResult& result) { runs.push_back(result.run.value); });
-  EXPECT_THAT(runs, ElementsAre(0, 1, 2, 256, 299));
-  EXPECT_THAT(store.finished_runs(),
-              ElementsAre(RunRange{RunIndex{0}, 3}, RunRange{RunIndex{256}, 1},
-                          RunRange{RunIndex{299}, 1}));
-}
-
-TEST_F(StoreTest, CommitsARunOnce) {
-  Store store = create(4);
-  EXPECT_EQ(store.commit(deliveries_of(0, 2)).num_new, 2u);
-  std::vector<Delivery> again = deliveries_of(1, 4);
-  again[0].worker = wire::SessionId{7};
-  again.push_back(again.back());  // The same run twice in one commit.
-
-  const CommitSummary summary = store.commit(again);
-
-  EXPECT_EQ(summary.num_new, 2u);
-  EXPECT_EQ(summary.num_duplicate, 2u);
-  EXPECT_EQ(summary.num_contradicting, 0u);
-  EXPECT_EQ(results_in(store).size(), 4u);
-  const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text("SELECT session FROM worker JOIN delivery USING (worker_key) WHERE "
-                          "run_index = 1"),
-            "fedcba9876543210");
-  EXPECT_EQ(database.integer("SELECT count(*) FROM delivery"), 4);
-}
-
 TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
   Store store = create(2);
   std::vector<Delivery> deliveries = deliveries_of(0, 2);
@@ -199,20 +164,6 @@ TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
   EXPECT_EQ(store_error_of([&] { store.commit(deliveries); }),
             "delivery.compute_s = inf (must be in [0, 1e9]; run 1)");
   EXPECT_THAT(store.finished_runs(), IsEmpty());
-}
-
-TEST_F(StoreTest, ExtendsToMoreRunsAndTheirTableValues) {
-  Store store = Store::create(file(), campaign_with_data(2), "num_runs = 2\n");
-  store.commit(deliveries_of(0, 2));
-  const MicroscopeCampaign larger = campaign_with_data(4);
-
-  store.extend(larger, "num_runs = 4\n");
-
-  EXPECT_EQ(store.num_runs(), 4u);
-  EXPECT_EQ(store.definition(), "num_runs = 4\n");
-  const std::vector<double> first_column = store.table_columns()[0];
-  EXPECT_THAT(first_column, ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0, 3.0 + 3.0 / 7.0));
-  EXPECT_EQ(store.commit(deliveries_of(0, 4)).num_new, 2u);
 }
 
 TEST_F(StoreTest, KeepsTheDigestOfItsTables) {

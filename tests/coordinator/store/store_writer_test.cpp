@@ -247,37 +247,6 @@ TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
-// All that the parent is told of was named by a completion before the process was killed.
-TEST_F(StoreWriterTest, NamesNothingThatAKilledProcessLoses) {
-  std::array<int, 2> channel{};
-  ASSERT_EQ(::pipe(channel.data()), 0);
-  test::run_and_kill([&] {
-    WriterConfig config = patient_config();
-    config.commit_runs_max = 10;
-    StoreWriter& writer = start(config);
-    writer.open(id, create(2000));
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
-    for (std::uint64_t num_told = 0; num_told < 500;) {
-      for (const Completion& completion : writer.take_completions()) {
-        for (const RunIndex run : std::get<Committed>(completion).runs) {
-          if (::write(channel[1], &run, sizeof run) != sizeof run) ::_exit(1);
-          ++num_told;
-        }
-      }
-    }
-  });
-  ::close(channel[1]);
-  const Store store = Store::open(file());
-  ASSERT_EQ(store.finished_runs().size(), 1u);
-  const std::uint64_t num_stored = store.finished_runs()[0].count;
-  std::uint64_t num_told = 0;
-  for (RunIndex run; ::read(channel[0], &run, sizeof run) == sizeof run; ++num_told) {
-    EXPECT_LT(run.value, num_stored);
-  }
-  ::close(channel[0]);
-  EXPECT_GE(num_told, 500u);
-}
-
 // A writer whose disk does not take what it is given.
 
 using test::committed;
@@ -293,42 +262,6 @@ class StoreWriterDisk : public test::WriterTest {
 };
 
 constexpr rlim_t small_size = 150'000;  // More than a new campaign database needs.
-
-TEST_F(StoreWriterDisk, KeepsEverythingThroughAFailureAndReportsItOnce) {
-  StoreWriter& writer = start();
-  writer.open(id, create(5000));
-  {
-    const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
-    writer.write(id, SecondDelivery{wrong_delivery_of(1999)});
-    writer.flush();
-    EXPECT_THAT(take_completions(), ElementsAre(failed(io_error)));
-    writer.write(id, delivery_of(2000));
-    writer.flush();
-    EXPECT_THAT(take_completions(), IsEmpty());
-    EXPECT_THAT(Store::open_read_only(file()).finished_runs(), IsEmpty());
-  }
-  writer.flush();
-  std::vector<std::uint64_t> runs(2000);
-  std::iota(runs.begin(), runs.end(), 0);
-  EXPECT_THAT(take_completions(), ElementsAre(committed(runs), "compared 1999 different",
-                                              "recovered", "committed 2000"));
-}
-
-TEST_F(StoreWriterDisk, TriesAgainByItself) {
-  WriterConfig config = patient_config();
-  config.commit_runs_max = 2000;
-  config.retry_after = std::chrono::milliseconds(1);
-  StoreWriter& writer = start(config);
-  writer.open(id, create(5000));
-  {
-    const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
-    wait_for(failed(io_error));
-  }
-  wait_for("recovered");
-  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 2000u);
-}
 
 TEST_F(StoreWriterDisk, DropsRecordsThatNobodyWaitsForBeyondALimit) {
   WriterConfig config = patient_config();
@@ -390,50 +323,6 @@ TEST_F(StoreWriterDisk, EndsWithoutWaitingForIt) {
     end();
   }
   EXPECT_THAT(Store::open(file()).finished_runs(), IsEmpty());
-}
-
-/// A file system of one megabyte that only this process sees.
-class SmallFileSystem {
- public:
-  explicit SmallFileSystem(std::filesystem::path path) : path_(std::move(path)) {
-    std::filesystem::create_directory(path_);
-    is_mounted_ = ::unshare(CLONE_NEWNS) == 0 &&
-                  ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
-                  ::mount("tmpfs", path_.c_str(), "tmpfs", 0, "size=1m") == 0;
-  }
-  ~SmallFileSystem() {
-    if (is_mounted_) ::umount2(path_.c_str(), MNT_DETACH);
-  }
-  SmallFileSystem(const SmallFileSystem&) = delete;
-  SmallFileSystem& operator=(const SmallFileSystem&) = delete;
-
-  [[nodiscard]] bool is_mounted() const { return is_mounted_; }
-
- private:
-  std::filesystem::path path_;
-  bool is_mounted_ = false;
-};
-
-TEST_F(StoreWriterDisk, GoesOnWhenSpaceIsFreedOnAFullOne) {
-  const std::filesystem::path mount = directory() / "small";
-  const SmallFileSystem small(mount);
-  if (!small.is_mounted()) return test::skip_for_want("no permission to mount a file system");
-  StoreWriter& writer = start();
-  writer.open(id, Store::create(mount / "campaign.db", campaign_of(5000), ""));
-  std::ofstream ballast(mount / "ballast");
-  ballast << std::string(700'000, 'x') << std::flush;
-  for (std::uint64_t run = 0; run < 1000; ++run) writer.write(id, delivery_of(run));
-  writer.flush();
-  EXPECT_THAT(take_completions(),
-              ElementsAre("failed campaign database = " + (mount / "campaign.db").string() +
-                          " (the disk is full; what was committed before is safe, free space and "
-                          "try again)"));
-  ballast.close();
-  std::filesystem::remove(mount / "ballast");
-  writer.flush();
-  EXPECT_THAT(take_completions(), Contains("recovered"));
-  end();
-  EXPECT_EQ(results_in(Store::open(mount / "campaign.db")).size(), 1000u);
 }
 
 }  // namespace

@@ -57,16 +57,9 @@ TEST(HtmlTables, SayHowTheyAreSorted) {
 }
 
 const std::string bad = "\033[1;38;5;130m";
-const std::string bold = "\033[1m";
-const std::string plain = "\033[0m";
 
 Table named_runs(std::vector<Row> rows) {
   return {.columns = {{"name", true, 6}, {"runs", false, 6}}, .rows = std::move(rows)};
-}
-
-TEST(TerminalTable, KeepsASpaceBetweenColumns) {
-  EXPECT_EQ(terminal_text(named_runs({{"Δx", "12"}, {"a", ""}})),
-            "name    runs\n────────────\nΔx        12\na\n");
 }
 
 TEST(TerminalTable, WidensItsColumnsForLongCells) {
@@ -91,24 +84,6 @@ TEST(TerminalTable, GoesOnBelowWhereADocumentHasNoRoom) {
             "a calibration/of-it     12\nb                        3\n");
 }
 
-TEST(TerminalTable, HasGroupsVerticalLinesAndATotal) {
-  const Table table{.columns = {{"name", true, 6},
-                                {"mean", false, 6, "this"},
-                                {"std", false, 6, "this"},
-                                {"hidden", false, 6, "this", false, true},
-                                {"mean", false, 6, "this", true},
-                                {"", true, 2}},
-                    .rows = {{"a", "1", "2", "x", "3", " *"}, {"sum", "4", "5", "y", "6", ""}},
-                    .has_total = true};
-  EXPECT_EQ(terminal_text(table),
-            "          this    │ this\n"
-            "name    mean  std │  mean\n"
-            "──────────────────┼──────\n"
-            "a          1    2 │     3 *\n"
-            "──────────────────┼──────\n"
-            "sum        4    5 │     6\n");
-}
-
 TEST(TerminalTable, KeepsItsLinesWhereNumbersAndHeadingsAreWide) {
   const Table table{.columns = {{"a", true, 3},
                                 {"from", false, 7},
@@ -120,26 +95,6 @@ TEST(TerminalTable, KeepsItsLinesWhereNumbersAndHeadingsAreWide) {
             "a      from     to │         b\n"
             "───────────────────┼──────────\n"
             "S   4.8e-04 5.5e-04│         1\n");
-}
-
-TEST(TerminalTable, HasACaptionRemarksAndSentences) {
-  Table table = named_runs({});
-  table.caption = "runs";
-  table.remarks = {{"a: " + std::string(80, 'x')}};
-  table.notes = {std::string(74, 'n') + " wraps at 80"};
-  EXPECT_EQ(terminal_text(table, {.line_width_max = 20, .cuts_remarks = true}),
-            "runs\n\nname    runs\n────────────\na: xxxxxxxxxxxxxxxx…\n" + std::string(74, 'n') +
-                " wraps\n  at 80\n");
-  EXPECT_NE(terminal_text(table).find("\na: " + std::string(80, 'x') + "\n"), std::string::npos);
-}
-
-TEST(TerminalTable, PaintsTonesAndChangesNoBlank) {
-  Table table = named_runs({{"a", "2"}});
-  table.rows[0][1].tone = Tone::bad;
-  table.remarks = {{"a: lost", Tone::bad}};
-  EXPECT_EQ(terminal_text(table, {.paint = Paint::yes}),
-            bold + "name    runs" + plain + "\n────────────\na          " + bad + "2" + plain +
-                "\n" + bad + "a: lost" + plain + "\n");
 }
 
 TEST(TerminalTable, ShowsControlCharacters) {

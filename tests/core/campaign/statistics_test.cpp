@@ -30,17 +30,6 @@ CampaignStatistics statistics_of_errors(const std::vector<double>& errors) {
   return statistics_of(results);
 }
 
-// |error| = 1, 2, 3, 4: mean 2.5, squared deviations 2.25 + 0.25 + 0.25 + 2.25 = 5, over n − 1 = 3.
-TEST(Statistics, AreThoseOfTheAbsoluteError) {
-  const CampaignStatistics statistics = statistics_of_errors({1.0, -2.0, 3.0, -4.0});
-  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
-    EXPECT_EQ(accuracy.worst, 4.0);
-    EXPECT_EQ(accuracy.worst_run, RunIndex{3});
-    EXPECT_EQ(accuracy.mean, 2.5);
-    EXPECT_DOUBLE_EQ(accuracy.standard_deviation, std::sqrt(5.0 / 3.0));
-  }
-}
-
 TEST(Statistics, HaveTheHealthOfRunsWithAnEstimate) {
   std::vector<RunResult> results;
   for (const double health : {1.0, 5.0, 3.0}) {
@@ -55,39 +44,6 @@ TEST(Statistics, HaveTheHealthOfRunsWithAnEstimate) {
   EXPECT_EQ(statistics.health[0].worst, 5.0);
   EXPECT_EQ(statistics.health[0].mean, 3.0);
   EXPECT_EQ(statistics.health[1].mean, 0.25);
-}
-
-// Run 0 is within all objectives, run 1 beyond one, run 2 beyond two of them, run 3 has no
-// estimate. 1 of 4 draws, and of 5 with one that was given up: 0.631 to 80.6 % and 0.505 to 71.6 %
-// (scipy.stats.beta.ppf); of the runs with an estimate 2 of 3 are beyond the first, 9.43 to 99.2 %.
-TEST(Statistics, CountRunsWithinAllObjectivesTogether) {
-  std::vector<RunResult> results;
-  for (std::uint64_t run = 0; run < 4; ++run) {
-    RunResult result = run_with_error(run, -1.0);
-    if (run >= 1) result.estimate[index(a_c12)] = -1.5;
-    if (run == 2) result.estimate[index(k2d)] = 1.5;
-    if (run == 3) result.status = RunStatus::not_finite;
-    results.push_back(result);
-  }
-  const CampaignStatistics statistics = statistics_of(results);
-  EXPECT_EQ(statistics.num_within_objectives, 1u);
-  EXPECT_NEAR(statistics.within_objectives(0)->lower, 0.00630946, 1e-8);
-  EXPECT_NEAR(statistics.within_objectives(0)->upper, 0.80587956, 1e-8);
-  EXPECT_NEAR(statistics.within_objectives(1)->lower, 0.00505076, 1e-8);
-  EXPECT_NEAR(statistics.within_objectives(1)->upper, 0.71641793, 1e-8);
-  EXPECT_EQ(statistics.accuracy[index(a_c12)].num_beyond_objective, 2u);
-  EXPECT_NEAR(statistics.accuracy[index(a_c12)].beyond_objective.lower, 0.09429932, 1e-8);
-  EXPECT_NEAR(statistics.accuracy[index(a_c12)].beyond_objective.upper, 0.99159624, 1e-8);
-  EXPECT_EQ(CampaignStatistics{}.within_objectives(0), std::nullopt);
-}
-
-TEST(Statistics, TakeTheErrorAgainstTheTruth) {
-  RunResult result = run_with_error(0, 0.0);
-  result.truth[index(k2d)] = 100.0;
-  result.estimate[index(k2d)] = 75.0;
-  const CampaignStatistics statistics = statistics_of({result});
-  EXPECT_EQ(statistics.accuracy[index(k2d)].worst, 25.0);
-  EXPECT_EQ(statistics.accuracy[index(k2c)].worst, 0.0);
 }
 
 TEST(Statistics, CountEveryStatusAndLeaveOutRunsThatAreNotCompleted) {
@@ -120,19 +76,6 @@ TEST(Statistics, ResolveASpreadFarBelowTheMean) {
   const AccuracyStatistic accuracy = statistics_of_errors(errors).accuracy[index(a_c12)];
   EXPECT_NEAR(accuracy.mean, 1e8, 1.5e-8);  // Half a unit in the last place of 1e8, twice.
   EXPECT_NEAR(accuracy.standard_deviation / 1e-4, std::sqrt(n / (n - 1.0)), 7.5e-5);
-}
-
-// Signed errors 1, −2, 3, −4: mean −½, squares 30/4, squared deviations 30 − 1 = 29 over 3.
-TEST(Statistics, KeepTheSignOfTheErrorApart) {
-  const ErrorStatistic error =
-      statistics_of_errors({1.0, -2.0, 3.0, -4.0}).accuracy[index(a_c13)].error;
-  EXPECT_EQ(error.bias, -0.5);
-  EXPECT_DOUBLE_EQ(error.rms, std::sqrt(7.5));
-  EXPECT_DOUBLE_EQ(error.standard_deviation, std::sqrt(29.0 / 3.0));
-  EXPECT_LT(error.bias_interval->lower, -0.5);
-  EXPECT_FALSE(error.deviation_interval.has_value());  // Five values have one.
-  // Third central moments sum to 3.375 − 3.375 + 42.875 − 42.875: symmetric about −½.
-  EXPECT_NEAR(error.skewness, 0.0, 1e-15);
 }
 
 // Each is what the functions of core/statistics say of the errors or of their magnitudes.

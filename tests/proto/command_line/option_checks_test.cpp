@@ -95,11 +95,6 @@ std::string refusal_of_file(const std::string& content) {
   return text;
 }
 
-TEST(OptionFile, IsAcceptedIfItHasOptionsOnly) {
-  EXPECT_EQ(refusal_of_file("# mine\n[watch]\nconnect = \"ipc:///a\"\n"), "");
-  EXPECT_EQ(refusal_of_file("watch.connect = \"ipc:///a\"\n"), "");
-}
-
 TEST(OptionFile, IsRefusedWithTheLineAndTheNearestName) {
   EXPECT_EQ(refusal_of_file("[list]\n\n[watch]\n# mine\nconect = \"ipc:///a\"\n"),
             "config = FILE:5 (watch.conect is no option; nearest is connect)");

@@ -61,21 +61,6 @@ TEST(KeyFiles, PublicOneDoesNotHoldTheSecret) {
   EXPECT_EQ(text_of(directory / "client.pub").find(pair.secret_key.reveal()), std::string::npos);
 }
 
-TEST(KeyFiles, ThatOthersCanReadAreRefused) {
-  const ScratchDirectory directory;
-  write_key_pair(directory.path(), "worker", KeyRole::worker, make_key_pair());
-  const auto file = directory / "worker.key";
-  for (const auto& [mode, text] :
-       {std::pair{0644, "0644"}, {0640, "0640"}, {0604, "0604"}, {0620, "0620"}, {0601, "0601"}}) {
-    ::chmod(file.c_str(), static_cast<mode_t>(mode));
-    EXPECT_EQ(reading(file, KeyRole::worker),
-              message(file, std::string("mode ") + text +
-                                "; must be readable by its owner alone: chmod 600"));
-  }
-  ::chmod(file.c_str(), 0400);
-  EXPECT_EQ(reading(file, KeyRole::worker), "accepted");
-}
-
 TEST(KeyFiles, OfSomebodyElseAreRefused) {
   if (::geteuid() != 0) return test::skip_for_want("only root can give a file away");
   const ScratchDirectory directory;
@@ -183,25 +168,6 @@ TEST(PublicKeys, Are40CharactersOfZ85AndNoComment) {
   digits[0] = '#';
   EXPECT_FALSE(PublicKey::parse(digits));
   EXPECT_FALSE(SecretKey::parse(good.substr(1)));
-}
-
-TEST(Security, IsReadFromADirectory) {
-  const ScratchDirectory directory;
-  const KeyPair coordinator = make_key_pair();
-  const KeyPair client = make_key_pair();
-  write_key_pair(directory.path(), "coordinator", KeyRole::coordinator, coordinator);
-  write_key_pair(directory.path(), "client", KeyRole::client, client);
-
-  const ServerSecurity server = read_server_security(directory.path(), Domain::clients);
-  const ClientSecurity mine = read_client_security(directory.path(), KeyRole::client);
-
-  EXPECT_EQ(server.domain, Domain::clients);
-  EXPECT_EQ(server.keys.value().secret_key.reveal(), coordinator.secret_key.reveal());
-  EXPECT_EQ(mine.identity.value().role, KeyRole::client);
-  EXPECT_EQ(mine.identity.value().keys.public_key, client.public_key);
-  EXPECT_EQ(mine.identity.value().coordinator, coordinator.public_key);
-  EXPECT_EQ(refusal_of([&] { (void)read_client_security(directory.path(), KeyRole::worker); }),
-            message(directory / "worker.key", "No such file or directory"));
 }
 
 TEST(WholeFile, ReplacesOnlyWhenAsked) {

@@ -6,7 +6,6 @@
 #include "proto/text/visible_text.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/proto/text/hostile_values.hpp"
-#include "tests/support/faults/planned_faults.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::wire {
@@ -99,127 +98,6 @@ TEST(MakeLog, LeavesOutWhatIsBelowItsLevel) {
   const std::string text = written(make_log("quiet", LogFormat::text, LogLevel::warning));
   EXPECT_THAT(text, testing::Not(testing::HasSubstr("worker_ended")));
   EXPECT_THAT(text, testing::HasSubstr("worker_crashed"));
-}
-
-using std::chrono::duration;
-using std::chrono::milliseconds;
-using test::refusal_of;
-
-constexpr LinkTime start{};
-constexpr int num_messages = 20000;
-
-struct Arrival {
-  std::string bytes;
-  LinkTime at;
-};
-
-LinkTime sent_at(int i) { return start + milliseconds(i); }
-
-// Sends message i at i ms, each named by its number, to `num_peers` in turn; takes what is due each
-// millisecond until the link is empty.
-std::map<std::string, std::vector<Arrival>> arrivals(const std::string& plan, int num_peers = 1,
-                                                     int count = num_messages) {
-  FaultyLink link(FaultPlan::parse(plan), FaultyLink::Direction::sending);
-  std::map<std::string, std::vector<Arrival>> arrived;
-  for (int i = 0; i < count || link.next_due(); ++i) {
-    if (i < count) link.pass(std::to_string(i % num_peers), std::to_string(i), sent_at(i));
-    for (Parcel& parcel : link.due(sent_at(i))) {
-      arrived[parcel.routing].push_back({std::move(parcel.bytes), sent_at(i)});
-    }
-  }
-  return arrived;
-}
-
-// Five standard deviations of a binomial count.
-double bound(double p, int n = num_messages) { return 5.0 * std::sqrt(n * p * (1.0 - p)); }
-
-TEST(FaultyLink, DropsAsManyAsPlanned) {
-  const auto num_lost = num_messages - static_cast<int>(arrivals("drop=0.1").at("0").size());
-  EXPECT_NEAR(num_lost, 0.1 * num_messages, bound(0.1));
-  EXPECT_TRUE(arrivals("drop=1").empty());
-}
-
-TEST(FaultyLink, DuplicatesAsManyAsPlanned) {
-  const auto arrived = arrivals("duplicate=0.05").at("0");
-  EXPECT_NEAR(static_cast<double>(arrived.size()) - num_messages, 0.05 * num_messages, bound(0.05));
-  std::map<std::string, int> counts;
-  for (const Arrival& arrival : arrived) ++counts[arrival.bytes];
-  EXPECT_EQ(counts.size(), std::size_t{num_messages});
-  for (const auto& [bytes, count] : counts) EXPECT_LE(count, 2) << bytes;
-}
-
-TEST(FaultyLink, DelaysUniformlyUpToThePlan) {
-  const auto arrived = arrivals("delay=0.2:2.0").at("0");
-  ASSERT_EQ(arrived.size(), std::size_t{num_messages});
-  int num_late = 0;
-  double sum_s = 0.0;
-  for (const Arrival& arrival : arrived) {
-    const double late_s = duration<double>(arrival.at - sent_at(std::stoi(arrival.bytes))).count();
-    EXPECT_LE(late_s, 2.001);  // What is due is taken each millisecond.
-    if (late_s == 0.0) continue;
-    ++num_late;
-    sum_s += late_s;
-  }
-  EXPECT_NEAR(num_late, 0.2 * num_messages, bound(0.2));
-  // A uniform number's standard deviation is its range by √12; half a millisecond of waiting.
-  EXPECT_NEAR(sum_s / num_late, 1.0005, 5.0 * 2.0 / std::sqrt(12.0 * num_late));
-}
-
-TEST(FaultyLink, ReorderedMessageIsOvertakenByTheNextOfItsPeer) {
-  const auto arrived = arrivals("reorder=0.1", 3);
-  int num_overtaken = 0;
-  for (const auto& [peer, messages] : arrived) {
-    int latest = -1;
-    for (const Arrival& arrival : messages) {
-      const int number = std::stoi(arrival.bytes);
-      if (number < latest) ++num_overtaken;
-      latest = std::max(latest, number);
-    }
-  }
-  EXPECT_NEAR(num_overtaken, 0.1 * num_messages, bound(0.1));
-}
-
-TEST(FaultyLink, CutLosesAllOfOnePeerForAWhile) {
-  FaultyLink link(FaultPlan::parse("seed=1,cut=0.001:3.0"), FaultyLink::Direction::sending);
-  std::map<std::string, std::vector<bool>> has_arrived;
-  for (int i = 0; i < num_messages; ++i) {
-    const std::string peer = std::to_string(i % 2);
-    link.pass(peer, "", sent_at(i));
-    has_arrived[peer].push_back(!link.due(sent_at(i)).empty());
-  }
-  for (const auto& [peer, arrived] : has_arrived) {
-    // Messages of one peer are 2 ms apart: a cut swallows the first and those of 3 s after it.
-    std::vector<std::ptrdiff_t> gaps;
-    for (auto at = arrived.begin(); at != arrived.end();) {
-      const auto begin = std::find(at, arrived.end(), false);
-      at = std::find(begin, arrived.end(), true);
-      if (at != arrived.end()) gaps.push_back(at - begin);
-    }
-    ASSERT_FALSE(gaps.empty());
-    for (const auto gap : gaps) EXPECT_EQ(gap % 1500, 0) << gap;
-  }
-  EXPECT_NE(has_arrived.at("0"), has_arrived.at("1"));
-}
-
-std::vector<std::pair<std::string, LinkTime>> schedule(const std::string& plan,
-                                                       FaultyLink::Direction direction) {
-  FaultyLink link(FaultPlan::parse(plan), direction);
-  std::vector<std::pair<std::string, LinkTime>> taken;
-  for (int i = 0; i < 3000; ++i) {
-    if (i < 1000) link.pass(i % 3 == 0 ? "a" : "b", std::to_string(i), sent_at(i));
-    for (Parcel& parcel : link.due(sent_at(i))) {
-      taken.emplace_back(parcel.routing + std::move(parcel.bytes), sent_at(i));
-    }
-  }
-  return taken;
-}
-
-TEST(FaultyLink, ScheduleIsAFunctionOfSeedAndDirection) {
-  const std::string plan = "drop=0.1,delay=0.2:1.0,duplicate=0.05,reorder=0.1,cut=0.01:0.1";
-  const auto one = schedule("seed=7," + plan, FaultyLink::Direction::sending);
-  EXPECT_EQ(schedule("seed=7," + plan, FaultyLink::Direction::sending), one);
-  EXPECT_NE(schedule("seed=8," + plan, FaultyLink::Direction::sending), one);
-  EXPECT_NE(schedule("seed=7," + plan, FaultyLink::Direction::receiving), one);
 }
 
 }  // namespace

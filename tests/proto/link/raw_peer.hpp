@@ -95,12 +95,6 @@ class RawPeer {
     }
   }
 
-  /// Sends what the other end takes at once, and says how much; -1 if the connection is closed.
-  [[nodiscard]] ssize_t send_some(std::string_view bytes) {
-    const ssize_t count = ::send(file_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-    return count < 0 && errno == EAGAIN ? 0 : count;
-  }
-
   /// The body of the next frame.
   [[nodiscard]] std::string receive() {
     const std::string head = read_exactly(2);

@@ -6,8 +6,6 @@
 #include <array>
 #include <bit>
 #include <limits>
-#include <memory>
-#include <random>
 #include <variant>
 
 #include "core/error.hpp"
@@ -236,51 +234,6 @@ TEST(ResultBatches, AreSmallerWhereResultsAreLarge) {
   ASSERT_EQ(taken.size(), 3U);
   EXPECT_EQ(taken[0].results_size(), 16);
   EXPECT_LT(taken[0].ByteSizeLong(), message_size_max);
-}
-
-std::string encoded_part() {
-  const EncodedDefinition definition(definition_of(unusual_campaign()));
-  return encoded(definition.part({6}, 0));
-}
-
-TEST(Codec, SurvivesAnyTruncation) {
-  const std::string bytes = encoded_part();
-  const std::string definition = encode_definition(definition_of(unusual_campaign()));
-  for (std::size_t size = 0; size < bytes.size(); ++size) {
-    const auto decoded = decode(std::string_view(bytes).substr(0, size));
-    ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
-  }
-  for (std::size_t size = 0; size < definition.size(); ++size) {
-    const auto decoded = decode_definition(std::string_view(definition).substr(0, size));
-    const auto* const part = std::get_if<Definition>(&decoded);
-    // Where a table is missing, what is left has the form of a definition.
-    if (part == nullptr) continue;
-    EXPECT_THROW((void)campaign_of(*part, TableColumns::left_out), DefinitionError) << size;
-  }
-}
-
-// Not a proof of safety, but it runs under the sanitizers too. The seed is fixed.
-TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
-  std::mt19937_64 random(20130104);
-  const ComputedRun run{.result = some_result({1}, RunStatus::completed), .compute_s = 1.0};
-  const auto held = make_held({3}, {2}, {{{5}, 1}, {{9}, 90}});
-  const std::array<std::string, 4> good{encode_definition(definition_of(unusual_campaign())),
-                                        encoded(make_result_batch({3}, {1}, {run})),
-                                        encoded(make_heartbeat(1, {held})), encoded_part()};
-  std::size_t num_refused = 0;
-  for (int i = 0; i < 20000; ++i) {
-    std::string bytes = good[random() % good.size()];
-    if (i % 4 == 0) {
-      bytes.resize(random() % 200);
-      for (char& byte : bytes) byte = static_cast<char>(random());
-    }
-    for (std::uint64_t hits = random() % 4; hits > 0 && !bytes.empty(); --hits) {
-      bytes[random() % bytes.size()] = static_cast<char>(random());
-    }
-    const bool is_refused = std::holds_alternative<DecodeError>(decode(bytes));
-    if (is_refused && std::holds_alternative<DecodeError>(decode_definition(bytes))) ++num_refused;
-  }
-  EXPECT_GT(num_refused, 5000U);
 }
 
 }  // namespace

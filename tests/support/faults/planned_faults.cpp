@@ -127,11 +127,6 @@ std::vector<Parcel> FaultyLink::due(LinkTime now) {
   return parcels;
 }
 
-std::optional<LinkTime> FaultyLink::next_due() const {
-  if (under_way_.empty()) return std::nullopt;
-  return under_way_.begin()->first;
-}
-
 double FaultyLink::draw(std::uint32_t stream) const {
   return uniform(philox(
       {static_cast<std::uint32_t>(num_passed_), static_cast<std::uint32_t>(num_passed_ >> 32),

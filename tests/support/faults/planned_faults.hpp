@@ -59,9 +59,6 @@ class FaultyLink final : public LinkFaults {
   void pass(std::string routing, std::string bytes, LinkTime now) override;
   [[nodiscard]] std::vector<Parcel> due(LinkTime now) override;
 
-  /// When due() has something next; nothing if no message is under way.
-  [[nodiscard]] std::optional<LinkTime> next_due() const;
-
  private:
   using UnderWay = std::multimap<LinkTime, Parcel>;
 

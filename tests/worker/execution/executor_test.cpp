@@ -21,15 +21,6 @@ TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
   EXPECT_TRUE(bench.executor.computing().empty());
 }
 
-TEST(Executor, HandsEachRunItsTableValues) {
-  Bench bench(prepare_counting(1));
-  const auto two = test::make_lease(first_campaign, {{0}, 2}, {3}, {1.5, -1.0, 2.5, -2.0});
-  submit(bench.executor, two);
-  const std::vector<wire::LeasedResult> runs = bench.wait_for(2);
-  EXPECT_EQ(runs[0].computed.result.truth[0], 1.5);
-  EXPECT_EQ(runs[1].computed.result.truth[0], 2.5);
-}
-
 // The first batch holds the thread while the leases come.
 TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
   Gate gate;
@@ -312,19 +303,6 @@ std::shared_ptr<const Campaign> definition_with(std::uint64_t seed) {
   MicroscopeCampaign campaign;
   campaign.seed = seed;
   return std::make_shared<const MicroscopeCampaign>(campaign);
-}
-
-TEST(Executor, ComputesRunsOfSeveralCampaigns) {
-  std::atomic<int> num_prepared = 0;
-  Bench bench(prepare_by_seed(num_prepared), {.num_threads = 2, .batch_size_max = 4});
-  bench.executor.define(second_campaign, definition_with(22));
-  submit(bench.executor, lease(0, 2));
-  submit(bench.executor, lease(0, 2, second_campaign));
-  submit(bench.executor, lease(2, 2));
-  for (const wire::LeasedResult& run : bench.wait_for(6)) {
-    EXPECT_EQ(run.computed.result.num_draws, run.campaign == second_campaign ? 22U : 1U);
-  }
-  EXPECT_EQ(num_prepared, 2);
 }
 
 TEST(Executor, LetsRunsOfACampaignWaitUntilItIsDefined) {

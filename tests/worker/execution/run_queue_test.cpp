@@ -126,17 +126,6 @@ TEST(RunQueue, MakesNoLargerBatchesThanTheWorkerCanWhateverALeaseWants) {
   EXPECT_EQ(indices(queue.take(4, all)), (Indices{0, 1, 2, 3}));
 }
 
-// The worker has run 8 already.
-TEST(RunQueue, HandsEachRunItsTableValues) {
-  RunQueue queue;
-  const auto three = test::make_lease({1}, {{7}, 3}, {1}, {1.5, -1.0, 2.5, -2.0, 3.5, -3.0});
-  queue.add(three, std::array{RunRange{{7}, 1}, RunRange{{9}, 1}});
-  const TakenRuns assignment = queue.take(3, all);
-  ASSERT_EQ(indices(assignment), (Indices{7, 9}));
-  EXPECT_EQ(assignment.requests[0].table_values, (std::vector<double>{1.5, -1.0}));
-  EXPECT_EQ(assignment.requests[1].table_values, (std::vector<double>{3.5, -3.0}));
-}
-
 TEST(RunQueue, DropsWhatIsHereOfTheRangesOfACampaign) {
   RunQueue queue;
   add(queue, lease(1, 5, 5));

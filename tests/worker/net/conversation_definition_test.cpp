@@ -6,26 +6,6 @@
 namespace proofmass::worker {
 namespace {
 
-TEST_F(ConversationTest, AsksForACampaignUntilItComes) {
-  start();
-  register_here();
-  receive(lease(0, 1, 1, campaign_2));
-  EXPECT_EQ(execution.waiting.size(), 1U) << "they wait for the definition";
-  EXPECT_EQ(take_sent<proto::CampaignRequest>().campaign(), campaign_2.value);
-  receive(lease(1, 1, 1, campaign_2));
-  tick_after(900ms);
-  EXPECT_TRUE(sent.empty());
-  tick_after(100ms);
-  EXPECT_EQ(take_sent<proto::CampaignRequest>().campaign(), campaign_2.value);
-
-  const proto::DefinitionPart answer = definition(campaign_2);
-  receive(answer);
-  EXPECT_TRUE(execution.is_defined(campaign_2));
-  receive(answer);  // To the other request.
-  receive(lease(2, 1, 1, campaign_2));
-  tick_after(900ms);
-}
-
 TEST_F(ConversationTest, AsksNoMoreForACampaignWithoutRuns) {
   start();
   register_here();
@@ -38,18 +18,6 @@ TEST_F(ConversationTest, AsksNoMoreForACampaignWithoutRuns) {
   EXPECT_FALSE(execution.is_defined(campaign_1));
 }
 
-TEST_F(ConversationTest, ForgetsACampaign) {
-  register_with_campaign();
-  (void)compute(lease(10, 1));
-  receive(lease(11, 1));
-  receive(lease(5, 1, 1, campaign_2));
-  (void)take_sent<proto::CampaignRequest>();
-  receive(test::make_forget(campaign_1));
-  EXPECT_EQ(execution.forgotten, std::vector{campaign_1});
-  EXPECT_EQ(conversation->num_unacknowledged(), 0U);
-  EXPECT_EQ(conversation->num_unfinished(), 1U);
-}
-
 /// Of more than one part, as far as the conversation is concerned.
 std::vector<proto::DefinitionPart> split(const proto::DefinitionPart& whole) {
   proto::DefinitionPart first = whole;
@@ -58,26 +26,6 @@ std::vector<proto::DefinitionPart> split(const proto::DefinitionPart& whole) {
   second.mutable_content()->erase(0, 100);
   second.set_offset(100);
   return {first, second};
-}
-
-TEST_F(ConversationTest, AsksForADefinitionPartByPart) {
-  start();
-  register_here();
-  receive(lease(0, 1));
-  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 0U);
-  const auto parts = split(definition(campaign_1));
-  receive(parts[1]);  // Not asked for: what comes before it is missing.
-  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 0U);
-  receive(parts[0]);
-  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 100U);
-  receive(parts[0]);  // Repeated by the network.
-  tick_after(999ms);
-  EXPECT_TRUE(sent.empty());
-  tick_after(1ms);
-  EXPECT_EQ(take_sent<proto::CampaignRequest>().offset(), 100U) << "it was lost";
-  EXPECT_FALSE(execution.is_defined(campaign_1));
-  receive(parts[1]);
-  EXPECT_TRUE(execution.is_defined(campaign_1));
 }
 
 TEST_F(ConversationTest, BeginsADefinitionAnewThatHasChanged) {

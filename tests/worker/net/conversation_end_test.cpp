@@ -25,23 +25,6 @@ TEST_F(ConversationTest, DropsEverythingWhenToldToStop) {
   expect_ending(Ending::Kind::done, "told to stop");
 }
 
-TEST_F(ConversationTest, DeliversWhatItHoldsWhenDrainedByTheCoordinator) {
-  register_with_campaign();
-  receive(lease(0, 1));
-  receive(proto::Drain());
-  const auto heartbeat = take_sent<proto::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_runs_max(), 0U);
-  EXPECT_EQ(test::vector_of(heartbeat.held()), held(0, 1));
-  receive(proto::Drain());
-  execution.finish_lease();
-  conversation->on_progress(now);
-  (void)take_sent<proto::ResultBatch>();
-  EXPECT_FALSE(conversation->ending().has_value());
-  acknowledge({{0}});
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
-  expect_ending(Ending::Kind::done, "drained");
-}
-
 // The lease crossed the Drain. Its first run is here already and is not given back.
 TEST_F(ConversationTest, GivesBackALeaseThatComesTooLate) {
   register_with_campaign();
@@ -54,29 +37,6 @@ TEST_F(ConversationTest, GivesBackALeaseThatComesTooLate) {
   EXPECT_EQ(test::vector_of(answer.runs()), held(1, 2));
   EXPECT_EQ(execution.waiting.size(), 1U);
   receive(lease(0, 1));
-}
-
-TEST_F(ConversationTest, GivesBackWhatHasNotBegunWhenAskedToEnd) {
-  register_with_campaign();
-  receive(lease(0, 2));
-  execution.begin_batch();
-  receive(lease(2, 3));
-  conversation->on_drain_request(now);
-  const auto heartbeat = take_sent<proto::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_runs_max(), 0U) << "before it gives back, or the runs would come again";
-  EXPECT_EQ(test::vector_of(heartbeat.held()), held(0, 5));
-  const auto given_back = take_sent<proto::GiveBack>();
-  EXPECT_EQ(given_back.reason(), proto::LOSS_REASON_PREEMPTED);
-  EXPECT_EQ(test::vector_of(given_back.runs()), held(2, 3));
-
-  conversation->on_drain_request(now);
-  execution.finish_batch();
-  conversation->on_progress(now);
-  (void)take_sent<proto::ResultBatch>();
-  EXPECT_FALSE(conversation->ending().has_value()) << "the results are not acknowledged";
-  acknowledge({{0}, {1}});
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
 TEST_F(ConversationTest, GivesBackRunsOfEachCampaign) {
@@ -99,22 +59,6 @@ TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
   conversation->on_drain_request(now);
   EXPECT_TRUE(sent.empty()) << "nobody knows it";
   expect_ending(Ending::Kind::done, "nothing left to do");
-}
-
-TEST_F(ConversationTest, GivesBackWhatCrashedOutsideAndGoesOn) {
-  register_with_campaign();
-  receive(lease(0, 2));
-  receive(lease(2, 3));
-  execution.begin_batch();
-  execution.crash_batch("killed by signal 6");
-  conversation->on_progress(now);
-  const auto given_back = take_sent<proto::GiveBack>();
-  EXPECT_EQ(given_back.reason(), proto::LOSS_REASON_CRASHED);
-  EXPECT_EQ(test::vector_of(given_back.runs()), held(0, 2));
-  EXPECT_EQ(conversation->num_unfinished(), 3U);
-  EXPECT_FALSE(conversation->ending().has_value());
-  EXPECT_EQ(to_text(conversation->take_events().back()),
-            "simulation_crashed first_run=0 runs=2 reason=\"killed by signal 6\"");
 }
 
 TEST_F(ConversationTest, LeavesAtOnceWhenAskedAgain) {
@@ -165,22 +109,6 @@ TEST_F(ConversationTest, EndsWhenTheDrainTakesTooLong) {
   tick_after(1s);
   EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
   expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
-}
-
-// A coordinator that is gone while the worker drains may come back: the results wait for it.
-TEST_F(ConversationTest, DeliversToANewCoordinatorWhileItDrains) {
-  register_with_campaign();
-  (void)compute(lease(0, 1));
-  conversation->on_drain_request(now);
-  (void)take_sent<proto::Heartbeat>();
-  reject_unregistered(wire::Epoch{6});
-  (void)take_sent<proto::Hello>();
-  receive(welcome, wire::Epoch{6});
-  EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
-  (void)take_sent<proto::ResultBatch>();
-  receive(test::make_ack(campaign_1, {{0}}), wire::Epoch{6});
-  (void)take_sent<proto::Bye>();
-  expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
 // A worker that cannot deliver, as the file is gone, outlives the coordinator that drained it, and
@@ -264,17 +192,6 @@ TEST_F(ConversationTest, LeavesBeforeItsWalltimeAtAnotherTimeThanOtherWorkers) {
   }
   // Five standard deviations of a binomial law.
   for (const int num : num_leaving) EXPECT_NEAR(num, num_workers / 4, 44);
-}
-
-TEST_F(ConversationTest, EndsBeforeItsWalltimeIsOver) {
-  register_with_campaign({.walltime_end = now + 100s});
-  receive(lease(0, 1));
-  execution.begin_batch();
-  tick_after(90s);
-  (void)take_sent<proto::Heartbeat>();
-  EXPECT_EQ(take_sent<proto::GiveBack>().reason(), proto::LOSS_REASON_WALLTIME);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_WALLTIME);
-  expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
 // Told to deliver all that it holds, however long that takes; but its time is not endless.

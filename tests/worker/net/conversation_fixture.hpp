@@ -58,7 +58,7 @@ class FakeExecution final : public Execution {
   }
   void abandon() override { ++num_abandons; }
   std::vector<wire::LeasedResult> take_finished() override { return std::exchange(finished, {}); }
-  std::vector<CrashedBatch> take_crashed() override { return std::exchange(crashed, {}); }
+  std::vector<CrashedBatch> take_crashed() override { return {}; }
   std::vector<RunningBatch> computing() const override { return batches; }
   std::optional<Duration> usual_batch_time() const override { return batch_time; }
   std::uint64_t num_steps_done() const override { return 11; }
@@ -84,19 +84,11 @@ class FakeExecution final : public Execution {
     finish(batch.campaign, batch.ranges);
   }
 
-  /// The simulation of the oldest batch crashes.
-  void crash_batch(const std::string& reason) {
-    const RunningBatch batch = batches.front();
-    batches.erase(batches.begin());
-    crashed.push_back({batch.campaign, indices_of(batch.ranges), reason});
-  }
-
   std::set<wire::CampaignId> defined;
   std::vector<wire::CampaignId> forgotten;
   std::deque<WaitingRuns> waiting;
   std::vector<RunningBatch> batches;
   std::vector<wire::LeasedResult> finished;
-  std::vector<CrashedBatch> crashed;
   std::optional<Duration> batch_time;
   std::optional<std::string> failure_text;
   int num_abandons = 0;

@@ -24,13 +24,6 @@ class RefusalTest : public ConversationTest {
   }
 };
 
-TEST_F(RefusalTest, IsFinalIfItIsIncompatible) {
-  start();
-  (void)take_sent<proto::Hello>();
-  refuse(proto::REJECT_REASON_INCOMPATIBLE);
-  expect_ending(Ending::Kind::failed, "refused by the coordinator: not now");
-}
-
 // The list of keys may have been cut off for a moment: then the handshakes fail, too.
 TEST_F(RefusalTest, IsFinalIfTheKeyIsRevokedForMinutes) {
   start();
@@ -117,16 +110,6 @@ TEST_F(RefusalTest, IsHeardUnderAnySession) {
   receive_in({1}, test::make_reject(proto::REJECT_REASON_MALFORMED, "bad"));
   tick_after(1s);
   EXPECT_TRUE(sent.empty());
-}
-
-TEST_F(RefusalTest, GoesOnComputingMeanwhile) {
-  register_with_campaign();
-  receive(lease(10, 2));
-  refuse(proto::REJECT_REASON_FULL);
-  EXPECT_EQ(execution.num_abandons, 0);
-  execution.finish_lease();
-  conversation->on_progress(now);
-  EXPECT_EQ(conversation->num_unacknowledged(), 2U);
 }
 
 // The network may hold a refusal back until a later Hello was accepted.
@@ -234,30 +217,6 @@ TEST_F(NotServedTest, OnlyTheRunsThatAreNamedAreSetAside) {
   const proto::Heartbeat heartbeat = next_heartbeat();
   EXPECT_EQ(test::vector_of(heartbeat.held()), held(8, 2));
   EXPECT_EQ(test::vector_of(heartbeat.set_aside()), held(10, 2));
-}
-
-TEST_F(NotServedTest, ForgetLeavesRunsThatTheCoordinatorDoesNotKnow) {
-  register_with_campaign();
-  (void)compute(lease(8, 4));
-  receive(lease(20, 1));
-  execution.begin_batch();
-  receive(lease(5, 1));
-  receive(test::make_not_served(campaign_1, {{{10}, 2}}));
-  (void)events();
-  receive(test::make_forget(campaign_1, 10));
-  EXPECT_EQ(events(), std::vector<std::string>{"results_forgotten campaign=0000000000000001 "
-                                               "results=2 (finished or cancelled)"});
-  EXPECT_EQ(conversation->num_unacknowledged(), 2U);
-  EXPECT_EQ(conversation->num_set_aside(), 2U);
-  EXPECT_EQ(conversation->num_unfinished(), 1U) << "run 20 is being computed";
-  EXPECT_TRUE(execution.forgotten.empty());
-  execution.finish_batch();
-  conversation->on_progress(now);
-  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), 1);
-  receive(test::make_forget(campaign_1));
-  EXPECT_EQ(conversation->num_unacknowledged(), 0U);
-  EXPECT_EQ(conversation->num_set_aside(), 0U);
-  EXPECT_EQ(execution.forgotten, std::vector{campaign_1});
 }
 
 TEST_F(NotServedTest, ResultsTakeHalfOfTheCreditAtMost) {

@@ -75,28 +75,6 @@ TEST_F(ConversationTest, SaysAllItHoldsOnceItIsConnectedAgain) {
   (void)take_sent<proto::ResultBatch>();
 }
 
-TEST_F(ConversationTest, GoesOnComputingWhenItRegistersAgain) {
-  register_with_campaign();
-  (void)compute(lease(10, 1));
-  receive(lease(11, 2));
-  reject_unregistered(wire::Epoch{6});
-  EXPECT_EQ(take_envelope().epoch(), 0U);
-  EXPECT_EQ(execution.num_abandons, 0);
-  EXPECT_EQ(execution.waiting.size(), 1U);
-  receive(lease(20, 1));  // Of the registration that is over.
-  EXPECT_EQ(execution.waiting.size(), 1U);
-
-  execution.finish_lease();
-  conversation->on_progress(now);
-  EXPECT_TRUE(sent.empty()) << "nobody would take the results";
-
-  receive(welcome, wire::Epoch{6});
-  const proto::Envelope heartbeat = take_envelope();
-  EXPECT_EQ(heartbeat.epoch(), 6U);
-  EXPECT_EQ(test::vector_of(heartbeat.heartbeat().held()), held(10, 3));
-  EXPECT_EQ(take_sent<proto::ResultBatch>().results_size(), 3);
-}
-
 TEST_F(ConversationTest, SaysHelloOnceIfItIsRejectedTwice) {
   register_with_campaign();
   reject_unregistered();
@@ -145,32 +123,6 @@ TEST_F(ConversationTest, SaysWhyItWasNotLetIn) {
 
 // Heartbeats.
 
-TEST_F(ConversationTest, ShowsThatItLives) {
-  register_with_campaign();
-  tick_after(1900ms);
-  EXPECT_TRUE(sent.empty());
-  tick_after(100ms);
-  const auto heartbeat = take_sent<proto::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_steps_done(), 11U);
-  EXPECT_TRUE(heartbeat.held().empty());
-}
-
-TEST_F(ConversationTest, SaysAllThatItHolds) {
-  register_with_campaign();
-  (void)compute(lease(10, 2));
-  receive(lease(12, 3));
-  execution.begin_batch();
-  receive(lease(15, 1));
-  receive(lease(20, 1, 2));
-  tick_after(2s);
-  const auto heartbeat = take_sent<proto::Heartbeat>();
-  const std::vector<proto::HeldRuns> expected{test::make_held(campaign_1, {1}, {{{10}, 6}}),
-                                              test::make_held(campaign_1, {2}, {{{20}, 1}})};
-  EXPECT_EQ(test::vector_of(heartbeat.held()), expected);
-  ASSERT_EQ(heartbeat.computing_size(), 1);
-  EXPECT_EQ(heartbeat.computing(0), test::make_computed_batch(campaign_1, {{{12}, 3}}));
-}
-
 TEST_F(ConversationTest, SaysSoonWhatItComputesNow) {
   register_with_campaign();
   receive(lease(12, 3));
@@ -211,16 +163,6 @@ TEST_F(ConversationTest, CountsUnacknowledgedResultsAgainstItsCredit) {
   EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 4000U);
 }
 
-// Leases.
-
-TEST_F(ConversationTest, HandsALeaseToTheExecutionOnce) {
-  register_with_campaign();
-  receive(lease(10, 2));
-  receive(lease(10, 2));
-  ASSERT_EQ(execution.waiting.size(), 1U);
-  EXPECT_EQ(execution.waiting[0].runs, (RunRange{{10}, 2}));
-}
-
 // Of runs 0 to 5, run 1 is finished and run 3 waits.
 TEST_F(ConversationTest, TakesFromALeaseWhatItDoesNotHold) {
   register_with_campaign();
@@ -238,6 +180,8 @@ TEST_F(ConversationTest, TakesFromALeaseWhatItDoesNotHold) {
   EXPECT_EQ(execution.waiting[3].batch_runs_max, 7U);
 }
 
+// Leases.
+
 // The runs were taken from this worker and lent to it again before it said that it has them.
 TEST_F(ConversationTest, NamesTheLargestAttemptUnderWhichItWasLentARun) {
   register_with_campaign();
@@ -251,48 +195,7 @@ TEST_F(ConversationTest, NamesTheLargestAttemptUnderWhichItWasLentARun) {
   EXPECT_EQ(take_sent<proto::ResultBatch>().attempt(), 3U);
 }
 
-TEST_F(ConversationTest, GivesBackWhatIsNotBeingComputed) {
-  register_with_campaign();
-  receive(lease(0, 2));
-  execution.begin_batch();
-  receive(lease(2, 4, 2));
-  receive(test::make_retract(campaign_1, {{{1}, 2}, {{4}, 10}}));
-  const auto answer = take_sent<proto::GiveBack>();
-  EXPECT_EQ(answer.reason(), proto::LOSS_REASON_RETRACTED);
-  const std::vector expected{test::make_held(campaign_1, {2}, {{{2}, 1}, {{4}, 2}})};
-  EXPECT_EQ(test::vector_of(answer.runs()), expected);
-  EXPECT_EQ(conversation->num_unfinished(), 3U);
-  receive(test::make_retract(campaign_1, {{{1}, 2}, {{4}, 10}}));
-  EXPECT_TRUE(sent.empty()) << "it has none of them";
-}
-
 // Results.
-
-TEST_F(ConversationTest, SendsResultsOfALeaseTogether) {
-  register_with_campaign();
-  const proto::ResultBatch batch = compute(lease(10, 2, 4));
-  EXPECT_EQ(batch.campaign(), campaign_1.value);
-  EXPECT_EQ(batch.attempt(), 4U);
-  ASSERT_EQ(batch.results_size(), 2);
-  EXPECT_EQ(batch.results(1).run(), 11U);
-}
-
-TEST_F(ConversationTest, RepeatsResultsUntilTheyAreAcknowledged) {
-  register_with_campaign();
-  (void)compute(lease(10, 2));
-  acknowledge({{10}});
-  EXPECT_EQ(conversation->num_unacknowledged(), 1U);
-
-  tick_after(5s);
-  const auto again = take_sent<proto::ResultBatch>();
-  ASSERT_EQ(again.results_size(), 1);
-  EXPECT_EQ(again.results(0).run(), 11U);
-  EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), held(11, 1));
-
-  acknowledge({{11}});
-  tick_after(60s);
-  EXPECT_TRUE(take_sent<proto::Heartbeat>().held().empty());
-}
 
 // After 5, 10, 20, 40, 60, 60 s.
 TEST_F(ConversationTest, RepeatsResultsEverMoreSeldom) {

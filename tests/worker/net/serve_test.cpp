@@ -11,7 +11,6 @@
 #include "proto/wire/codec.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
-#include "tests/support/faults/planned_faults.hpp"
 #include "tests/support/messages.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "tests/support/prepared_campaign.hpp"
@@ -154,31 +153,6 @@ TEST_F(ServeTest, SaysWhyTheSpoolCannotBeUsed) {
     EXPECT_EQ(std::string(error.what()),
               "spool = " + config.spool->string() + " (No such file or directory)");
   }
-}
-
-// Every other message is lost, both ways.
-TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
-  wire::plan_faults(wire::FaultPlan::parse("seed=1,drop=0.5"));
-  config.conversation.resend_after = std::chrono::milliseconds(50);
-  Coordinator coordinator(config.endpoint);
-  std::future<Ending> ending = start_worker();
-  (void)coordinator.receive<proto::Hello>();
-  for (int i = 0; i < 20; ++i) {
-    coordinator.send(test::make_welcome({1}, 0.01));
-  }
-  (void)coordinator.receive<proto::Heartbeat>();
-  for (int i = 0; i < 20; ++i) {
-    coordinator.send(test::make_lease(campaign, {{0}, 1}, {1}));
-  }
-  (void)coordinator.receive<proto::CampaignRequest>();
-  for (int i = 0; i < 20; ++i) {
-    coordinator.send(
-        wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part(campaign, 0));
-  }
-  EXPECT_EQ(coordinator.receive<proto::ResultBatch>().results_size(), 1);
-  for (int i = 0; i < 20; ++i) coordinator.send(proto::Stop());
-  EXPECT_EQ(ending.get().reason, "told to stop");
-  wire::plan_faults({});
 }
 
 TEST(HeldRuns, AreGroupedByCampaignAndAttempt) {

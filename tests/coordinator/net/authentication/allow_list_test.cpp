@@ -114,26 +114,6 @@ TEST_F(AllowListFile, ChangesAreSeen) {
   EXPECT_NE(list.owner_of(two_), nullptr);
 }
 
-// `cat new > list`, an editor that writes in place, a disk that is full for a moment.
-TEST_F(AllowListFile, ThatIsEmptyOrCutOffForAMomentRevokesNothing) {
-  const std::string both = one_ + " a\n" + two_ + " b\n";
-  write(both);
-  AllowList list(file_, wire::Domain::workers);
-  for (const std::string& moment : {std::string(), one_ + " a\n", std::string("# only\n")}) {
-    write(moment);
-    const std::string empty = "allow-list = " + file_.string() + " (is empty)";
-    EXPECT_EQ(look(list).value_or(""), moment.empty() ? empty : "");
-    write(both);
-    EXPECT_FALSE(look(list));
-    EXPECT_FALSE(look(list));
-    EXPECT_NE(list.owner_of(one_), nullptr) << moment;
-    EXPECT_NE(list.owner_of(two_), nullptr) << moment;
-  }
-  write("");  // The disk stays full.
-  for (int i = 0; i < 5; ++i) (void)look(list);
-  EXPECT_NE(list.owner_of(one_), nullptr);
-}
-
 TEST_F(AllowListFile, OfWhichTwoLooksDifferRevokesWhatBothLack) {
   write(one_ + " a\n" + two_ + " b\n");
   AllowList list(file_, wire::Domain::workers);
@@ -278,10 +258,6 @@ TEST_F(RefusalLogTest, CountsAFlood) {
   EXPECT_EQ(to_text(events_[20].fields), "count=980 without a line each");
 }
 
-Asker asker(const std::string& name, const std::string& rights) {
-  return {.name = name, .rights = parse_rights(rights).value()};
-}
-
 TEST(RightsOfAKey, AreAListOfWords) {
   EXPECT_EQ(parse_rights("observe,submit,control"), all_rights);
   EXPECT_EQ(parse_rights("submit,observe"), usual_rights);
@@ -289,18 +265,6 @@ TEST(RightsOfAKey, AreAListOfWords) {
   for (const std::string text : {"", "observe,", ",", "Observe", "observe, submit", "root"}) {
     EXPECT_EQ(parse_rights(text), std::nullopt) << text;
   }
-}
-
-TEST(RightsOfAKey, ReachToItsOwnCampaignsAndThoseOfNobody) {
-  const Asker anna = asker("anna", "observe,submit");
-  EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", "anna"); }), "accepted");
-  EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", ""); }), "accepted");
-  EXPECT_EQ(test::refusal_of([&] { require_control(anna, "c", "ben"); }),
-            "campaign = c (belongs to ben; the key anna must have the right `control`)");
-  EXPECT_EQ(test::refusal_of([&] { require_control(asker("boss", "control"), "c", "ben"); }),
-            "accepted");
-  EXPECT_EQ(test::refusal_of([&] { require_control(asker("eve", "observe"), "c", ""); }),
-            "key = eve (must have the right `submit` in authorized_clients of the coordinator)");
 }
 
 }  // namespace

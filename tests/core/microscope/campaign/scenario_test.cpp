@@ -98,19 +98,6 @@ TEST(Scenario, RefusesEveryFieldThatIsNotFiniteOrNoEnumerator) {
   EXPECT_GT(position, 80u);
 }
 
-TEST(Scenario, NamesFieldValueAndRule) {
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.estimation.transient_s = -5.0; }),
-            "estimation.transient_s = -5 (must be >= 0)");
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.simulation.sample_period_s = 2.0; }),
-            "simulation.sample_period_s = 2 (must be in [0.05, 1])");
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.noise.preset = static_cast<NoisePreset>(0); }),
-            "noise.preset = 0 (must be in [1, 4])");
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.estimation.num_rounds_max = 0; }),
-            "estimation.num_rounds_max = 0 (must be in [1, 1000])");
-  EXPECT_EQ(refusal_after([](Scenario& s) { s.sessions[0].num_orbits = 0; }),
-            "session[0].orbits = 0 (must be in [1, 10000])");
-}
-
 TEST(Scenario, WantsLoopsMuchSlowerThanTheSampleRate) {
   EXPECT_EQ(refusal_after([](Scenario& s) {
               s.simulation.sample_period_s = 0.5;

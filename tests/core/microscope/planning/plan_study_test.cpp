@@ -207,47 +207,6 @@ TEST(PlanStudy, AllocatesWhereTheChanceRoundsToZeroOrOne) {
   EXPECT_EQ(allocation(1e3), best_of_all(much));
 }
 
-// The largest acceleration of a run is that of its excitations, which three orbits show as well as
-// four: with the range in the middle of those of 16 runs, 8 of these are lost.
-TEST(PlanStudy, CountsRunsThatAreLost) {
-  MicroscopeCampaign campaign = simultaneous_campaign();
-  const auto most_of = [&] { return test::simulated(RunPlan(campaign), batch_lanes); };
-  std::vector<double> accelerations;
-  for (const RunResult& result : most_of()) accelerations.push_back(result.health[0]);
-  std::ranges::sort(accelerations);
-  const auto lost_of = [&] {
-    const auto study = study_plan(campaign);
-    EXPECT_EQ(study->scope().num_probed, batch_lanes);
-    return study->bound(study->scope().num_steps);
-  };
-  EXPECT_EQ(lost_of().num_lost(), 0U);
-  campaign.scenario.sensor.range_m_s2 = 0.5 * (accelerations[7] + accelerations[8]);
-  const PlanBound some = lost_of();
-  EXPECT_LE(some.num_lost(), 8U);
-  EXPECT_GE(some.num_lost(), 6U);
-  const double part = static_cast<double>(some.num_lost()) / batch_lanes;
-  EXPECT_NEAR(some.misses[index(Parameter::a_d12)], part, 1e-9);
-  campaign.scenario.sensor.range_m_s2 = 1e-9;
-  const PlanBound all = lost_of();
-  EXPECT_EQ(most_of().front().status, RunStatus::lost);
-  EXPECT_EQ(all.misses_any, 1.0);
-  ASSERT_EQ(all.losses.size(), 1U);
-  EXPECT_EQ(all.losses[0].num_runs, batch_lanes);
-  EXPECT_EQ(all.losses[0].cause, "saturation");
-  const std::string& first = campaign.scenario.sessions.front().name;
-  EXPECT_EQ(all.losses[0].session, first);
-  EXPECT_EQ(all.losses[0].detail,
-            "a sensor measures more than sensor.range_m_s2 = 1e-09 in session " + first);
-}
-
-// What the model leaves out is far above the noise of perfect sensors.
-TEST(PlanStudy, CountsRunsThatDoNotFit) {
-  MicroscopeCampaign campaign = simultaneous_campaign();
-  EXPECT_EQ(study_plan(campaign)->scope().num_misfits, 0U);
-  campaign.scenario.noise.scale = 1e-3;
-  EXPECT_EQ(study_plan(campaign)->scope().num_misfits, batch_lanes);
-}
-
 // The squares' noise has the fourth power of the loops' noise. A record that is as long again has
 // twice the signal; noise is watched only where nothing is shaken.
 TEST(PlanStudy, SeesTheNoiseOfSquaresOfAllSessionsTogether) {
@@ -344,12 +303,6 @@ TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
   const PlanBound bound = study->bound(std::vector<int>(study->scope().num_steps.size(), 0));
   for (const double error : bound.standard_errors) EXPECT_TRUE(std::isinf(error));
   EXPECT_NEAR(bound.misses_any, 1.0, 1e-12);
-}
-
-TEST(PlanStudy, RefusesSessionsThatItsMethodCannotUse) {
-  MicroscopeCampaign campaign;
-  campaign.scenario.sessions[0].spin_rate_rad_s = 1e-3;
-  EXPECT_THROW((void)study_plan(campaign), ConfigError);
 }
 
 // What is written is read again as the plan that it is of.

@@ -135,15 +135,6 @@ TEST(ValidateSessions, RefusesABadName) {
             "session[1].name = \"a_c11_delta_x\" (is the name of session[0] already)");
 }
 
-TEST(ValidateSessions, RefusesANumberOutOfRange) {
-  EXPECT_EQ(refusal_after([](Sessions& s) { s[0].num_orbits = 0; }),
-            "session[0].orbits = 0 (must be in [1, 10000])");
-  EXPECT_EQ(refusal_after([](Sessions& s) { s[0].num_orbits = 10001; }),
-            "session[0].orbits = 10001 (must be in [1, 10000])");
-  EXPECT_EQ(refusal_after([](Sessions& s) { s[0].spin_rate_rad_s = 0.06; }),
-            "session[0].spin_rate_rad_s = 0.06 (must be in [-0.05, 0.05])");
-}
-
 TEST(ValidateSessions, RefusesAnUnknownTarget) {
   EXPECT_EQ(refusal_after([](Sessions& s) { s[1].target = static_cast<SessionTarget>(99); }),
             "session[1].target = 99 (unknown target)");
@@ -366,13 +357,6 @@ TEST(ValidateSessions, LetsASessionWithoutTargetShakeWhatItLikes) {
   EXPECT_EQ(after({{ExcitationKind::attitude, Axis::y, 1e-3, 1e-3}}), "");
   EXPECT_EQ(after({{ExcitationKind::attitude, Axis::y, -1e-3, 1e-3}}),
             "session[6].excitations[0].amplitude_rad = -0.001 (must be > 0)");
-}
-
-TEST(ValidateSessions, AcceptsSessionsOfOneOrbit) {
-  EXPECT_EQ(refusal_after([](Sessions& sessions) {
-              for (Session& session : sessions) session.num_orbits = 1;
-            }),
-            "");
 }
 
 }  // namespace
