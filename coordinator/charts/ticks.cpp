@@ -136,6 +136,7 @@ std::string figure_text(double value) {
   const std::string scientific = fmt::format("{:.2e}", value);
   const int exponent = std::stoi(scientific.substr(scientific.find('e') + 1));
   if (exponent < -3 || exponent > 4) return from_scientific(scientific);
+  if (exponent >= 3) return with_minus(fmt::format("{:.0f}", value));
   // Rounded to three digits first, and then written without an exponent.
   return with_minus(fmt::format("{:.10g}", std::stod(scientific)));
 }

@@ -9,8 +9,9 @@
 
 namespace proofmass::coordinator {
 
-/// A number as people write it: at most three significant digits, U+2212 as its minus sign, and
-/// powers of ten in superscripts outside of 0.001 to 99,999: `−0.25`, `1240`, `2.5×10⁻⁹`, `10⁶`.
+/// A number as people write it: at most three significant digits, or all of a whole number, U+2212
+/// as its minus sign, and powers of ten in superscripts outside of 0.001 to 99,999: `−0.25`,
+/// `1244`, `2.5×10⁻⁹`, `10⁶`.
 [[nodiscard]] std::string figure_text(double value);
 
 /// A unit in the same spelling: `10⁻⁴ rad` for `1e-4 rad`.

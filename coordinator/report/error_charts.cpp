@@ -103,6 +103,14 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
                             quantity_text(last.standard_deviation, quantity_at(review, index)));
 }
 
+/// What an overview shows errors in: the objective, or the worst error where there is none.
+double overview_scale(const Review& review, std::size_t index) {
+  const double objective = review.objectives[index];
+  if (std::isfinite(objective)) return objective;
+  const std::vector<RunValue>& worst = review.figures[index].worst;
+  return !worst.empty() && worst[0].value > 0.0 ? worst[0].value : 1.0;
+}
+
 /// Half the width of an interval over the value in its middle, percent.
 std::optional<double> relative_percent(const std::optional<Interval>& interval, double value) {
   if (!interval || !(value > 0.0)) return std::nullopt;
@@ -147,7 +155,9 @@ Chart error_chart(const Review& review, std::size_t index) {
   const ErrorStatistic& error = statistics.accuracy[index].error;
   const double scale = quantity.display_scale;
   add_interval(error.bias_interval, error.bias, scale,
-               fmt::format("bias {} with 95 % interval", figure_text(error.bias / scale)), chart);
+               fmt::format("bias {}{}", figure_text(error.bias / scale),
+                           error.bias_interval ? " with 95 % interval" : ""),
+               chart);
   chart.text.description = fmt::format(
       "Histogram of the errors with their signs. The bias is {}{}, the standard deviation {}.",
       figure_text(error.bias / scale),
@@ -165,8 +175,8 @@ Chart convergence_chart(const Review& review, std::size_t index) {
   Curve worst{.name = "worst", .ink = Ink::second, .look = Dash::dashed};
   Curve mean{.name = "mean", .ink = Ink::first};
   Curve deviation{.name = "std", .ink = Ink::third, .look = Dash::dotted};
-  Band mean_band;
-  Band deviation_band{.name = "95 % intervals", .ink = Ink::third};
+  Band mean_band{.name = "mean, 95 %"};
+  Band deviation_band{.name = "std, 95 %", .ink = Ink::third};
   for (const ConvergencePoint& point : review.figures[index].convergence) {
     const auto n = static_cast<double>(point.num_runs);
     worst.points.push_back({n, point.worst / scale});
@@ -176,32 +186,38 @@ Chart convergence_chart(const Review& review, std::size_t index) {
     deviation.points.push_back({n, point.standard_deviation / scale});
     add_to_band(n, point.deviation_interval, scale, deviation_band);
   }
-  return {.text = {.id = fmt::format("convergence-{}", quantity.name),
-                   .title = fmt::format("Convergence of {}", quantity.symbol),
-                   .description = convergence_sentence(review, index)},
-          .x = {.label = "runs", .scale = Scale::logarithmic},
-          .y = {.label = axis_label("|error|", quantity), .from = 0.0},
-          .layers = {std::move(mean_band), std::move(deviation_band), std::move(worst),
-                     std::move(mean), std::move(deviation)}};
+  Chart chart{.text = {.id = fmt::format("convergence-{}", quantity.name),
+                       .title = fmt::format("Convergence of {}", quantity.symbol),
+                       .description = convergence_sentence(review, index)},
+              .x = {.label = "runs", .scale = Scale::logarithmic},
+              .y = {.label = axis_label("|error|", quantity), .from = 0.0}};
+  for (Band* const band : {&mean_band, &deviation_band}) {
+    if (!band->points.empty()) chart.layers.emplace_back(std::move(*band));
+  }
+  for (Curve* const curve : {&worst, &mean, &deviation}) {
+    chart.layers.emplace_back(std::move(*curve));
+  }
+  return chart;
 }
 
 ChartGrid magnitude_overview(const Review& review) {
   ChartGrid grid{.text = {.id = "errors", .title = "Errors in units of their objectives"}};
+  // One axis for all, so that they can be compared.
+  double end = 3.0;
+  for (std::size_t i = 0; i < review.figures.size(); ++i) {
+    const std::vector<double>& edges = review.figures[i].magnitudes.edges;
+    if (!edges.empty()) end = std::max(end, edges.back() / overview_scale(review, i));
+  }
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     const Quantity& quantity = quantity_at(review, i);
     const double objective = review.objectives[i];
-    const std::vector<RunValue>& worst = review.figures[i].worst;
-    double scale = std::isfinite(objective) ? objective : 1.0;
-    if (!std::isfinite(objective) && !worst.empty() && worst[0].value > 0.0) {
-      scale = worst[0].value;
-    }
     Chart chart{.text = {.id = fmt::format("errors-{}", quantity.name),
                          .title = std::string(quantity.symbol)},
                 .x = {.label = std::isfinite(objective) ? "|error| / objective" : "|error| / worst",
                       .scale = Scale::logarithmic,
                       .from = 1e-4,
-                      .to = 3.0},
-                .layers = {bars_of(review.figures[i].magnitudes, scale)},
+                      .to = end},
+                .layers = {bars_of(review.figures[i].magnitudes, overview_scale(review, i))},
                 .plot_height = 70.0};
     if (std::isfinite(objective)) chart.layers.emplace_back(LimitLine{.value = 1.0});
     grid.charts.push_back(std::move(chart));

@@ -55,8 +55,9 @@ std::string summary_text(const Review& review) {
     text += fmt::format("          (not checked: no stored one of these {} runs)\n",
                         statistics.num_runs);
   }
-  text += fmt::format("Runs      {} finished of {}, {} completed\n", statistics.num_runs,
-                      review.num_runs, statistics.num_estimated);
+  text += fmt::format("Runs      {} finished of {}, {} completed{}\n", statistics.num_runs,
+                      review.num_runs, statistics.num_estimated,
+                      review.is_cancelled ? "; the campaign was cancelled" : "");
   if (statistics.num_estimated < statistics.num_runs) {
     const MissingEstimates& missing = review.results.missing;
     text += fmt::format(
@@ -377,6 +378,7 @@ Review read_review(const Store& store, const Campaign& campaign, ReviewDepth dep
   stated = matrix_requirements(store.schema(), std::move(stated), campaign.objectives());
   store.read_one_state([&] {
     review = read_of_one_state(store, campaign, depth, std::move(stated));
+    review.is_cancelled = store.control().phase == wire::CampaignPhase::cancelled;
     review.stop = stop_outcome(store);
   });
   return review;

@@ -78,6 +78,13 @@ std::string limit_line(const RequirementAnswer& answer) {
   return fmt::format("Limit        {:.6g} {}\n", answer.limit, answer.subject.unit);
 }
 
+/// Of a requirement that a project's document states.
+std::string statement_line(const StatedRequirement& stated) {
+  if (stated.text.empty()) return "";
+  return fmt::format("{:{}}{}\n", "", margin,
+                     wire::visible_text(fmt::format("{}: {}", stated.id, stated.text)));
+}
+
 std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
   if (answer.is_joint()) return "";
@@ -207,8 +214,9 @@ Tone tone_of(RequirementVerdict verdict) {
 
 std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
   return fitted(
-      fmt::format("Requirement  {}\n{}Answer       {}\nRule         {}\n{}{}{}",
-                  wire::visible_text(answer.stated.requirement), limit_line(answer),
+      fmt::format("Requirement  {}\n{}{}Answer       {}\nRule         {}\n{}{}{}",
+                  wire::visible_text(answer.stated.requirement), statement_line(answer.stated),
+                  limit_line(answer),
                   in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
                   rule_text(answer), count_lines(answer), bound_line(answer), needed_line(answer)));
 }

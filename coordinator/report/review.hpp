@@ -90,6 +90,7 @@ struct Review {
   std::optional<Causes> causes = {};       ///< Empty if runs are too few, or not asked for.
   std::optional<RunSpectra> spectra = {};  ///< Of worst_run_of(); empty if not asked for.
   CampaignExecution execution = {};
+  bool is_cancelled = false;
   std::optional<StopOutcome> stop = {};
 };
 

@@ -235,19 +235,23 @@ std::string spectrum_description(const SessionSpectrum& spectrum, RunIndex run) 
 }
 
 Chart spectrum_chart(const ResultSchema& schema, const SessionSpectrum& spectrum, RunIndex run) {
-  return {.text = {.id = "spectrum-" + spectrum.session,
-                   .title = fmt::format("{}: {}", name_in_symbols(schema, spectrum.session),
-                                        spectrum.meaning),
-                   .description = spectrum_description(spectrum, run)},
-          .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
-          .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
-          .layers = {
-              line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
-              line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
-                      Dash::solid),
-              line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed),
-              line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
-              line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
+  Chart chart{
+      .text = {.id = "spectrum-" + spectrum.session,
+               .title = fmt::format("{}: {}", name_in_symbols(schema, spectrum.session),
+                                    spectrum.meaning),
+               .description = spectrum_description(spectrum, run)},
+      .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
+      .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
+      .layers = {line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
+                 line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
+                         Dash::solid),
+                 line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
+                 line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
+  if (spectrum.noise_ratio) {  // There is noise to compare with.
+    chart.layers.emplace_back(
+        line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed));
+  }
+  return chart;
 }
 
 /// A line of the estimate, and the noise about it.

@@ -150,7 +150,9 @@ std::string spectra_markup(const Review& review, Tables) {
   html += fmt::format(
       "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
       "bit "
-      "for bit. Without the fitted lines, noise is left, and lines that the session does not fit. "
+      "for bit. Without the fitted lines, noise is left, if there is any, and lines that the "
+      "session "
+      "does not fit. "
       "{}</p>\n",
       spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
   std::string figures;
@@ -265,6 +267,7 @@ th.words,td.words{text-align:left}
 td{white-space:nowrap}
 td.words{white-space:normal;overflow-wrap:anywhere;min-width:6rem}
 tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
+tbody th{max-width:40vw;overflow-wrap:anywhere}
 .met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
 td strong{white-space:nowrap}
 .note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
@@ -360,7 +363,8 @@ std::string draws(const Review& review) {
   const std::uint64_t num_done = statistics.num_runs + review.results.missing.num_given_up;
   const std::uint64_t num_missing = num_done - statistics.num_estimated;
   std::string text = num_done < num_wanted
-                         ? fmt::format("The campaign is not finished: {} of {} {} {} done",
+                         ? fmt::format("The campaign {}: {} of {} {} {} done",
+                                       review.is_cancelled ? "was cancelled" : "is not finished",
                                        num_done, num_wanted, unit_of(review), be(num_done))
                          : fmt::format("{}{} {} {} done", num_wanted == 1 ? "1 of " : "All ",
                                        num_wanted, unit_of(review), be(num_wanted));
@@ -404,7 +408,22 @@ std::optional<std::size_t> worst_quantity(const Review& review) {
   return worst;
 }
 
+/// More of the worst error than half is what all runs share: then no draw explains it.
+bool is_mostly_bias(const AccuracyStatistic& accuracy) {
+  const double bias = std::abs(accuracy.error.bias);
+  return bias > 0.5 * accuracy.worst && bias > 2.0 * accuracy.error.standard_deviation;
+}
+
 std::string driver_of(const Review& review, std::size_t quantity) {
+  const AccuracyStatistic& accuracy = review.results.statistics.accuracy[quantity];
+  if (is_mostly_bias(accuracy)) {
+    return fmt::format(
+        "most of it is a bias that all runs share, {} with a standard deviation of {}, which "
+        "follows "
+        "from the campaign and not from its draws",
+        quantity_text(accuracy.error.bias, review.schema.quantities[quantity]),
+        quantity_text(accuracy.error.standard_deviation, review.schema.quantities[quantity]));
+  }
   if (!review.why_not_independent.empty()) {
     return "what drives it is not sought, as that needs independent draws";
   }

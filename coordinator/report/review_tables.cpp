@@ -27,7 +27,13 @@ std::string digest_words(const Review& review) {
               : " (not checked: there is no stored one of these runs)");
 }
 
-std::string hours(double seconds) { return figure_text(seconds / 3600.0) + " h"; }
+/// A text of lines, the first of which begins with the name of all.
+std::string in_one_line(std::string_view lines) {
+  static const std::regex end_of_line("\\n\\s*"), name("^\\S+\\s+"), gap(" {2,}");
+  std::string text(lines.substr(0, lines.find_last_not_of('\n') + 1));
+  text = std::regex_replace(text, end_of_line, "; ");
+  return std::regex_replace(std::regex_replace(text, name, ""), gap, " ");
+}
 
 /// `1.2×10⁻¹²` for each `1.2e-12` of a text.
 std::string with_powers_of_ten(const std::string& text) {
@@ -104,7 +110,7 @@ Table identity_table(const Review& review) {
              {"SHA-256 of the definition", review.definition_digest}});
   if (review.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
   if (review.stop && !review.stop->text.empty()) {
-    table.rows.push_back({"stop rule", review.stop->text});
+    table.rows.push_back({"stop rule", in_one_line(review.stop->text)});
   }
   if (!review.note.empty()) table.rows.push_back({"note", review.note});
   return table;
@@ -114,7 +120,7 @@ Table execution_table(const Review& review) {
   const CampaignExecution& execution = review.execution;
   Table table = facts(
       "execution", "How it was computed",
-      {{"time of processor cores", hours(execution.compute_s)},
+      {{"time of processor cores", duration_text(execution.compute_s)},
        {"first and last result", execution.first_result_utc.value_or("none") + " to " +
                                      execution.last_result_utc.value_or("none")},
        {"workers",
@@ -148,7 +154,7 @@ Table host_table(const Review& review) {
   for (const HostShare& host : review.execution.hosts) {
     table.rows.push_back({host.host, host.cards.empty() ? "none" : host.cards,
                           std::to_string(host.num_workers), std::to_string(host.num_results),
-                          rate_text(host), hours(host.compute_s)});
+                          rate_text(host), duration_text(host.compute_s)});
   }
   table.notes.push_back(
       "runs/s: results over the time from the first registration of a worker to the last result, "
@@ -177,7 +183,8 @@ std::vector<std::pair<std::string, std::string>> reproducing_commands(const Revi
   if (const std::optional<RunIndex> worst = worst_run_of(review)) {
     commands.emplace_back(fmt::format("proofmass replay {0} --run {1} --output run{1}.h5{2}",
                                       database, worst->value, program),
-                          "writes the time series of the worst run");
+                          review.is_of_program ? "simulates the worst run again"
+                                               : "writes the time series of the worst run");
   }
   return commands;
 }

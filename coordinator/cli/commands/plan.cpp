@@ -46,18 +46,31 @@ struct Planned {
   PlanBound bound;
   std::vector<Quantity> quantities;
   std::vector<double> objectives;
-  std::string note;  ///< Campaign::note().
+  std::vector<std::string> others;  ///< Symbols of what has an objective and no bound.
+  std::string note;                 ///< Campaign::note().
 
   [[nodiscard]] int num_steps_in_all() const {
     return std::accumulate(num_steps.begin(), num_steps.end(), 0);
   }
 };
 
+/// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing, and seven in
+/// all: no error is known to be normal beyond five standard errors.
+std::string percent_text(double miss) {
+  if (miss < 5e-8) return "100";
+  const int decimals = static_cast<int>(std::ceil(-std::log10(miss))) - 1;
+  return fmt::format("{:.{}f}", 100.0 * (1.0 - miss), std::clamp(decimals, 1, 5));
+}
+
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
   PlanBound bound = study.bound(num_steps);
   // Sessions beside those of the study may add further ones.
   std::vector<Quantity> quantities = campaign.results().quantities;
   std::vector<double> objectives = campaign.objectives();
+  std::vector<std::string> others;
+  for (std::size_t i = bound.misses.size(); i < objectives.size(); ++i) {
+    if (std::isfinite(objectives[i])) others.emplace_back(quantities[i].symbol);
+  }
   quantities.resize(bound.misses.size());
   objectives.resize(bound.misses.size());
   return {study,
@@ -65,14 +78,15 @@ Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<in
           std::move(bound),
           std::move(quantities),
           std::move(objectives),
+          std::move(others),
           campaign.note()};
 }
 
-/// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing.
-std::string percent_text(double miss) {
-  if (miss < 1e-12) return "100";
-  const int decimals = static_cast<int>(std::ceil(-std::log10(miss))) - 1;
-  return fmt::format("{:.{}f}", 100.0 * (1.0 - miss), std::clamp(decimals, 1, 10));
+/// `all objectives hold in 97.8 % of the runs`, of those that the plan has a bound for.
+std::string chance_text(const Planned& plan) {
+  return fmt::format("all objectives {}hold in {} % of the runs",
+                     plan.others.empty() ? "" : "of these parameters ",
+                     percent_text(plan.bound.misses_any));
 }
 
 /// `16 of 16 probed runs are lost`.
@@ -138,9 +152,8 @@ Table bound_table(const Planned& plan) {
                           given_figure(objective / scale), measured_figure(sigma / scale),
                           measured_figure(objective / sigma), percent_text(plan.bound.misses[i])});
   }
-  table.remarks.push_back(
-      {fmt::format("all objectives hold in {} % of the runs, if estimated by the method {}",
-                   percent_text(plan.bound.misses_any), plan.study.scope().method)});
+  table.remarks.push_back({fmt::format("{}, if estimated by the method {}", chance_text(plan),
+                                       plan.study.scope().method)});
   if (plan.bound.mean_budget) {
     table.remarks.push_back(
         {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});
@@ -150,6 +163,11 @@ Table bound_table(const Planned& plan) {
       "to be normal, and the chance that all objectives hold is the product of the single ones; "
       "correlated errors can only raise it",
       plan.study.scope().method, plan.study.scope().num_instruments));
+  if (!plan.others.empty()) {
+    table.notes.push_back(fmt::format(
+        "there is no bound of {}: how often their objectives hold, a `run` of the campaign tells",
+        fmt::join(plan.others, ", ")));
+  }
   add_undetermined(plan, table);
   add_losses(plan, table);
   add_misfits(plan.study.scope(), table);
@@ -307,9 +325,8 @@ void print_changed_method(const Campaign& campaign, const std::string& method) {
 /// What the lengths in the campaign file promise, to be held beside the new ones.
 void print_former_chance(const Campaign& campaign, const PlanStudy& study) {
   const Planned former = planned(campaign, study, study.scope().num_steps);
-  print_lines(fmt::format("before, with {} {}: all objectives hold in {} % of the runs\n",
-                          former.num_steps_in_all(), built_in_model().step_name(),
-                          percent_text(former.bound.misses_any)));
+  print_lines(fmt::format("before, with {} {}: {}\n", former.num_steps_in_all(),
+                          built_in_model().step_name(), chance_text(former)));
 }
 
 /// Names the data files that a new campaign file in another folder does not find.

@@ -202,6 +202,19 @@ std::size_t value_index(const Recording& recording, std::string_view group_name,
   return index;
 }
 
+/// What expected_spectra() takes for noise.
+std::string noise_meaning_of(const NoiseConfig& noise) {
+  if (noise.scale == 0.0) return "This campaign has no noise.";
+  std::string text = "The noise model is half the difference of the noise of both sensors.";
+  if (noise.thrust_asd_m_s2 > 0.0) {
+    text +=
+        " What the drag-free loop leaves of the thrust's noise comes on top, most around 10 mHz, "
+        "the "
+        "more the less both sensors are alike.";
+  }
+  return text;
+}
+
 /// Half the difference of two sensors whose noise is independent has a quarter of the sum of both
 /// PSDs. What the loops leave of thrust and attitude reaches Γ_mes,dx through factors of a percent
 /// and is left out.
@@ -212,6 +225,7 @@ std::vector<ExpectedSpectrum> expected_spectra(const Scenario& scenario, const N
   const auto noise_psd = [shapes = noise.linear_x, period_s](double frequency_hz) {
     return 0.25 * (shapes[0].psd(frequency_hz, period_s) + shapes[1].psd(frequency_hz, period_s));
   };
+  const std::string noise_meaning = noise_meaning_of(scenario.noise);
   std::vector<ExpectedSpectrum> spectra;
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
     const LineFit fit = line_fit(scenario, scenario.sessions[i]);
@@ -227,9 +241,7 @@ std::vector<ExpectedSpectrum> expected_spectra(const Scenario& scenario, const N
       spectrum.fits.push_back(std::move(known));
     }
     spectrum.noise_psd = noise_psd;
-    spectrum.noise_meaning =
-        "The noise model is half the difference of the noise of both sensors. What the drag-free "
-        "loop leaves of the thrust's noise adds some tens of percent of its power around 10 mHz.";
+    spectrum.noise_meaning = noise_meaning;
   }
   return spectra;
 }

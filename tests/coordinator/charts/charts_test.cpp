@@ -268,10 +268,11 @@ std::vector<std::string> labels_of(const AxisRange& range) {
   return labels;
 }
 
-TEST(FigureText, HasThreeDigitsAtMost) {
+TEST(FigureText, HasThreeDigitsOrAllOfAWholeNumber) {
   EXPECT_EQ(figure_text(0.0), "0");
   EXPECT_EQ(figure_text(-0.0), "0");
-  EXPECT_EQ(figure_text(1234.0), "1230");
+  EXPECT_EQ(figure_text(1234.0), "1234");
+  EXPECT_EQ(figure_text(-23456.7), "−23457");
   EXPECT_EQ(figure_text(0.00123456), "0.00123");
   EXPECT_EQ(figure_text(99'999.0), "10⁵");
   EXPECT_EQ(figure_text(2.5), "2.5");

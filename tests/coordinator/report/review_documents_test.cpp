@@ -170,6 +170,9 @@ TEST_F(ReviewSummary, SaysWhatIsMissing) {
   store.extend(test::campaign_of(30), canonical_definition(test::campaign_of(30)));
   Review review = review_of(store, 30);
   EXPECT_EQ(sentences_of(review)[1], "The campaign is not finished: 20 of 30 draws are done.");
+  review.is_cancelled = true;
+  EXPECT_EQ(sentences_of(review)[1], "The campaign was cancelled: 20 of 30 draws are done.");
+  review.is_cancelled = false;
   review.results.missing.num_given_up = 1;
   EXPECT_EQ(sentences_of(review)[1],
             "The campaign is not finished: 21 of 30 draws are done, 1 of them without an estimate "
@@ -190,6 +193,15 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
   const Store store = store_with(100);
   Review review = review_of(store, 100);
   review.causes = Causes{};
+  AccuracyStatistic& of_delta_x = review.results.statistics.accuracy[0];
+  const ErrorStatistic error = of_delta_x.error;
+  of_delta_x.error.bias = -9e-8;
+  of_delta_x.error.standard_deviation = 4e-9;
+  EXPECT_THAT(
+      sentences_of(review)[3],
+      HasSubstr("; most of it is a bias that all runs share, −90 nm with a standard deviation "
+                "of 4 nm, which follows from the campaign and not from its draws."));
+  of_delta_x.error = error;
   EXPECT_THAT(
       sentences_of(review)[3],
       HasSubstr(

@@ -90,6 +90,22 @@ class AuthenticatorTest : public ::testing::Test {
     return peer.monitor.is_connected() ? "connected" : text.value_or("nothing");
   }
 
+  // Takes the next message at a door and says whose it is; empty if none comes.
+  std::string user_of_next(Peer& peer, Domain domain) {
+    zmq::message_t id;
+    zmq::message_t frame;
+    zmq::socket_t& router = routers_.at(domain);
+    until(peer, [&] { return router.recv(id, zmq::recv_flags::dontwait).has_value(); });
+    if (!router.recv(frame, zmq::recv_flags::dontwait)) return "";
+    const char* const user = zmq_msg_gets(frame.handle(), "User-Id");
+    return user == nullptr ? "nobody" : user;
+  }
+
+  // What is logged of one refusal but the address, which is this host's.
+  [[nodiscard]] std::string logged() const {
+    return events_.empty() ? "nothing" : to_text(events_.front().fields);
+  }
+
   test::ScratchDirectory directory_;
   KeyPair coordinator_ = wire::make_key_pair();
   KeyPair worker_ = wire::make_key_pair();
@@ -103,12 +119,50 @@ class AuthenticatorTest : public ::testing::Test {
   std::map<Domain, std::unique_ptr<wire::SocketEvents>> events_of_routers_;
 };
 
+std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const std::string& role) {
+  return "key = " + keys.public_key.text() + " (refused by the coordinator at " + endpoint +
+         ": must be in its authorized_" + role + "s, and this its address for " + role + "s)";
+}
+
+TEST_F(AuthenticatorTest, AdmitsListedKeysAndNamesThemWithEachMessage) {
+  for (const auto& [domain, role, keys] : {std::tuple{Domain::workers, KeyRole::worker, worker_},
+                                           {Domain::clients, KeyRole::client, client_}}) {
+    Peer peer(endpoint(domain), identity(role, keys));
+    ASSERT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
+    peer.dealer.send(zmq::str_buffer("hello"), zmq::send_flags::dontwait);
+    EXPECT_EQ(user_of_next(peer, domain), keys.public_key.text());
+  }
+  EXPECT_EQ(authenticator_->client(client_.public_key.text(), now_).value().name,
+            to_text(KeyRole::client));
+  EXPECT_TRUE(events_.empty()) << logged();
+}
+
 TEST_F(AuthenticatorTest, AdmitsAKeyThatIsListedLater) {
   Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, stranger_));
   ASSERT_NE(refusal(peer), "connected");
   write_lists(stranger_.public_key.text() + " late\n", "");
   now_ += std::chrono::seconds(1);
   EXPECT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
+}
+
+TEST_F(AuthenticatorTest, RevokedKeyMaySpeakNoMoreThoughItsConnectionStands) {
+  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, worker_));
+  ASSERT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
+  const std::string key = worker_.public_key.text();
+  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, key, now_));
+  EXPECT_FALSE(authenticator_->is_allowed(Domain::clients, key, now_));
+
+  write_lists("#" + key + " worker\n", "");
+  now_ += std::chrono::seconds(1);
+  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, key, now_)) << "one look is not enough";
+  now_ += std::chrono::seconds(1);
+
+  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, key, now_));
+  peer.dealer.send(zmq::str_buffer("still here"), zmq::send_flags::dontwait);
+  EXPECT_EQ(user_of_next(peer, Domain::workers), key);
+
+  Peer again(endpoint(Domain::workers), identity(KeyRole::worker, worker_));
+  EXPECT_EQ(refusal(again), key_refusal(worker_, endpoint(Domain::workers), "worker"));
 }
 
 // The first message of a client may be the only one that a coordinator gets in an hour.
@@ -125,6 +179,18 @@ TEST_F(AuthenticatorTest, RevokesKeysWhileNobodyConnectsOrSpeaks) {
 
 TEST_F(AuthenticatorTest, MessageWithoutAUserIsNotAllowed) {
   EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, "", now_));
+}
+
+TEST_F(AuthenticatorTest, ListThatCannotBeReadIsLoggedAndTheOldOneStands) {
+  write_lists("nonsense\n", "");
+  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, worker_.public_key.text(), now_));
+  ASSERT_EQ(events_.size(), 1u);
+  EXPECT_EQ(events_[0].kind, "allow_list_unreadable");
+  EXPECT_EQ(events_[0].severity, Severity::error);
+  EXPECT_EQ(to_text(events_[0].fields),
+            (directory_ / "authorized_workers").string() +
+                " line = 1 (must begin with a public key of 40 characters); the list before it "
+                "stands");
 }
 
 TEST_F(AuthenticatorTest, RefusesThatWhichIsNoQuestion) {
