@@ -1,6 +1,5 @@
 #include "coordinator/archive/export.hpp"
 
-
 #include <cstddef>
 #include <cstdint>
 #include <limits>
