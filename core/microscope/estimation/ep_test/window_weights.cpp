@@ -65,9 +65,9 @@ Parts parts_of(const NoiseFilter& filter) {
   return found;
 }
 
-double power(double base, std::size_t exponent) {
-  double result = 1.0;
-  for (std::size_t i = 0; i < exponent; ++i) result *= base;
+ComplexDouble power(ComplexDouble base, std::size_t exponent) {
+  ComplexDouble result = 1.0;
+  for (std::size_t i = 0; i < exponent; ++i) result = result * base;
   return result;
 }
 
@@ -93,23 +93,33 @@ WindowAutocovariance::WindowAutocovariance(const NoiseFilter& sensor) {
       near[k] += 0.5 * products[n] * (of_samples[distance + n] + of_samples[before]);
     }
   }
-  for (std::size_t i = 0; i < sensor.num_real; ++i) {
-    const double pole = sensor.pole[i];
-    const double factor = power(pole, test_block_size);
-    if (power(factor, num_near) < memory_min) continue;
-    double gain = products[0];
+  for (const auto& [amplitude, pole] : parts.parts) {
+    const ComplexDouble factor = power(pole, test_block_size);
+    if (norm(power(factor, num_near)) < memory_min * memory_min) continue;
+    ComplexDouble gain = products[0];
     for (std::size_t n = 1; n < window_size; ++n) {
       gain += products[n] * (power(pole, n) + 1.0 / power(pole, n));
     }
-    memory.push_back({0.5 * parts.parts[i].amplitude.real() * gain, factor});
-    for (std::size_t k = 0; k < num_near; ++k) near[k] -= memory.back().weight * power(factor, k);
+    memory.push_back({0.5 * amplitude * gain, factor});
+    for (std::size_t k = 0; k < num_near; ++k) {
+      near[k] -= (memory.back().weight * power(factor, k)).real();
+    }
   }
 }
 
 double WindowAutocovariance::at(std::size_t distance) const {
   double sum = distance < num_near ? near[distance] : 0.0;
-  for (const auto& [weight, factor] : memory) sum += weight * power(factor, distance);
+  for (const auto& [weight, factor] : memory) sum += (weight * power(factor, distance)).real();
   return sum;
+}
+
+double WindowAutocovariance::sum() const {
+  double total = near[0];
+  for (std::size_t n = 1; n < near.size(); ++n) total += 2.0 * near[n];
+  for (const auto& [weight, factor] : memory) {
+    total += (weight * ((1.0 + factor) / (1.0 - factor))).real();
+  }
+  return total;
 }
 
 // 1/f noise is left out of the weights: over a stretch it is a constant, nearly, which they do not
@@ -119,8 +129,7 @@ WindowWeights::WindowWeights(const SensorNoise& sensor, double sample_period_s)
   SensorNoise without_pink = sensor;
   without_pink.pink_corner_hz = 0.0;
   const WindowAutocovariance local(shape_noise(without_pink, sample_period_s));
-  double total = local.near[0];
-  for (std::size_t n = 1; n < local.near.size(); ++n) total += 2.0 * local.near[n];
+  const double total = local.sum();
   for (Eigen::Index length = 1; length <= Eigen::Index{longest_stretch}; ++length) {
     Eigen::MatrixXd covariance(length, length);
     for (Eigen::Index i = 0; i < length; ++i) {
@@ -128,7 +137,13 @@ WindowWeights::WindowWeights(const SensorNoise& sensor, double sample_period_s)
         covariance(i, j) = local.at(static_cast<std::size_t>(std::abs(i - j)));
       }
     }
-    const Eigen::VectorXd best = covariance.llt().solve(Eigen::VectorXd::Constant(length, total));
+    const Eigen::LLT<Eigen::MatrixXd> factored(covariance);
+    // Rounding alone makes it indefinite; other weights than the best are less sharp, and no less
+    // true.
+    const Eigen::VectorXd best =
+        factored.info() == Eigen::Success
+            ? Eigen::VectorXd(factored.solve(Eigen::VectorXd::Constant(length, total)))
+            : Eigen::VectorXd::Ones(length);
     auto& half = of_stretches_.emplace_back();
     for (Eigen::Index i = 0; 2 * i < length; ++i) half.push_back(static_cast<float>(best[i]));
   }
@@ -176,9 +191,12 @@ RegressorProducts WindowWeights::noise_products(
   const Eigen::Matrix<double, 4, num_test_regressors> polynomial = powers.llt().solve(mixed);
 
   // A product of two windows counts once from each side: half of it is summed, from the later one.
+  struct Remembered {
+    Row real = Row::Zero(), imaginary = Row::Zero();
+  };
   std::array<Row, WindowAutocovariance::num_near> before;
   before.fill(Row::Zero());
-  std::vector<Row> remembered(noise_.memory.size(), Row::Zero());
+  std::vector<Remembered> remembered(noise_.memory.size());
   Eigen::Matrix<double, num_test_regressors, num_test_regressors> sum;
   sum.setZero();
   for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -190,8 +208,11 @@ RegressorProducts WindowWeights::noise_products(
     }
     for (std::size_t m = 0; m < remembered.size(); ++m) {
       const auto& [weight, factor] = noise_.memory[m];
-      noise += weight * remembered[m];
-      remembered[m] = factor * (remembered[m] + now);
+      auto& [real, imaginary] = remembered[m];
+      noise += weight.real() * real - weight.imag() * imaginary;
+      const Row sum_of_real = real + now;
+      real = factor.real() * sum_of_real - factor.imag() * imaginary;
+      imaginary = factor.real() * imaginary + factor.imag() * sum_of_real;
     }
     sum += now.transpose() * noise;
   }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/math/complex.hpp"
 #include "core/microscope/session/test_signals.hpp"
 #include "core/signal/noise_shape.hpp"
 
@@ -14,10 +15,10 @@ namespace proofmass {
 
 /// Autocovariance, (m/s²)², of half the difference of two sensors' noise, averaged over windows.
 struct WindowAutocovariance {
-  /// Σ weight·factorⁿ at a distance of n windows, in addition to `near`: what 1/f noise has of long
-  /// memory.
+  /// Re(weight·factorⁿ) at a distance of n windows, in addition to `near`: the long memory of 1/f
+  /// noise, and of a rise that ends at a few mHz.
   struct Memory {
-    double weight = 0.0, factor = 0.0;
+    ComplexDouble weight, factor;
   };
   static constexpr std::size_t num_near = 16;
   std::array<double, num_near> near{};  ///< At a distance of n windows.
@@ -25,6 +26,8 @@ struct WindowAutocovariance {
 
   explicit WindowAutocovariance(const NoiseFilter& sensor);
   [[nodiscard]] double at(std::size_t distance) const;
+  /// Over all distances, of either sign.
+  [[nodiscard]] double sum() const;
 };
 
 /// For all runs of a campaign.

@@ -153,6 +153,19 @@ void expect_error(const MicroscopeCampaign& campaign, double budget) {
   EXPECT_NEAR(calibrated.values[uncorrected], budget, 0.01 * std::abs(budget));
 }
 
+// Whatever else a mission has, a test whose data are lost tells nothing and takes nothing away.
+TEST(EpTest, DoesWithoutASessionThatLostAllData) {
+  MicroscopeCampaign campaign = quiet_campaign({test_session("lost", 2), test_session("kept", 2)});
+  fix(campaign, "eotvos_parameter.masses_2_1", 1e-12);
+  const RunRecord whole = RunPlan(campaign, no_calibration).record(RunIndex{0}, {});
+  RunRecord record = whole;
+  std::ranges::fill(record.phasors[0].test_products, 0.0);
+  const double found = estimate(campaign, record).values[delta];
+  EXPECT_NEAR(found / 1e-12, 1.0, 1e-3);
+  std::ranges::fill(record.phasors[1].test_products, 0.0);
+  EXPECT_FALSE(std::isfinite(estimate(campaign, record).values[delta]));
+}
+
 // Γ_mes,dx holds a_d11 Γ_mes,cx, so that 2 a_d11 Γ_res,x is taken for δ g.
 TEST(EpTest, HasTheErrorOfAScaleFactorInItsBudget) {
   MicroscopeCampaign campaign = circular_campaign();
@@ -281,9 +294,13 @@ TEST(EpTest, HasAnHonestStandardError) {
   NoiseConfig rising;
   rising.linear_x.rise_corner_hz = 5e-3;
   rising.linear_x.rise_limit_hz = 0.05;
+  NoiseConfig slow = rising;  // What is left of it after sixteen windows is a thirtieth.
+  slow.linear_x.rise_corner_hz = 3e-3;
+  slow.linear_x.rise_limit_hz = 0.012;
   for (const GapsConfig& gaps : {GapsConfig{}, many_gaps()}) {
-    for (const auto& [spin, noise] : {std::pair(0.0, NoiseConfig{}), std::pair(17.5, NoiseConfig{}),
-                                      std::pair(17.5, of_each_sensor), std::pair(17.5, rising)}) {
+    for (const auto& [spin, noise] :
+         {std::pair(0.0, NoiseConfig{}), std::pair(17.5, NoiseConfig{}),
+          std::pair(17.5, of_each_sensor), std::pair(17.5, rising), std::pair(0.0, slow)}) {
       const Coverage found = coverage(spin, noise, gaps);
       EXPECT_NEAR(found.within_95, 0.95, 3.0 * std::sqrt(0.95 * 0.05 / 208)) << spin;
       EXPECT_NEAR(found.rms, 1.0, 3.5 / std::sqrt(2.0 * 208)) << spin;
