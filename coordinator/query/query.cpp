@@ -174,6 +174,10 @@ std::string text_of(const QueryFiles& files) {
 
 Reader::Reader(const QueryFiles& files, const QueryLimits& limits, Clock::time_point end)
     : files_text_(text_of(files)), limits_(limits), end_(end), database_(open_files(files)) {
+  // This deletes all temporary tables, of which the functions bring some.
+  if (limits_.temporary_data == TemporaryData::in_memory) {
+    database_->execute("PRAGMA temp_store = MEMORY");
+  }
   check(register_functions(connection()));
   set_limits();
   restrict_connection();
@@ -187,9 +191,6 @@ void Reader::restrict_connection() {
                                                          {SQLITE_DBCONFIG_DQS_DML, 0}}};
   for (const auto& [setting, value] : settings) {
     check(sqlite3_db_config(connection(), setting, value, nullptr));
-  }
-  if (limits_.temporary_data == TemporaryData::in_memory) {
-    database_->execute("PRAGMA temp_store = MEMORY");
   }
   database_->execute("PRAGMA query_only = ON");
   sqlite3_set_authorizer(connection(), &Reader::on_action, this);
