@@ -25,6 +25,9 @@ enum class CheckOutcome : std::uint8_t {
   not_checked,  ///< Another check failed that it needs, or the file does not tell.
 };
 
+/// Of the runs, simulated again if nobody asks for another.
+inline constexpr double fraction_by_default = 0.01;
+
 /// Details that a Check names of many.
 inline constexpr std::size_t details_named_max = 10;
 

@@ -27,7 +27,9 @@ namespace {
 struct MergeOptions {
   std::filesystem::path whole;
   std::vector<std::filesystem::path> parts;
-  double fraction = 0.01;  ///< Of each part's runs, simulated again; in [0, 1].
+  /// Of each part's runs, simulated again; in [0, 1]. One that is not asked for is simulated if it
+  /// can be.
+  std::optional<double> fraction = {};
   OutputFormat format = OutputFormat::text;
 };
 
@@ -62,12 +64,18 @@ void require_part(const std::filesystem::path& part, const LargestPart& largest)
 /// @throws ArchiveError with the checks that fail.
 void require_sound(const std::filesystem::path& part, const MergeOptions& options,
                    const IsStopped& is_stopped) {
-  const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
+  const VerifyOptions how{.fraction = options.fraction.value_or(fraction_by_default),
+                          .num_threads = wire::num_processors()};
   std::string failing;
   const auto collect = [&](const Check& check) {
+    const bool is_skipped =
+        check.verdict == CheckOutcome::not_checked && check.name == "simulation";
+    if (is_skipped && options.fraction.value_or(0.0) > 0.0) {
+      failing += fmt::format("\nno run was simulated again, as --fraction asks: {}", check.finding);
+    }
     if (check.verdict == CheckOutcome::fails) failing += "\n" + check_text(check);
   };
-  if (verify(part, how, collect, is_stopped)) return;
+  if (verify(part, how, collect, is_stopped) && failing.empty()) return;
   while (failing.ends_with('\n')) failing.pop_back();
   throw ArchiveError(fmt::format("{} fails these checks:{}", part.string(), failing));
 }
@@ -150,7 +158,7 @@ void add_merge(CLI::App& app, Command& chosen) {
   command
       .add_option("--fraction", options.fraction, "Fraction of each part's runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
-      ->capture_default_str();
+      ->default_str(fmt::format("{}", fraction_by_default));
   add_json_flag(command, options.format);
 }
 

@@ -29,8 +29,6 @@ struct CheckedFileOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-constexpr double fraction_by_default = 0.01;
-
 VerifyOptions how_to_verify(const CheckedFileOptions& options) {
   return {.fraction = options.fraction.value_or(fraction_by_default),
           .num_threads = wire::num_processors()};
