@@ -229,6 +229,19 @@ void expect_accepted(std::string_view answer, const std::filesystem::path& progr
       "model program = {} (must answer prepare with {{}} or what it refuses)", program.string()));
 }
 
+/// The file may have been replaced since the model was loaded, and then other runs would be
+/// computed.
+/// @throws ModelProgramError
+void expect_same(std::string_view answer, const ProgramDescription& loaded,
+                 const std::filesystem::path& program) {
+  const ProgramDescription now = description_in(answer, program.string() + ": description");
+  if (now.text == loaded.text) return;
+  throw ModelProgramError(fmt::format(
+      "model program = {} (describes {} now, and not {} as when it was loaded: start what "
+      "runs it anew)",
+      program.string(), now.version, loaded.version));
+}
+
 /// A process of the program that has accepted the parameters of a campaign.
 std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& program,
                                                  const DescribedCampaign& campaign) {
@@ -238,6 +251,8 @@ std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& pr
     question["parameters"][of.parameters[i].name] = campaign.parameters[i];
   }
   auto process = std::make_unique<ProgramProcess>(program, of.limits);
+  process->ask({Json{{"ask", "describe"}}.dump()},
+               [&](std::string_view answer) { expect_same(answer, of, program); });
   process->ask({question.dump()},
                [&](std::string_view answer) { expect_accepted(answer, program); });
   return process;
