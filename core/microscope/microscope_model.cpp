@@ -121,12 +121,36 @@ std::string drift_note(const Scenario& scenario) {
       scenario.estimation.transient_s, std::ceil(least_s));
 }
 
+/// A file has the accelerations in the satellite's frame, and so those of one spin.
+std::string environment_note(const MicroscopeCampaign& campaign) {
+  const Scenario& scenario = campaign.scenario;
+  if (campaign.environment_table.empty()) return {};
+  const auto [slow, fast] = std::ranges::minmax(scenario.sessions, {},
+                                                [](const Session& s) { return s.spin_rate_rad_s; });
+  if (slow.spin_rate_rad_s != fast.spin_rate_rad_s) {
+    return fmt::format(
+        "environment.file has accelerations in the satellite's frame, and the satellite spins "
+        "otherwise in {} than in {}: it is right for one of them at most",
+        slow.name, fast.name);
+  }
+  const int num_orbits = std::ranges::max(scenario.sessions, {}, &Session::num_orbits).num_orbits;
+  const double end_s = campaign.environment_table.back().time_s;
+  const double turns = slow.spin_rate_rad_s * scenario.orbit.period_s / (2.0 * std::numbers::pi);
+  if (end_s >= num_orbits * scenario.orbit.period_s) return {};
+  if (std::abs(turns - std::round(turns)) < 1e-6) return {};
+  return fmt::format(
+      "environment.file ends after {:.0f} s, and then its first orbit is repeated, in which the "
+      "satellite makes {:.6g} turns: not a whole number, so that accelerations jump; make the file "
+      "as long as the longest session",
+      end_s, turns);
+}
+
 }  // namespace
 
 std::string MicroscopeCampaign::note() const {
   std::string all;
-  for (const std::string& note :
-       {unwatched_note(scenario), loops_note(scenario), drift_note(scenario)}) {
+  for (const std::string& note : {unwatched_note(scenario), loops_note(scenario),
+                                  drift_note(scenario), environment_note(*this)}) {
     if (!all.empty() && !note.empty()) all += "; ";
     all += note;
   }

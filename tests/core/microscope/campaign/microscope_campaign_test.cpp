@@ -58,7 +58,7 @@ TEST(MicroscopeCampaign, HasAFitOfEachSessionSinceTheSixthVersion) {
   EXPECT_EQ(schema.fit[8].name, "chi_squared_A_C12");
   EXPECT_EQ(schema.fit[10].name, "chi_squared_a_c12_");  // Names of columns have no case.
   EXPECT_EQ(schema.fit[11].name, "degrees_of_freedom_a_c12_");
-  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-8x", "other-7", ""}) {
+  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-9x", "other-7", ""}) {
     EXPECT_EQ(model().results_of(definition, version).fit.size(), 2U) << version;
   }
   EXPECT_EQ(model().results_of(definition, "hardy2013-10").fit.size(), schema.fit.size());
@@ -165,6 +165,24 @@ TEST(MicroscopeCampaign, NotesThatNoSessionWatchesTheNoise) {
   EXPECT_EQ(campaign.note(),
             "no session watches the noise of the loops, which may move every estimate: add one "
             "without excitations");
+}
+
+// What comes from space turns with the frame: in half a turn it changes its sign.
+TEST(MicroscopeCampaign, NotesAnEnvironmentFileThatCannotBeRight) {
+  using ::testing::HasSubstr;
+  MicroscopeCampaign campaign;
+  const double period_s = campaign.scenario.orbit.period_s;
+  const double whole_turn_rad_s = 2.0 * std::numbers::pi / period_s;
+  campaign.environment_table = {{.time_s = 0.0}, {.time_s = period_s}};
+  EXPECT_EQ(campaign.note(), "");
+  for (Session& session : campaign.scenario.sessions) {
+    session.spin_rate_rad_s = 4.5 * whole_turn_rad_s;
+  }
+  EXPECT_THAT(campaign.note(), HasSubstr("the satellite makes 4.5 turns: not a whole number"));
+  campaign.environment_table.back().time_s = 40.0 * period_s;
+  EXPECT_EQ(campaign.note(), "");
+  campaign.scenario.sessions[3].spin_rate_rad_s = 0.0;
+  EXPECT_THAT(campaign.note(), HasSubstr("spins otherwise in a_c12 than in k2_sensor_2"));
 }
 
 }  // namespace
