@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "core/campaign/sampling_design.hpp"
@@ -75,5 +77,29 @@ struct Dispersion {
 /// The standard normal deviate that a quantity with the law `normal` or `correlated` follows.
 [[nodiscard]] double draw_deviate(std::string_view name, std::uint64_t seed, RunIndex run,
                                   std::uint32_t draw, const Stratum& stratum = {});
+
+/// Keys that a law has in a campaign file beside `law`, each named like its field of Dispersion.
+[[nodiscard]] std::span<const std::string_view> keys_of(Law law);
+
+/// A field of a Dispersion, of the type that its key has in a campaign file.
+using LawField =
+    std::variant<double*, std::string*, std::vector<double>*, std::vector<std::string>*>;
+
+/// The field of one of keys_of() any law.
+[[nodiscard]] LawField field_of(Dispersion& law, std::string_view key);
+
+/// Mean and standard deviation of a law.
+struct LawMoments {
+  double mean = 0.0;
+  double standard_deviation = 0.0;
+};
+
+/// Those of a valid law. Nothing for the laws `table` and `derived`, whose values follow from a
+/// file or from other quantities.
+///
+/// A truncated normal law is integrated over the part of its interval that matters, which keeps the
+/// digits far out in a tail and in slivers, where the closed form subtracts nearly equal numbers;
+/// relative error of the standard deviation below 1e-6. The bits are the same on every processor.
+[[nodiscard]] std::optional<LawMoments> moments_of(const Dispersion& law);
 
 }  // namespace proofmass

@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "core/campaign/law_keys.hpp"
+#include "core/campaign/dispersion.hpp"
 #include "core/definition/definition_text.hpp"
 
 namespace proofmass::detail {

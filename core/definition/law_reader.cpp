@@ -12,7 +12,7 @@
 #include <utility>
 #include <variant>
 
-#include "core/campaign/law_keys.hpp"
+#include "core/campaign/dispersion.hpp"
 #include "core/definition/document.hpp"
 
 namespace proofmass {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <limits>
 
-#include "core/random/normal.hpp"
+#include "core/random/stream.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/interval.hpp"
 

@@ -8,7 +8,6 @@
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
-#include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"

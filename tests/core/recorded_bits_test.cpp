@@ -6,7 +6,6 @@
 #include "core/math/hash.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
-#include "core/random/normal.hpp"
 #include "core/random/normal_deviates.hpp"
 #include "core/random/stream.hpp"
 #include "core/signal/noise_shape.hpp"

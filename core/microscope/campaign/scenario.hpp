@@ -15,7 +15,7 @@
 #include "core/microscope/estimation/estimation_config.hpp"
 #include "core/microscope/instrument/instrument_config.hpp"
 #include "core/microscope/instrument/noise_config.hpp"
-#include "core/microscope/orbit/orbit_config.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/gaps.hpp"
 #include "core/microscope/session/session.hpp"

@@ -4,7 +4,6 @@
 #include "core/microscope/environment/environment.hpp"
 #include "core/microscope/environment/environment_table.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
-#include "core/microscope/orbit/orbit_config.hpp"
 
 namespace proofmass {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "core/campaign/law_moments.hpp"
+#include "core/campaign/dispersion.hpp"
 #include "core/microscope/instrument/drawn_quantities.hpp"
 
 namespace proofmass {

@@ -6,9 +6,14 @@
 
 #include "core/math/elementary.hpp"
 #include "core/math/inline.hpp"
-#include "core/microscope/orbit/orbit_config.hpp"
 
 namespace proofmass {
+
+/// The orbit of the satellite about the Earth: `[orbit]` of a campaign file.
+struct OrbitConfig {
+  double period_s = 5950.0;
+  double eccentricity = 5e-3;  ///< In [0, 0.5].
+};
 
 /// Where the satellite is on its orbit. The orbital plane is that of X and Z of the inertial frame
 /// I: X points towards perigee, Z a quarter of a turn on.

@@ -135,7 +135,7 @@ class BatchPhilox {
 
 using F = hn::Vec<Floats>;
 
-/// log_unit() of core/random/normal.cpp, line by line.
+/// log_unit() of core/random/normal_deviates.hpp, line by line.
 HWY_INLINE F log_unit(F u) {
   const Floats floats;
   const SignedWords words;
@@ -154,7 +154,7 @@ HWY_INLINE F log_unit(F u) {
                  hn::Mul(s, hn::Add(hn::Set(floats, 2.0F), tail)));
 }
 
-/// sincos_word() of core/random/normal.cpp, line by line.
+/// sincos_word() of core/random/normal_deviates.hpp, line by line.
 HWY_INLINE void sincos_word(hn::Vec<UnsignedWords> word, F& sine, F& cosine) {
   const Floats floats;
   const SignedWords words;
@@ -185,7 +185,7 @@ HWY_INLINE void sincos_word(hn::Vec<UnsignedWords> word, F& sine, F& cosine) {
   cosine = hn::Xor(second, hn::BitCast(floats, cosine_sign));
 }
 
-/// The radius of box_muller() in core/random/normal.cpp, line by line.
+/// The radius of box_muller() in core/random/normal_deviates.hpp, line by line.
 HWY_INLINE F radius(hn::Vec<UnsignedWords> word) {
   const Floats floats;
   const auto half_word = hn::BitCast(SignedWords(), hn::ShiftRight<1>(word));

@@ -1,5 +1,4 @@
-#include "core/campaign/law_moments.hpp"
-
+#include "core/campaign/dispersion.hpp"
 #include "core/runs.hpp"
 #include "tests/test.hpp"
 

@@ -1,4 +1,4 @@
-#include "core/random/normal.hpp"
+#include "core/random/stream.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {

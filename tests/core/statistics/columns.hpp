@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
 #include "core/statistics/sensitivity.hpp"
 #include "core/statistics/stop_rule.hpp"

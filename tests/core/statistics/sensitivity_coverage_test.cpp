@@ -3,7 +3,7 @@
 #include <iostream>
 
 #include "core/error.hpp"
-#include "core/random/normal.hpp"
+#include "core/random/stream.hpp"
 #include "core/statistics/independence.hpp"
 #include "core/statistics/sensitivity.hpp"
 #include "tests/core/statistics/columns.hpp"

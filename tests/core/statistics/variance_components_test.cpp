@@ -1,6 +1,5 @@
 #include "core/statistics/variance_components.hpp"
 
-#include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
 #include "core/statistics/distribution.hpp"
 #include "tests/test.hpp"

@@ -3,7 +3,6 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/instrument/drawn_moments.hpp"
-#include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
 #include "tests/test.hpp"
 

@@ -1,8 +1,8 @@
-#include "core/microscope/planning/undetermined.hpp"
-
 #include <gmock/gmock.h>
 
 #include <Eigen/Core>
+
+#include "core/microscope/planning/plan_study.hpp"
 
 namespace proofmass {
 namespace {
