@@ -333,14 +333,14 @@ Table error_table(const Review& review) {
   }
   table.notes.push_back(has_intervals ? bias_sentence(review)
                                       : "no intervals over runs: " + review.why_not_independent);
+  const bool has_objective = std::ranges::any_of(
+      review.objectives, [](double objective) { return std::isfinite(objective); });
   const std::uint64_t num_draws = statistics.num_runs + review.results.missing.num_given_up;
-  if (has_intervals && statistics.num_estimated < num_draws) {
+  if (has_intervals && has_objective && statistics.num_estimated < num_draws) {
     table.notes.push_back(fmt::format(
         "beyond: of draws that have an estimate; {} of {} have none and meet no objective",
         num_draws - statistics.num_estimated, num_draws));
   }
-  const bool has_objective = std::ranges::any_of(
-      review.objectives, [](double objective) { return std::isfinite(objective); });
   if (has_objective || !has_intervals) table.notes.push_back(joint_sentence(review));
   return table;
 }

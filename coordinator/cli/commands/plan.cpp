@@ -55,7 +55,7 @@ struct Planned {
 };
 
 /// `99.988`: a probability of 1 − miss in percent, with two digits of what is missing, and seven in
-/// all: no error is known to be normal beyond five standard errors.
+/// all: further ones would be about tails of an assumed law beyond five standard errors.
 std::string percent_text(double miss) {
   if (miss < 5e-8) return "100";
   const int decimals = static_cast<int>(std::ceil(-std::log10(miss))) - 1;
@@ -84,8 +84,8 @@ Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<in
 
 /// `all objectives hold in 97.8 % of the runs`, of those that the plan has a bound for.
 std::string chance_text(const Planned& plan) {
-  return fmt::format("all objectives {}hold in {} % of the runs",
-                     plan.others.empty() ? "" : "of these parameters ",
+  return fmt::format("all {} hold in {} % of the runs",
+                     plan.others.empty() ? "objectives" : "of these",
                      percent_text(plan.bound.misses_any));
 }
 
@@ -165,8 +165,8 @@ Table bound_table(const Planned& plan) {
       plan.study.scope().method, plan.study.scope().num_instruments));
   if (!plan.others.empty()) {
     table.notes.push_back(fmt::format(
-        "there is no bound of {}: how often their objectives hold, a `run` of the campaign tells",
-        fmt::join(plan.others, ", ")));
+        "these objectives have no bound, and a `run` of the campaign tells how often they hold: {}",
+        fmt::join(plan.others, "; ")));
   }
   add_undetermined(plan, table);
   add_losses(plan, table);

@@ -123,6 +123,18 @@ TEST(ErrorTable, CountsNothingBeyondAnObjectiveThatThereIsNot) {
               Contains(::testing::MatchesRegex("a_c11·Δx .* +-  +-")));
 }
 
+// A requirement counts them; the intervals of this table cannot.
+TEST(ErrorTable, SaysThatItLeavesOutDrawsWithoutAnEstimate) {
+  CampaignStatistics statistics = paper_statistics(100);
+  EXPECT_THAT(error_text(review_of(MicroscopeCampaign{}, statistics)),
+              ::testing::Not(HasSubstr("beyond: ")));
+  statistics.num_estimated = 60;
+  Review review = review_of(MicroscopeCampaign{}, statistics, 3);
+  EXPECT_THAT(error_text(review), HasSubstr("beyond: of draws that have an estimate; 43 of 103 "));
+  std::ranges::fill(review.objectives, std::numeric_limits<double>::infinity());
+  EXPECT_THAT(error_text(review), ::testing::Not(HasSubstr("beyond: ")));
+}
+
 TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   CampaignStatistics statistics = paper_statistics(40);
   leave_out_intervals(statistics);

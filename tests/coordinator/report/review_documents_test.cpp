@@ -103,15 +103,53 @@ TEST_F(ReviewHtml, ShowsTheSpectraOfTheWorstRun) {
   review.spectra = some_spectra();
   const std::string html = review_html(review);
   EXPECT_EQ(test::malformed_part(as_xml(html)), "");
-  EXPECT_THAT(
-      html, AllOf(HasSubstr("<h2 id=\"spectra-section-title\">Spectra of the worst run"),
-                  HasSubstr("a_c13: difference &lt;x&gt;"), HasSubstr("m/s²/√Hz"),
-                  HasSubstr("an amplitude of 3×10⁻⁹ m/s²."),
-                  HasSubstr("<td data-value=\"3e-09\">3×10⁻⁹</td>"), HasSubstr(">1.04 ± 0.03</td>"),
-                  HasSubstr("It is white &amp; quiet."), Not(HasSubstr("<script>"))));
+  EXPECT_THAT(html, AllOf(HasSubstr("<h2 id=\"spectra-section-title\">Spectra of the worst run"),
+                          HasSubstr("a_c13: difference &lt;x&gt;"), HasSubstr("m/s²/√Hz"),
+                          HasSubstr("an amplitude of 3×10⁻⁹ m/s²."),
+                          HasSubstr("<td data-value=\"3e-09\">3×10⁻⁹</td>"),
+                          HasSubstr(">1.04 ± 0.03</td>"), HasSubstr("It is white &amp; quiet."),
+                          HasSubstr("noise model"), Not(HasSubstr("<script>"))));
+  review.spectra->sessions[0].noise_ratio.reset();
+  EXPECT_THAT(review_html(review), Not(HasSubstr("noise model")));
   review.spectra->sessions.clear();
   const std::string reasons = review_html(review);
   EXPECT_THAT(reasons, AllOf(HasSubstr("&lt;script&gt;"), Not(HasSubstr("bit for bit"))));
+}
+
+// Run 19 is off by a fifth of the objective, and by ten of one that is 50 times as small.
+TEST_F(ReviewHtml, ShowsErrorsHoweverFarBeyondTheirObjectives) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  for (const Chart& chart : magnitude_overview(review).charts) EXPECT_EQ(chart.x.to, 3.0);
+  review.objectives[2] /= 50.0;
+  const ChartGrid grid = magnitude_overview(review);
+  for (const Chart& chart : grid.charts) {
+    EXPECT_GE(chart.x.to, 10.0);
+    EXPECT_LE(chart.x.to, 10.0 * 1.3) << "a bin ends a tenth of a decade on at most";
+  }
+}
+
+TEST_F(ReviewHtml, NamesIntervalsThatAreDrawn) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  const auto names_of = [&] {
+    std::string names;
+    for (const Layer& layer : error_chart(review, 0).layers) {
+      if (const auto* const line = std::get_if<LimitLine>(&layer)) names += line->label + ";";
+    }
+    for (const Layer& layer : convergence_chart(review, 0).layers) {
+      if (const auto* const band = std::get_if<Band>(&layer)) names += band->name + ";";
+    }
+    return names;
+  };
+  EXPECT_THAT(names_of(), AllOf(HasSubstr("with 95 % interval"), HasSubstr("mean, 95 %;"),
+                                HasSubstr("std, 95 %;")));
+  review.results.statistics.accuracy[0].error.bias_interval.reset();
+  for (ConvergencePoint& point : review.figures[0].convergence) {
+    point.mean_interval.reset();
+    point.deviation_interval.reset();
+  }
+  EXPECT_THAT(names_of(), AllOf(HasSubstr("bias "), Not(HasSubstr("95 %"))));
 }
 
 TEST_F(ReviewHtml, KnowsTheWorstRun) {

@@ -60,8 +60,8 @@ std::optional<TestRecord> test_record(const SessionPhasors& record, const Sessio
       all.bottomRightCorner<num_powers, num_powers>();
   const Eigen::Matrix<double, num_averaged, num_powers> mixed =
       all.topRightCorner<num_averaged, num_powers>();
-  // Products of sums keep 16 digits: windows of less than some percent of a record leave none of
-  // them.
+  // Of 16 digits of the products six at least are left without their polynomial; windows that lie
+  // within some percent of a record leave fewer.
   constexpr double condition_min = 1e-10;
   const Eigen::LLT<Eigen::Matrix<double, num_powers, num_powers>> factored(powers);
   if (factored.info() != Eigen::Success || factored.rcond() < condition_min) return std::nullopt;
