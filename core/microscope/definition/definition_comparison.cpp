@@ -24,8 +24,7 @@ class Comparison {
 
   std::vector<DefinitionDifference> run() {
     compare_sampling();
-    const bool is_any_realistic = first_.scenario.realism || second_.scenario.realism;
-    compare_entries("", fields_of(first_, is_any_realistic), fields_of(second_, is_any_realistic));
+    compare_entries("", fields_of(first_, second_), fields_of(second_, first_));
     compare_sessions();
     compare_controllers();
     compare_environment();
@@ -51,8 +50,14 @@ class Comparison {
   }
 
   // More runs extend a campaign; the values of data files are compared, not their names.
-  static std::vector<Entry> fields_of(MicroscopeCampaign campaign, bool with_realism) {
-    if (with_realism && !campaign.scenario.realism) campaign.scenario.realism.emplace();
+  // A campaign without realism or tests has their fields as they are by default.
+  static std::vector<Entry> fields_of(MicroscopeCampaign campaign,
+                                      const MicroscopeCampaign& other) {
+    Scenario& scenario = campaign.scenario;
+    if (other.scenario.realism && !scenario.realism) scenario.realism.emplace();
+    if (other.scenario.has_tests() && !scenario.has_tests()) {
+      scenario.sessions.emplace_back().target = SessionTarget::ep_test;
+    }
     std::vector<Entry> entries = detail::scenario_entries(campaign);
     std::erase_if(entries, [](const Entry& entry) {
       static constexpr std::array<std::string_view, 5> left_out{
@@ -67,8 +72,7 @@ class Comparison {
     return entries;
   }
 
-  /// Only campaigns that test have some of the fields: what one alone has is left to the comparison
-  /// of sessions.
+  /// Sessions that test have other fields than those that do not.
   void compare_entries(const std::string& prefix, const std::vector<Entry>& first,
                        const std::vector<Entry>& second) {
     for (const Entry& entry : first) {

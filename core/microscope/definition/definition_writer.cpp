@@ -91,10 +91,11 @@ class CommentedWriter {
         "# Rodrigues, Touboul, Métris, Validation of the in-flight calibration procedures for the\n"
         "# MICROSCOPE space mission, Advances in Space Research (2013).\n"
         "#\n"
-        "# Two kinds of tables are not shown, as none is in force: [realism], whose keys\n"
-        "# hardy2013-realistic.toml lists, and [[controller]], a transfer function of one axis of "
-        "a\n"
-        "# loop (core/microscope/control/README.md).\n";
+        "# Tables that are not in force are not shown: [realism], whose keys\n"
+        "# hardy2013-realistic.toml lists, [[controller]], a transfer function of one axis of a\n"
+        "# loop (core/microscope/control/README.md), and what sessions that test add to a "
+        "campaign,\n"
+        "# which mission-2013.toml has.\n";
   }
 
   // What a preset sets is shown but not stated: a stated value would win over another preset.

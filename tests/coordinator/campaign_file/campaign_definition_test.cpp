@@ -156,6 +156,17 @@ TEST(DefinitionDifferences, NameFieldAndBothValues) {
           "database, { law = \"fixed\", value = 0.5 } asked for"));
 }
 
+// A campaign without tests has the fields of tests by default.
+TEST(DefinitionDifferences, NameWhatATestBrings) {
+  const std::vector<std::string> lines = differences_after([](MicroscopeCampaign& c) {
+    c.scenario.sessions.emplace_back().target = SessionTarget::ep_test;
+    c.scenario.gaps.glitch_rate_hz = 0.02;
+    c.scenario.drag_free.resonator_damping = 0.5;
+  });
+  EXPECT_THAT(lines, Contains("gaps.glitch_rate_hz: 0 in the database, 0.02 asked for"));
+  EXPECT_THAT(lines, Contains("drag_free.resonator_damping: 0 in the database, 0.5 asked for"));
+}
+
 TEST(DefinitionDifferences, IncludeTheValuesOfDataFiles) {
   EXPECT_THAT(differences_after([](MicroscopeCampaign& c) { c.table_columns[0][1] = 2.5; }),
               ElementsAre("dispersion.star_tracker_bias_rad.head_2_z of run 1: 2 in the database, "
