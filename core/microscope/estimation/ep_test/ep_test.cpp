@@ -1,6 +1,7 @@
 #include "core/microscope/estimation/ep_test/ep_test.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -43,6 +44,7 @@ struct TestRecord {
   double common_part = 0.0;
   Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
   FittedMatrix noise;             ///< XᵀRX of the regressors, of noise of scale 1.
+  double num_windows = 0.0;       ///< By weight.
   double weight = 0.0;            ///< 1/S(f_EP), Hz/(m/s²)².
 };
 
@@ -68,8 +70,8 @@ std::optional<TestRecord> test_record(const SessionPhasors& record, const Sessio
   TestRecord of;
   of.products =
       all.topLeftCorner<num_averaged, num_averaged>() - mixed * factored.solve(mixed.transpose());
-  const double count = powers(0, 0);
-  const auto mean = [&](TestSignal signal) { return mixed(row(signal), 0) / count; };
+  of.num_windows = powers(0, 0);
+  const auto mean = [&](TestSignal signal) { return mixed(row(signal), 0) / of.num_windows; };
   of.common_mean = mean(common_x);
   of.differential_mean = mean(differential_x);
   of.mean_gradient << mean(gradient_xx), mean(gradient_xy), mean(gradient_xz);
@@ -136,6 +138,22 @@ FittedMatrix fitted_block(const TestRecord& record) {
   return block;
 }
 
+/// Covariance of a window with all others, (m/s²)², by the noise of the squares that corrected()
+/// subtracts. It is white, of which windows that overlap by half leave `whitened` times their
+/// variance. What the squares have of the polynomial and of the regressors, lines as those of the
+/// drag, is no noise.
+double square_noise(const TestRecord& record, const ParameterArray& calibration) {
+  constexpr auto size = static_cast<double>(test_block_size);
+  constexpr double whitened = 1.5 / (1.0 - 0.25 / (size * size));
+  Factors squares = Factors::Zero();
+  squares[row(common_squared)] = calibration[index(Parameter::k2d)];
+  squares[row(common_product)] = 2.0 * calibration[index(Parameter::k2c)];
+  const Fitted mixed = fitted_rows(record) * squares;
+  const double of_windows =
+      squares.dot(record.products * squares) - mixed.dot(fitted_block(record).llt().solve(mixed));
+  return whitened * std::max(of_windows, 0.0) / record.num_windows;
+}
+
 /// Covariance of the calibration's estimates; 0 if it has no standard errors.
 Eigen::Matrix<double, num_calibrated, num_calibrated> covariance_of(const Estimation& calibration) {
   Eigen::Matrix<double, num_calibrated, num_calibrated> covariance;
@@ -171,11 +189,14 @@ class TestFit {
     return 2.0 * (inverse_ * sum);
   }
 
-  /// By noise.
-  [[nodiscard]] FittedMatrix covariance() const {
+  /// By the noise of the sensors, and of the squares that are subtracted.
+  [[nodiscard]] FittedMatrix covariance(const ParameterArray& calibration) const {
     FittedMatrix sum = FittedMatrix::Zero();
-    for (const TestRecord& test : tests_) sum += test.weight * test.weight * test.noise;
-    return 4.0 * scale_ * scale_ * inverse_ * sum * inverse_;
+    for (const TestRecord& test : tests_) {
+      sum += test.weight * test.weight *
+             (scale_ * scale_ * test.noise + square_noise(test, calibration) * fitted_block(test));
+    }
+    return 4.0 * inverse_ * sum * inverse_;
   }
 
   /// Derivatives of values() by the calibration's estimates: the fit is linear in each of them.
@@ -233,8 +254,8 @@ TestEstimation estimate_ep_test(const RunPhasors& records, const EstimationInput
     result.values[i] = values[static_cast<Eigen::Index>(i)];
   }
   result.values[index(TestParameter::uncorrected)] = fit.values({})[eotvos];
-  result.standard_error =
-      std::sqrt(fit.covariance()(eotvos, eotvos) + with_calibration.dot(jacobian.row(eotvos)));
+  result.standard_error = std::sqrt(fit.covariance(calibration.values)(eotvos, eotvos) +
+                                    with_calibration.dot(jacobian.row(eotvos)));
   for (std::size_t i = 0; i < num_parameters; ++i) {
     if (calibration.standard_errors[i] == 0.0) continue;
     result.correlations[i] = with_calibration[static_cast<Eigen::Index>(i)] /
