@@ -157,11 +157,12 @@ std::string joint_sentence(const Review& review) {
 std::string level_sentence(const Review& review) {
   const ErrorBudget& budget = *review.budget;
   const CampaignStatistics& statistics = review.results.statistics;
-  const std::string_view unit = review.schema.health.at(budget.level).unit;
-  if (statistics.health.empty() || statistics.health.at(budget.level).worst == 0.0) {
+  const std::string_view unit = review.schema.health.at(review.schema.budget_level).unit;
+  const bool is_told = budget.level < statistics.health.size();
+  const HealthStatistic level = is_told ? statistics.health[budget.level] : HealthStatistic{};
+  if (level.worst == 0.0) {
     return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
   }
-  const HealthStatistic& level = statistics.health.at(budget.level);
   return fmt::format("{} is that of the runs: worst {:.3g}, mean {:.3g} {}; assumed was {:.3g}",
                      budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
 }

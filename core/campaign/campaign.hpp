@@ -58,7 +58,8 @@ struct ErrorBudget {
   std::string_view title;  ///< `Budget of the test of ..., m/s²`.
   std::vector<BudgetTerm> terms;
   BudgetEntryInfo total_info;
-  std::size_t level = 0;              ///< A health quantity of each run: its index.
+  /// A health quantity of each run: its index. Results of older programs may lack it.
+  std::size_t level = 0;
   std::string_view level_label = {};  ///< For people: `Γ_res`.
   double assumed_level = 1.0;         ///< Where no run tells it, SI.
   std::string note;                   ///< What a reader of the table should know; may be empty.

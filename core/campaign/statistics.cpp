@@ -68,7 +68,7 @@ void CampaignStatistics::count(const RunResult& result) {
 
 BudgetColumns budget_columns(const ErrorBudget& budget, const CampaignStatistics& statistics) {
   HealthStatistic level;
-  if (!statistics.health.empty()) level = statistics.health.at(budget.level);
+  if (budget.level < statistics.health.size()) level = statistics.health[budget.level];
   BudgetColumns columns{.before = budget.before(level.mean), .after_worst = {}, .after_mean = {}};
   if (statistics.num_estimated == 0) return columns;
   std::vector<double> worst, mean;

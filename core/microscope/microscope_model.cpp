@@ -44,9 +44,20 @@ Definition MicroscopeCampaign::definition(TableColumns columns) const {
 
 namespace {
 
+/// N of `hardy2013-N`; 0 of any other version.
+int number_of(std::string_view version) {
+  constexpr std::string_view name = "hardy2013-";
+  if (!version.starts_with(name)) return 0;
+  int number = 0;
+  const char* const end = version.data() + version.size();
+  const auto [stop, error] = std::from_chars(version.data() + name.size(), end, number);
+  return error == std::errc() && stop == end ? number : 0;
+}
+
 /// With the columns of standard errors whatever the method is, as databases of all campaigns had
 /// them from the first; where sessions test, of what has them, and the quantities of the test.
-ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
+ResultSchema scenario_results(const Scenario& scenario, std::string_view version) {
+  constexpr int with_session_fits = 6, with_test_residual = 10;
   const bool has_tests = scenario.has_tests();
   const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
   ResultSchema schema = has_tests && !has_errors ? microscope_results() : results_with_errors();
@@ -58,15 +69,23 @@ ResultSchema scenario_results(const Scenario& scenario, bool has_session_fits) {
     schema.health.insert(schema.health.end(), margin_quantities().begin(),
                          margin_quantities().end());
   }
+  schema.budget_level = budget_level({});
+  if (has_tests && number_of(version) >= with_test_residual) {
+    schema.health.push_back(test_residual_quantity());
+    schema.budget_level = budget_level(scenario);
+  }
   for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
-  schema.budget_level = budget_level();
-  if (has_errors && has_session_fits) add_session_fits(scenario.sessions, schema);
+  if (has_errors && number_of(version) >= with_session_fits) {
+    add_session_fits(scenario.sessions, schema);
+  }
   return schema;
 }
 
 }  // namespace
 
-ResultSchema MicroscopeCampaign::results() const { return scenario_results(scenario, true); }
+ResultSchema MicroscopeCampaign::results() const {
+  return scenario_results(scenario, model_version);
+}
 
 namespace {
 
@@ -230,17 +249,6 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   return drawn;
 }
 
-/// Whether results have χ² of each session: from hardy2013-6 on.
-bool has_session_fits(std::string_view version) {
-  constexpr std::string_view name = "hardy2013-";
-  constexpr int first = 6;
-  if (!version.starts_with(name)) return false;
-  int number = 0;
-  const char* const end = version.data() + version.size();
-  const auto [stop, error] = std::from_chars(version.data() + name.size(), end, number);
-  return error == std::errc() && stop == end && number >= first;
-}
-
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -251,7 +259,7 @@ class MicroscopeModel final : public Model {
 
   [[nodiscard]] ResultSchema results_of(std::string_view definition,
                                         std::string_view version) const override {
-    return scenario_results(recorded_scenario(definition), has_session_fits(version));
+    return scenario_results(recorded_scenario(definition), version);
   }
 
   [[nodiscard]] std::span<const DataTableSchema> tables() const override {

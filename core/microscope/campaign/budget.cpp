@@ -63,6 +63,10 @@ class Sizes {
     }
   }
 
+  /// Of a vector's element.
+  [[nodiscard]] double of_axis(std::string_view group, std::size_t axis) const {
+    return sizes_[draw_group(group).first + axis];
+  }
   /// Of half the sum, or the difference, of both sensors' about an axis.
   [[nodiscard]] double of_pair(std::string_view group, std::size_t axis) const {
     const std::size_t first = draw_group(group).first;
@@ -93,13 +97,15 @@ std::string test_note(const Scenario& scenario) {
                         rate_rad_s);
   }
   const bool is_elsewhere = std::ranges::any_of(scenario.sessions, [&](const Session& session) {
-    return !is_test(session) && session.excitations.empty() && !turns_so(session);
+    const bool is_watched = scenario.has_tests() ? is_test(session) : session.excitations.empty();
+    return is_watched && !turns_so(session);
   });
-  if (is_elsewhere) {
-    note +=
-        "Γ_res is that at f_EP of calibration sessions in another pointing; the loop leaves more "
-        "of the drag at a higher f_EP\n";
-  }
+  if (!is_elsewhere) return note;
+  note +=
+      scenario.has_tests()
+          ? "Γ_res is the largest of all tests, also of those that turn otherwise\n"
+          : "Γ_res is that at f_EP of calibration sessions in another pointing; the loop leaves "
+            "more of the drag at a higher f_EP\n";
   return note;
 }
 
@@ -122,7 +128,9 @@ const std::array<BudgetEntryInfo, num_budget_entries>& budget_entry_infos() {
   return infos;
 }
 
-std::size_t budget_level() {
+std::size_t budget_level(const Scenario& scenario) {
+  const std::size_t num_margins = scenario.has_plain_loops() ? 0 : margin_quantities().size();
+  if (scenario.has_tests()) return num_health_values + num_margins;
   const auto level =
       std::ranges::find(health_values(), &LoopHealth::residual_m_s2, &HealthValue::member);
   return static_cast<std::size_t>(level - health_values().begin());
@@ -161,8 +169,10 @@ ErrorBudget microscope_budget(const Scenario& scenario, const DispersionSet& dis
   const double a_c12_max = sizes.off_diagonal(2);
   const double a_c13_max = sizes.off_diagonal(1);
   const double a_d11_max = std::min(acceptance.a_d11_max, sizes.of_pair("scale_factor_error", 0));
-  const double delta = bound.offcentring_max_m;
-  const double a_c11_delta = (1.0 + bound.scale_factor_error_max) * delta;
+  const auto delta = [&](std::size_t axis) {
+    return std::max(bound.offcentring_max_m, sizes.of_axis("offcentring_m", axis));
+  };
+  const double a_c11 = 1.0 + bound.scale_factor_error_max;
   const double residual = bound.residual_m_s2;
   // A quadratic factor makes a line at f_EP from the product of a constant and the residue there;
   // Γ_d² holds that product twice.
@@ -173,7 +183,7 @@ ErrorBudget microscope_budget(const Scenario& scenario, const DispersionSet& dis
   ErrorBudget budget{.title = "Budget of the test of the equivalence principle, m/s²",
                      .terms = {},
                      .total_info = budget_total_info,
-                     .level = budget_level(),
+                     .level = budget_level(scenario),
                      .level_label = "Γ_res",
                      .assumed_level = residual,
                      .note = test_note(scenario)};
@@ -190,14 +200,14 @@ ErrorBudget microscope_budget(const Scenario& scenario, const DispersionSet& dis
     budget.terms.push_back(std::move(term));
   };
   constexpr bool follows_level = true;
-  add(gradient.xx * a_c11_delta, {{a_c11_delta_x, gradient.xx}});
-  add(gradient.xz * a_c11_delta, {{a_c11_delta_z, gradient.xz}});
-  add(bound.t_xy_s2 * a_c11_delta, {{a_c11_delta_y, bound.t_xy_s2}});
+  add(gradient.xx * a_c11 * delta(0), {{a_c11_delta_x, gradient.xx}});
+  add(gradient.xz * a_c11 * delta(2), {{a_c11_delta_z, gradient.xz}});
+  add(bound.t_xy_s2 * a_c11 * delta(1), {{a_c11_delta_y, bound.t_xy_s2}});
   // The error of a product of two estimates, each as large as it may be; a_c11 = 1 here.
-  add(gradient.yy * a_c12_max * delta,
-      {{a_c12, gradient.yy * delta}, {a_c11_delta_y, gradient.yy * a_c12_max}});
-  add(gradient.zz * a_c13_max * delta,
-      {{a_c13, gradient.zz * delta}, {a_c11_delta_z, gradient.zz * a_c13_max}});
+  add(gradient.yy * a_c12_max * delta(1),
+      {{a_c12, gradient.yy * delta(1)}, {a_c11_delta_y, gradient.yy * a_c12_max}});
+  add(gradient.zz * a_c13_max * delta(2),
+      {{a_c13, gradient.zz * delta(2)}, {a_c11_delta_z, gradient.zz * a_c13_max}});
   add(2.0 * a_d11_max * residual, {{a_d11_prime, 2.0 * residual}}, follows_level);
   add(2.0 * std::min(acceptance.a_d1j_max_rad, a_c12_max) * residual, {{a_d12, 2.0 * residual}},
       follows_level);

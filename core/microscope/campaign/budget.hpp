@@ -19,7 +19,7 @@ struct BudgetConfig {
   double t_xy_s2 = 3.0e-11;            ///< T_xy at f_EP, from 1.4 mrad of tilt.
   double residual_m_s2 = 1e-12;        ///< Drag-free residue at f_EP where no run tells it.
   double differential_m_s2 = 1.43e-8;  ///< Γ_app,d at DC.
-  double offcentring_max_m = 20e-6;
+  double offcentring_max_m = 20e-6;    ///< Or what the laws draw, if that is larger.
   double scale_factor_error_max = 1e-2;
   double quadratic_factor_max_s2_m = 14000.0;
 };
@@ -33,8 +33,9 @@ inline constexpr std::size_t num_budget_entries = 10;
 /// The paper's own totals, m/s².
 inline constexpr BudgetEntryInfo budget_total_info{"total", "Total", 2e-13, 1.1e-15, 3.6e-16};
 
-/// Index of LoopHealth::residual_m_s2 among the health quantities: the level of a budget.
-[[nodiscard]] std::size_t budget_level();
+/// Index of a budget's level among the health quantities: test_residual_quantity() if the scenario
+/// has tests, LoopHealth::residual_m_s2 if not.
+[[nodiscard]] std::size_t budget_level(const Scenario& scenario);
 
 /// Amplitudes of elements of the gravity gradient at one frequency, s⁻².
 struct GradientLevels {

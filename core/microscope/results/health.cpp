@@ -19,6 +19,11 @@ LoopHealth health_of(std::span<const double> values) {
   return health;
 }
 
+const HealthQuantity& test_residual_quantity() {
+  static const HealthQuantity quantity{"test_residual", "_m_s2", "m/s²"};
+  return quantity;
+}
+
 const std::array<HealthQuantity, 2>& margin_quantities() {
   static const std::array<HealthQuantity, 2> quantities{
       {{"gain_margin", "", "1"}, {"phase_margin", "_rad", "rad"}}};

@@ -51,6 +51,9 @@ inline constexpr std::size_t num_health_values = 5;
 /// Margins of the satellite that was drawn.
 [[nodiscard]] const std::array<HealthQuantity, 2>& margin_quantities();
 
+/// What a RunResult holds of sessions that test, behind all that: `residual` of these.
+[[nodiscard]] const HealthQuantity& test_residual_quantity();
+
 /// Why a run is lost: a sensor reached the end of its range, or something may have moved an
 /// estimate by more than its objective (ShiftBounds). The values are stored and sent: never
 /// renumber.

@@ -369,6 +369,7 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
     result.health.push_back(finding.health.*value.member);
   }
   result.health.insert(result.health.end(), record.margins.begin(), record.margins.end());
+  if (scenario.has_tests()) result.health.push_back(finding.test_residual_m_s2);
   if (finding.loss.cause != LossCause::none) {
     result.status = RunStatus::lost;
     result.loss = {.cause = static_cast<std::uint32_t>(finding.loss.cause),

@@ -34,6 +34,9 @@ double density(double squares, double steps, double period_s) {
   return squares / (2.0 * steps) * 2.0 * period_s / static_cast<double>(block);
 }
 
+/// What is not a number counts as too large to be stored.
+double bounded(double value) { return value <= magnitude_max ? value : magnitude_max; }
+
 /// Γ_mes,c at f_EP; the band-pass takes r⁴/(1 + r⁴) of a line at its centre.
 double residual_amplitude(const Scenario& scenario, const SessionHealth& session) {
   const double ratio = scenario.estimation.band_ratio;
@@ -42,11 +45,8 @@ double residual_amplitude(const Scenario& scenario, const SessionHealth& session
   for (const auto& [cosine, sine] : session.monitor.residual) {
     largest = std::max(largest, std::sqrt(cosine * cosine + sine * sine));
   }
-  return largest * (1.0 + fourth) / fourth;
+  return bounded(largest * (1.0 + fourth) / fourth);
 }
-
-/// What is not a number counts as too large to be stored.
-double bounded(double value) { return value <= magnitude_max ? value : magnitude_max; }
 
 double square_density(const Scenario& scenario, double squares, const QuietSums& quiet) {
   return density(squares, quiet.num_steps, scenario.simulation.sample_period_s);
@@ -126,8 +126,8 @@ LoopHealth session_health(const Scenario& scenario, const Session& session,
   // Loops that grew beyond all numbers left none to look at.
   const auto& differential = phasors.amplitude[index(Signal::differential_x)];
   if (!std::isfinite(differential[0].real())) health.acceleration_m_s2 = magnitude_max;
-  if (!record.is_quiet) return health;
-  health.residual_m_s2 = bounded(residual_amplitude(scenario, record));
+  if (!record.is_monitored || is_test(session)) return health;
+  health.residual_m_s2 = residual_amplitude(scenario, record);
   health.quadratic_noise =
       bounded(density(record.monitor.quadratic.squares, num_steps(scenario, session),
                       scenario.simulation.sample_period_s) /
@@ -195,7 +195,7 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
   QuietSums quiet;
   for (std::size_t i = 0; i < record.size(); ++i) {
     const SessionHealth& of_session = record[i];
-    if (!of_session.is_quiet) continue;
+    if (!of_session.is_monitored || is_test(scenario.sessions[i])) continue;
     quiet.common_squares += of_session.monitor.common_square.squares;
     quiet.sensor_squares[0] += of_session.monitor.sensor_square[0].squares;
     quiet.sensor_squares[1] += of_session.monitor.sensor_square[1].squares;
@@ -206,6 +206,10 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
     const Session& session = scenario.sessions[i];
     const LoopHealth health = session_health(scenario, session, record[i], phasors[i]);
     take_larger(finding.health, health);
+    if (is_test(session) && record[i].is_monitored) {
+      finding.test_residual_m_s2 =
+          std::max(finding.test_residual_m_s2, residual_amplitude(scenario, record[i]));
+    }
     const bool is_saturated = health.acceleration_m_s2 > scenario.sensor.range_m_s2;
     if (finding.loss.cause != LossCause::none || !is_saturated) continue;
     finding.loss = {.cause = LossCause::saturation, .session = session.target};

@@ -82,7 +82,7 @@ struct LoopMonitor {
 struct SessionHealth {
   double acceleration_m_s2 = 0.0;  ///< Largest |Γ_mes,k| of a sensor on an axis.
   double attitude_rad = 0.0;       ///< Largest |θ̂| about an axis.
-  bool is_quiet = false;           ///< True if the session was monitored; the rest is 0 if not.
+  bool is_monitored = false;       ///< The rest is 0 if not.
   LoopMonitor<double> monitor{};   ///< At its end.
 };
 
@@ -96,6 +96,7 @@ using HealthRecord = std::vector<SessionHealth>;
 /// The health of a run and, if it is lost, why.
 struct HealthFinding {
   LoopHealth health;
+  double test_residual_m_s2 = 0.0;  ///< LoopHealth::residual_m_s2, of the sessions that test.
   LoopLoss loss;  ///< Of a saturated sensor the first session, in the scenario's order.
 };
 

@@ -69,7 +69,7 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
     auto& of_groups = group_weights.emplace_back();
     for (const LineGroup& group : groups.back()) of_groups.emplace_back(group.fit);
-    if (is_test(session) || !session.excitations.empty() || is_monitored_before(i)) continue;
+    if (!session.excitations.empty() || is_monitored_before(i)) continue;
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
   for (std::size_t i = 0; i < tests.size(); ++i) regressors.push_back(nominal_regressors(i));
@@ -124,7 +124,8 @@ bool RunParts::is_monitored_before(std::size_t i) const {
   const Session& session = campaign.scenario.sessions[i];
   for (std::size_t k = 0; k < i; ++k) {
     const Session& before = campaign.scenario.sessions[k];
-    if (is_quiet(k) && before.spin_rate_rad_s == session.spin_rate_rad_s &&
+    if (is_monitored(k) && is_test(before) == is_test(session) &&
+        before.spin_rate_rad_s == session.spin_rate_rad_s &&
         before.drag_free == session.drag_free) {
       return true;
     }
@@ -186,7 +187,7 @@ void RunParts::keep(std::size_t i, const SessionOutcome& outcome, RunRecord& rec
     phasors.test_noise = window_noise(i, record.run);
   }
   record.health[i] = outcome.health;
-  record.health[i].is_quiet = is_quiet(i);
+  record.health[i].is_monitored = is_monitored(i);
 }
 
 }  // namespace proofmass

@@ -25,8 +25,7 @@ struct RunParts {
   /// @pre campaign.validate() passed, and so did m.check() for its sessions.
   RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m);
 
-  /// True if the session is monitored.
-  [[nodiscard]] bool is_quiet(std::size_t i) const { return residual_weights[i].has_value(); }
+  [[nodiscard]] bool is_monitored(std::size_t i) const { return residual_weights[i].has_value(); }
 
   /// Makes the weights of a session, block by block.
   struct Readers {
@@ -36,7 +35,7 @@ struct RunParts {
       for (std::size_t g = 0; g < parts.groups[i].size(); ++g) {
         further.push_back({WeightReader(parts.group_weights[i][g]), parts.groups[i][g].signals});
       }
-      if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
+      if (parts.is_monitored(i)) residual.emplace(*parts.residual_weights[i]);
     }
     WeightReader lines;
     std::vector<LineReader> further;  ///< Of the lines that the method asks for.
@@ -90,6 +89,7 @@ struct RunParts {
   [[nodiscard]] ResonatorGains resonator(const Session& session) const;
 
   /// True if the loops of a session without excitation are those of one before, which tells enough.
+  /// That one tests as well, or neither does.
   [[nodiscard]] bool is_monitored_before(std::size_t i) const;
 };
 

@@ -88,7 +88,7 @@ void MicroscopeDeviceSimulation::make_tables() {
     const std::vector<SharedSample> samples = all_samples(signals);
     RunParts::Readers readers(parts_, i);
     const SessionSetup setup = parts_.setup(i, readers);
-    const bool is_monitored = parts_.is_quiet(i);
+    const bool is_monitored = parts_.is_monitored(i);
     tables.push_back({.samples = upload(device_, samples),
                       .weights = upload(device_, all_weights(parts_.weights[i])),
                       .residual = is_monitored

@@ -186,10 +186,13 @@ TEST(BudgetAfterCalibration, TakesTheGradientOfTheTestNotOfTheSessions) {
   test.name = "test";
   test.target = SessionTarget::ep_test;
   test.spin_rate_rad_s = scenario.budget.test_spin_rate_rad_s;
-  EXPECT_THAT(microscope_budget(scenario).note, ::testing::Not(::testing::HasSubstr("No test")));
+  EXPECT_EQ(microscope_budget(scenario).note, "");
+  EXPECT_EQ(budget_level(scenario), num_health_values);
   test.spin_rate_rad_s = 0.01;
   EXPECT_THAT(microscope_budget(scenario).note,
               ::testing::HasSubstr("No test of this campaign turns by"));
+  EXPECT_THAT(microscope_budget(scenario).note,
+              ::testing::HasSubstr("Γ_res is the largest of all tests"));
 }
 
 TEST(Budget, FollowsTheResidueOfTheRuns) {
@@ -233,6 +236,15 @@ TEST(Budget, IsOfInstrumentsThatTheLawsMake) {
   const Budget nominal = budget_before(Scenario{});
   EXPECT_NEAR(budget.entries[3] / nominal.entries[3], 5.1e-3 / 2.6e-3, 1e-12);
   EXPECT_NEAR(budget.entries[4] / nominal.entries[4], 1.1e-3 / 2.6e-3, 1e-12);
+
+  // Of offcentrings, too, where they are larger than the bound.
+  Dispersion& along_z = laws[draw_group("offcentring_m").first + 2];
+  along_z = Dispersion{};
+  along_z.law = Law::fixed;
+  along_z.value = -40e-6;
+  const Budget wide = microscope_budget(Scenario{}, laws, {{1e-3, -6e-3}}).before(0.0);
+  EXPECT_NEAR(wide.entries[0], nominal.entries[0], 1e-12 * nominal.entries[0]);
+  EXPECT_NEAR(wide.entries[1], 2.0 * nominal.entries[1], 1e-12 * nominal.entries[1]);
 }
 
 TEST(BudgetEntryInfos, CarryThePapersFiguresAndItsTotals) {

@@ -58,11 +58,25 @@ TEST(MicroscopeCampaign, HasAFitOfEachSessionSinceTheSixthVersion) {
   EXPECT_EQ(schema.fit[8].name, "chi_squared_A_C12");
   EXPECT_EQ(schema.fit[10].name, "chi_squared_a_c12_");  // Names of columns have no case.
   EXPECT_EQ(schema.fit[11].name, "degrees_of_freedom_a_c12_");
-  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-9x", "other-7", ""}) {
+  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-10x", "other-7", ""}) {
     EXPECT_EQ(model().results_of(definition, version).fit.size(), 2U) << version;
   }
   EXPECT_EQ(model().results_of(definition, "hardy2013-10").fit.size(), schema.fit.size());
   EXPECT_EQ(model().results_of("[[session", model_version).fit.size(), 2U);
+}
+
+// And those with tests have the residual of calibration sessions alone.
+TEST(MicroscopeCampaign, HasAResidualOfTestsSinceTheTenthVersion) {
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  campaign.scenario.sessions.emplace_back().target = SessionTarget::ep_test;
+  campaign.scenario.sessions.back().name = "test";
+  const std::string definition = canonical_definition(campaign);
+  const ResultSchema now = model().results_of(definition, model_version);
+  const ResultSchema before = model().results_of(definition, "hardy2013-9");
+  EXPECT_EQ(now.health.at(now.budget_level).name, "test_residual");
+  EXPECT_EQ(before.health.at(before.budget_level).name, "residual");
+  EXPECT_EQ(before.health.size() + 1, now.health.size());
+  EXPECT_EQ(campaign.error_budget()->level, now.budget_level);
 }
 
 TEST(MicroscopeCampaign, RefusesABadName) {
