@@ -190,11 +190,7 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
            fmt::format("[{}]", fmt::join(computed.correlations, ",")));
   }
   if (!(stored.loss == computed.loss)) {
-    const auto text_of = [&](const Loss& loss) {
-      return fmt::format("{} in {}", name_at(schema.loss_causes, loss.cause),
-                         name_at(schema.loss_sessions, loss.session));
-    };
-    differ("loss_cause", text_of(stored.loss), text_of(computed.loss));
+    differ("loss_cause", loss_text(schema, stored.loss), loss_text(schema, computed.loss));
   }
   return differences;
 }

@@ -167,6 +167,16 @@ std::string reasons_text(const MissingEstimates& missing) {
 
 namespace {
 
+void add_loss(const Loss& loss, std::vector<LostRuns>& losses) {
+  if (loss.cause == 0) return;
+  const auto same = std::ranges::find(losses, loss, &LostRuns::loss);
+  if (same == losses.end()) {
+    losses.push_back({loss, 1});
+  } else {
+    ++same->num_runs;
+  }
+}
+
 void add_warnings(const Warner& warner, const RunResult& result, CampaignWarnings& all) {
   if (!warner || !result.is_completed()) return;
   const std::vector<Warning> warnings = warner(result);
@@ -222,6 +232,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       require_in_range(result, store.schema());
       statistics.add(result);
       results.missing.add(result);
+      if (result.status == RunStatus::lost) add_loss(result.loss, results.losses);
       standard_errors.add(result);
       groups.add(result);
       kept.add(result);

@@ -136,6 +136,12 @@ struct CampaignWarnings {
 [[nodiscard]] std::string warnings_text(const ResultSchema& schema,
                                         const CampaignWarnings& warnings);
 
+/// Runs whose loops left their limits in the same way.
+struct LostRuns {
+  Loss loss;
+  std::uint64_t num_runs = 0;
+};
+
 /// What the results of a campaign database yield.
 struct ReadResults {
   CampaignStatistics statistics;
@@ -147,6 +153,7 @@ struct ReadResults {
   std::optional<ReplicateStatistics> replicates = {};    ///< Of a sampling design.
   std::vector<RunRange> given_up = {};                   ///< Ascending.
   MissingEstimates missing = {};
+  std::vector<LostRuns> losses = {};  ///< Of missing.num_lost, in order of the first of each.
   DigestCheck digest_check = DigestCheck::not_checked;  ///< See read_checked_results().
 };
 

@@ -65,6 +65,10 @@ std::string summary_text(const Review& review) {
         missing.num_not_finite, missing.num_no_draw,
         missing.num_lost > 0 ? fmt::format(", {} lost", missing.num_lost) : std::string());
   }
+  for (const LostRuns& lost : review.results.losses) {
+    text +=
+        fmt::format("          {} lost: {}\n", lost.num_runs, loss_text(review.schema, lost.loss));
+  }
   return text;
 }
 
@@ -270,6 +274,11 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
   const ReadResults& results = review.results;
   const CampaignStatistics& statistics = results.statistics;
   const MissingEstimates& missing = results.missing;
+  const auto of_loss = [&](const LostRuns& lost) -> Json {
+    return {{"cause", name_at(schema.loss_causes, lost.loss.cause)},
+            {"session", name_at(schema.loss_sessions, lost.loss.session)},
+            {"num_runs", lost.num_runs}};
+  };
   const auto of_stated = [&](const StatedRequirement& each) {
     return json_of(answer_to(each, review));
   };
@@ -285,6 +294,7 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
             {"num_not_finite", missing.num_not_finite},
             {"num_no_draw", missing.num_no_draw},
             {"num_lost", missing.num_lost},
+            {"losses", array_of(results.losses, of_loss)},
             {"num_given_up", missing.num_given_up},
             {"num_warned", results.warnings.num_runs},
             {"warnings", warnings_of(schema, results.warnings)},

@@ -112,6 +112,10 @@ Table identity_table(const Review& review) {
   if (review.stop && !review.stop->text.empty()) {
     table.rows.push_back({"stop rule", in_one_line(review.stop->text)});
   }
+  for (const LostRuns& lost : review.results.losses) {
+    table.rows.push_back(
+        {"lost: " + loss_text(review.schema, lost.loss), counted(lost.num_runs, "run")});
+  }
   if (!review.note.empty()) table.rows.push_back({"note", review.note});
   return table;
 }

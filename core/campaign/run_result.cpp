@@ -15,6 +15,11 @@ std::string_view name_at(const std::vector<std::string_view>& names, std::uint32
   return position == 0 ? "none" : names[position - 1];
 }
 
+std::string loss_text(const ResultSchema& schema, const Loss& loss) {
+  return fmt::format("{} in {}", name_at(schema.loss_causes, loss.cause),
+                     name_at(schema.loss_sessions, loss.session));
+}
+
 std::optional<std::size_t> find_quantity(const ResultSchema& schema, std::string_view name) {
   const auto found = std::ranges::find(schema.quantities, name, &Quantity::name);
   if (found == schema.quantities.end()) return std::nullopt;

@@ -125,6 +125,9 @@ struct Loss {
   bool operator==(const Loss&) const = default;
 };
 
+/// `saturation in a_c12`.
+[[nodiscard]] std::string loss_text(const ResultSchema& schema, const Loss& loss);
+
 /// Everything a run yields. The same bits whatever worker, thread or attempt computed it. A
 /// ResultSchema says what the values are; a list is empty if its values have no meaning.
 struct RunResult {

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/math/elementary.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/campaign/loop_margins.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
@@ -164,12 +165,21 @@ std::string environment_note(const MicroscopeCampaign& campaign) {
       end_s, turns);
 }
 
+std::string gaps_note(const Scenario& scenario) {
+  const GapsConfig& gaps = scenario.gaps;
+  if (!scenario.has_tests() || !gaps.lose_data()) return {};
+  const double kept = exponential(-gaps.glitch_rate_hz * gaps.glitch_duration_s -
+                                  gaps.telemetry_rate_hz * gaps.telemetry_duration_s);
+  return fmt::format("[gaps] takes about {:.2g} % of the data of tests", 100.0 * (1.0 - kept));
+}
+
 }  // namespace
 
 std::string MicroscopeCampaign::note() const {
   std::string all;
-  for (const std::string& note : {unwatched_note(scenario), loops_note(scenario),
-                                  drift_note(scenario), environment_note(*this)}) {
+  for (const std::string& note :
+       {unwatched_note(scenario), loops_note(scenario), drift_note(scenario),
+        environment_note(*this), gaps_note(scenario)}) {
     if (!all.empty() && !note.empty()) all += "; ";
     all += note;
   }

@@ -96,8 +96,7 @@ void check_arguments(const ReplayOptions& options) {
 
 std::string text_of(const RunResult& result, const ResultSchema& schema) {
   if (result.status != RunStatus::lost) return std::string(name_of(result.status));
-  return fmt::format("lost ({} in {})", name_at(schema.loss_causes, result.loss.cause),
-                     name_at(schema.loss_sessions, result.loss.session));
+  return fmt::format("lost ({})", loss_text(schema, result.loss));
 }
 
 /// A run that was simulated again.

@@ -181,6 +181,15 @@ TEST(MicroscopeCampaign, NotesThatNoSessionWatchesTheNoise) {
             "without excitations");
 }
 
+// 1 − e⁻⁰·³ of the data.
+TEST(MicroscopeCampaign, NotesHowMuchTestsLose) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.sessions.emplace_back().target = SessionTarget::ep_test;
+  campaign.scenario.gaps.glitch_rate_hz = 0.02;
+  campaign.scenario.gaps.glitch_duration_s = 15.0;
+  EXPECT_EQ(campaign.note(), "[gaps] takes about 26 % of the data of tests");
+}
+
 // What comes from space turns with the frame: in half a turn it changes its sign.
 TEST(MicroscopeCampaign, NotesAnEnvironmentFileThatCannotBeRight) {
   using ::testing::HasSubstr;
