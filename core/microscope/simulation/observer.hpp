@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <utility>
+#include <vector>
 
 #include "core/microscope/session/session.hpp"
 #include "core/microscope/simulation/loop.hpp"
@@ -28,6 +29,7 @@ struct ObservedSample {
   const LoopConstants<double>& constants;
   const SampleNoise<double>& noise;  ///< Of this sample.
   Violation<double> violation;       ///< 0 in a session that does not test.
+  bool is_lost = false;              ///< In a block of which the ground lacks data.
 };
 
 /// Called with every sample of a run, in the order of sessions and times.
@@ -64,6 +66,7 @@ struct SessionObserver {
   const ObservedNoise& noise;
   double eotvos_parameter = 0.0;
   const TestSetup* test = nullptr;  ///< Null in a session that does not test.
+  std::vector<bool> lost_blocks{};  ///< Of the record; as many as a test has.
   Loop<double> loop{};              ///< Before the sample.
 
   /// Tells it the loop that a sample is about to advance.
@@ -82,8 +85,16 @@ struct SessionObserver {
              .noise = noise.last(),
              .violation = test == nullptr
                               ? Violation<double>{}
-                              : Violation<double>{eotvos_parameter, test->gravity_m_s2(shared)}});
+                              : Violation<double>{eotvos_parameter, test->gravity_m_s2(shared)},
+             .is_lost = is_lost()});
     ++next;
+  }
+
+ private:
+  [[nodiscard]] bool is_lost() const {
+    const std::int64_t block = next / std::int64_t{test_block_size};
+    return next >= 0 && std::cmp_less(block, lost_blocks.size()) &&
+           lost_blocks[static_cast<std::size_t>(block)];
   }
 };
 

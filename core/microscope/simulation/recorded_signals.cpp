@@ -157,8 +157,13 @@ constexpr std::array excitation_rows{
               [](const Sample& s) { return s.shared.second_motion.position_m; }},
 };
 
+constexpr std::array ground_rows{
+    SignalRow{"lost", "1", "", "1 in a block of 16 samples of which [gaps] takes some",
+              [](const Sample& s) { return s.is_lost ? 1.0 : 0.0; }},
+};
+
 std::span<const GroupRows> groups() {
-  static constexpr std::array<GroupRows, 9> all{{
+  static constexpr std::array<GroupRows, 10> all{{
       {"measured", "what the two sensors report", measured_rows},
       {"modes", "half difference and half sum of what the sensors report", modes_rows},
       {"applied", "accelerations that act on the test masses", applied_rows},
@@ -168,6 +173,7 @@ std::span<const GroupRows> groups() {
       {"star_tracker", "what the star tracker reports", star_tracker_rows},
       {"environment", "accelerations from outside", environment_rows},
       {"excitation", "what the session shakes", excitation_rows},
+      {"ground", "what reaches the ground", ground_rows},
   }};
   return all;
 }

@@ -119,7 +119,8 @@ struct RunPlan::Impl : RunParts {
                                            .constants = alone.constants,
                                            .noise = alone.noise,
                                            .eotvos_parameter = instrument.eotvos_parameter,
-                                           .test = is_test(session) ? &tests[i] : nullptr};
+                                           .test = is_test(session) ? &tests[i] : nullptr,
+                                           .lost_blocks = lost(i, record.run)};
     record_session_alone(i, signals, alone, session_observer, progress, record);
   }
 

@@ -82,12 +82,15 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
   }
 }
 
-std::vector<float> RunParts::window_weights(std::size_t i, RunIndex run) const {
+std::vector<bool> RunParts::lost(std::size_t i, RunIndex run) const {
   const Scenario& scenario = campaign.scenario;
   if (!is_test(scenario.sessions[i])) return {};
-  return weights_of_windows.of(lost_blocks(scenario.gaps, scenario.sessions[i], campaign.seed, run,
-                                           tests[i].num_blocks, scenario.orbit.period_s,
-                                           scenario.simulation.sample_period_s));
+  return lost_blocks(scenario.gaps, scenario.sessions[i], campaign.seed, run, tests[i].num_blocks,
+                     scenario.orbit.period_s, scenario.simulation.sample_period_s);
+}
+
+std::vector<float> RunParts::window_weights(std::size_t i, RunIndex run) const {
+  return weights_of_windows.of(lost(i, run));
 }
 
 RegressorProducts RunParts::window_noise(std::size_t i, RunIndex run) const {

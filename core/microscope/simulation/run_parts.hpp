@@ -45,6 +45,9 @@ struct RunParts {
 
   [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const;
 
+  /// lost_blocks() of a run's session; none unless it tests.
+  [[nodiscard]] std::vector<bool> lost(std::size_t i, RunIndex run) const;
+
   /// Weights of the windows of a run's session; none unless it tests.
   [[nodiscard]] std::vector<float> window_weights(std::size_t i, RunIndex run) const;
 

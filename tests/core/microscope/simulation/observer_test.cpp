@@ -3,6 +3,7 @@
 
 #include "core/microscope/simulation/observer.hpp"
 
+#include "core/microscope/session/gaps.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/fitted_lines.hpp"
 #include "tests/test.hpp"
@@ -88,6 +89,30 @@ TEST(SampleObserver, GetsEverySampleOfEverySessionInOrder) {
     EXPECT_EQ(observed.records[i].size(), 47600U) << i;  // Two orbits of 5950 s.
   }
   EXPECT_DOUBLE_EQ(observed.latest_s, 47599 * 0.25);
+}
+
+// In a test, and of the run that is observed.
+TEST(SampleObserver, KnowsWhatGapsTake) {
+  MicroscopeCampaign campaign = short_campaign();
+  Session test;
+  test.name = "test";
+  test.target = SessionTarget::ep_test;
+  test.num_orbits = 1;
+  campaign.scenario.sessions = {campaign.scenario.sessions[0], test};
+  campaign.scenario.gaps = {.glitch_rate_hz = 0.01, .glitch_duration_s = 15.0};
+  const RunIndex run{3};
+  constexpr std::size_t block = test_block_size, num_blocks = 23800 / block;
+  const std::vector<bool> expected =
+      lost_blocks(campaign.scenario.gaps, test, campaign.seed, run, num_blocks,
+                  campaign.scenario.orbit.period_s, 0.25);
+  ASSERT_GT(std::ranges::count(expected, true), 100);
+  std::size_t num_wrong = 0;
+  (void)RunPlan(campaign).record(run, {}, {}, [&](const ObservedSample& sample) {
+    const auto at = static_cast<std::size_t>(sample.index) / block;
+    const bool is_of_test = sample.session == 1 && sample.index >= 0 && at < num_blocks;
+    if (sample.is_lost != (is_of_test && expected[at])) ++num_wrong;
+  });
+  EXPECT_EQ(num_wrong, 0U);
 }
 
 /// The series of a line's signal in a record, by its place in LinePhasors.
