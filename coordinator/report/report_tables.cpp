@@ -104,8 +104,9 @@ constexpr std::uint64_t num_runs_of_bootstrap = 200;
 std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_estimate) {
   const double coverage = std::pow(1.0 - default_confidence, 1.0 / static_cast<double>(num_runs));
   // Rounded down: no more is claimed than holds.
-  std::string text = fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below",
-                                 num_runs, std::floor(coverage * 1e5) / 1e3);
+  std::string text =
+      fmt::format("worst of {}: with 95 % confidence {} % of all draws are no larger", num_runs,
+                  std::floor(coverage * 1e5) / 1e3);
   if (num_without_estimate > 0) {
     text += fmt::format(", of those that have an estimate; {} more {} none", num_without_estimate,
                         num_without_estimate == 1 ? "has" : "have");
@@ -122,23 +123,38 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
   return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
 }
 
+/// Student's law holds for the mean of n values if their skewness is √n/5 or less [Cochran1977].
+/// Chance makes that of a sample larger by two standard deviations, 2√(6/n).
+double skewness_max(std::uint64_t num_runs) {
+  const auto n = static_cast<double>(num_runs);
+  return std::sqrt(n) / 5.0 + 2.0 * std::sqrt(6.0 / n);
+}
+
 /// Which biases differ from 0 if all parameters are looked at together.
 std::string bias_sentence(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
   if (statistics.num_estimated < 2) return "Bias: one run does not tell whether it differs from 0.";
   std::vector<double> p_values;
+  std::string names, skewed;
+  const auto append = [](std::string& list, std::string_view name) {
+    list += (list.empty() ? "" : ", ") + std::string(name);
+  };
   for (const AccuracyStatistic& accuracy : statistics.accuracy) {
     p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
   }
   const std::vector<double> adjusted = holm_adjusted(p_values);
-  std::string names;
   for (std::size_t i = 0; i < adjusted.size(); ++i) {
     if (adjusted[i] >= 1.0 - default_confidence) continue;
-    names += (names.empty() ? "" : ", ") + std::string(review.schema.quantities[i].symbol);
+    const double skewness = std::abs(statistics.accuracy[i].error.skewness);
+    append(skewness > skewness_max(statistics.num_estimated) ? skewed : names,
+           review.schema.quantities[i].symbol);
   }
-  return fmt::format(
+  std::string text = fmt::format(
       "Bias: each interval holds by itself. Of all {} together (Holm, 5 %) {}.", adjusted.size(),
       names.empty() ? "no bias differs from 0" : "the bias differs from 0 of " + names);
+  if (skewed.empty()) return text;
+  return text +
+         fmt::format(" Too skewed to tell from {} runs: {}.", statistics.num_estimated, skewed);
 }
 
 std::string joint_sentence(const Review& review) {
@@ -301,9 +317,12 @@ Table interval_table(const Review& review) {
     table.notes.emplace_back(
         "std: an interval from fewer than 200 runs is too narrow, see core/statistics");
   }
-  table.notes.push_back(worth_of_worst(
-      statistics.num_estimated,
-      statistics.num_runs - statistics.num_estimated + review.results.missing.num_given_up));
+  // Whoever stops where the errors are small sees a worst one that is too small.
+  if (!review.stop) {
+    table.notes.push_back(worth_of_worst(
+        statistics.num_estimated,
+        statistics.num_runs - statistics.num_estimated + review.results.missing.num_given_up));
+  }
   return table;
 }
 

@@ -97,7 +97,7 @@ std::string bound_line(const RequirementAnswer& answer) {
         given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
   const std::string_view unit = answer.subject.unit;
-  return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
+  return fmt::format("Bound        {} of all draws at most {:.6g}{}{}, with {}\n",
                      given_percent(tolerance.coverage), *answer.bound, unit == "1" ? "" : " ",
                      unit == "1" ? "" : unit, given_percent(tolerance.confidence));
 }
@@ -139,7 +139,7 @@ double Exceedances::add(const RunResult& result) {
   ++num_estimated_;
   if (requirement_.subject == Requirement::Subject::parameter) {
     const double value = value_of(result);
-    if (value > requirement_.limit) ++num_exceeding_;
+    if (requirement_.is_exceeded_by(value)) ++num_exceeding_;
     return value;
   }
   std::vector<double> errors(objectives_.size());
@@ -244,7 +244,7 @@ std::vector<StatedRequirement> requirements_of_objectives(const ResultSchema& sc
         {.id = name,
          .text = fmt::format("Objective of {}", quantities[i].symbol),
          // The shortest text that reads back to the same bits.
-         .requirement = fmt::format("{} < {} {}", name, objectives[i], default_tolerance_text())});
+         .requirement = fmt::format("{} <= {} {}", name, objectives[i], default_tolerance_text())});
   }
   return stated;
 }

@@ -266,7 +266,8 @@ std::vector<std::string> matrix_notes(const Review& review) {
           "it holds and the more draws there are.",
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
       "so many draws meet the requirement.",
-      "Bound: with the confidence of the row, the stated part of all draws stays below it (order "
+      "Bound: with the confidence of the row, the stated part of all draws does not exceed it "
+      "(order "
       "statistics, any law). Margin: (limit − bound) / limit."};
   if (std::ranges::any_of(review.matrix, &RequirementAnswer::is_joint)) {
     notes.emplace_back(

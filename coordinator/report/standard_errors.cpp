@@ -69,7 +69,7 @@ void RunningStandardErrors::add(const RunResult& result) {
     sums.errors += sigma;
     sums.squares += sigma * sigma;
     sums.squared_errors += error * error;
-    sums.fourth_powers += error * error * error * error;
+    sums.fourth_powers += sigma * sigma * sigma * sigma;
     if (std::abs(error) < normal_95 * sigma) ++sums.num_within;
     if (sigma > 0.0 && is_in_range(error / sigma)) sums.pulls.add(error / sigma);
   }
@@ -82,7 +82,6 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     const Sums& sums = quantities_[i];
     const double mean_square = sums.squares / n, squared_error = sums.squared_errors / n;
-    const double scatter = sums.fourth_powers / n - squared_error * squared_error;
     const auto over_square = [&](double x) {
       return mean_square > 0.0 ? std::optional(x / mean_square) : std::nullopt;
     };
@@ -91,7 +90,7 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
          .num_runs = num_runs_,
          .mean = sums.errors / n,
          .squared_ratio = over_square(squared_error),
-         .squared_ratio_error = over_square(std::sqrt(std::max(scatter, 0.0) / n)),
+         .squared_ratio_error = over_square(std::sqrt(2.0 * sums.fourth_powers) / n),
          .num_within = sums.num_within,
          .within =
              probability_interval(static_cast<double>(sums.num_within), n, default_confidence),
@@ -121,13 +120,18 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
                           {"unit", true, 9},
                           {"mean", false, 9},
                           {"ratio", false, 10, ratio, true}},
-              .notes = {"honest ones have a ratio of 1, and 95 % of the errors within"}};
+              .notes = {"honest ones of normal errors have a ratio of 1, and 95 % of the errors "
+                        "within"}};
   if (have_ratio_errors) table.columns.push_back({"±", false, 9, ratio});
   table.columns.push_back({"runs", false, have_intervals ? 9U : 18U, within, true});
   if (have_intervals) {
     table.columns.insert(table.columns.end(),
                          {{"from", false, 9, within}, {"to", false, 9, within}});
-    if (have_ratio_errors) table.notes.back() += "; from, to: 95 % interval";
+    if (have_ratio_errors) {
+      table.notes.back() +=
+          "; ±: its standard deviation; from, to: 95 % interval, which one honest one in twenty "
+          "misses";
+    }
     if (!have_ratio_errors) table.notes.emplace_back("from, to: 95 % interval from replicates");
   }
   for (const StandardErrorStatistic& statistic : statistics.quantities) {

@@ -62,7 +62,8 @@ struct StandardErrorStatistic {
   double mean = 0.0;  ///< Of the standard errors, SI.
   /// Mean of error² over the mean of the standard errors' squares; nothing if these are 0.
   std::optional<double> squared_ratio;
-  std::optional<double> squared_ratio_error;  ///< Its standard error.
+  /// Its standard deviation if the standard errors are those of normal errors, √(2 Σσ⁴)/Σσ².
+  std::optional<double> squared_ratio_error;
   std::uint64_t num_within = 0;  ///< Runs whose |error| is within normal_95 standard errors.
   /// Of their share among all draws, 95 %; of a sampling design from its replicates.
   std::optional<Interval> within;
@@ -90,10 +91,10 @@ class RunningStandardErrors {
 
  private:
   struct Sums {
-    double errors = 0.0;   ///< Of the standard errors.
-    double squares = 0.0;  ///< Of the squares of the standard errors.
+    double errors = 0.0;         ///< Of the standard errors.
+    double squares = 0.0;        ///< Of the squares of the standard errors.
+    double fourth_powers = 0.0;  ///< Of those of the standard errors.
     double squared_errors = 0.0;
-    double fourth_powers = 0.0;  ///< Of the errors.
     std::uint64_t num_within = 0;
     ErrorBins pulls;
   };

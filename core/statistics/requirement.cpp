@@ -268,6 +268,7 @@ Requirement detail::read_requirement(Phrase& phrase) {
   } else {
     requirement.parameter = phrase.parameter();
     phrase.expect("<");
+    requirement.admits_limit = phrase.takes_sign("=");
     requirement.limit = phrase.positive_number();
   }
   phrase.expect("for");
@@ -280,7 +281,7 @@ Requirement detail::read_requirement(Phrase& phrase) {
 bool exceeds(const Requirement& requirement, std::span<const double> errors,
              std::span<const double> objectives) {
   if (requirement.subject == Requirement::Subject::parameter) {
-    return std::abs(errors[requirement.parameter]) > requirement.limit;
+    return requirement.is_exceeded_by(std::abs(errors[requirement.parameter]));
   }
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (std::abs(errors[i]) > objectives[i]) return true;

@@ -79,9 +79,15 @@ struct Requirement {
   double limit = 0.0;         ///< For Subject::parameter: SI, > 0.
   Tolerance tolerance;
   Subject subject = Subject::parameter;
+  bool admits_limit = false;  ///< For Subject::parameter: `<=` instead of `<`.
+
+  /// For Subject::parameter.
+  [[nodiscard]] bool is_exceeded_by(double magnitude) const {
+    return admits_limit ? magnitude > limit : magnitude >= limit;
+  }
 };
 
-/// Reads `a_c12 < 9e-4 for 99% with 95%`, the limit in SI units, or
+/// Reads `a_c12 < 9e-4 for 99% with 95%`, `<` or `<=` and the limit in SI units, or
 /// `all objectives for 95% with 90%`.
 /// @param parameters  Their names.
 /// @throws ConfigError such as `requirement = a_c14 < 1 for 9% with 9% (a_c14 is no parameter;
@@ -121,7 +127,7 @@ struct Decision {
 struct RequirementCheck : Decision, ExceedanceCount {
   /// Order, from the largest error, of the one below which at least `coverage` of all errors are
   /// with this confidence; 0 if runs are too few. The requirement is met if and only if that error
-  /// is not above the limit. One less are the exceedances with which so many runs meet it.
+  /// does not exceed the limit. One less are the exceedances with which so many runs meet it.
   std::uint64_t bound_order = 0;
   /// If undecided: all runs it takes until the requirement is met if none of the further ones
   /// exceeds, the plan of those who go on. Empty above num_runs_max.

@@ -65,8 +65,13 @@ double Phrase::percentage() {
 }
 
 void Phrase::expect(std::string_view literal) {
-  if (!rest_.starts_with(literal)) refuse_form();
+  if (!takes_sign(literal)) refuse_form();
+}
+
+bool Phrase::takes_sign(std::string_view literal) {
+  if (!rest_.starts_with(literal)) return false;
   rest_ = without_blanks_in_front(rest_.substr(literal.size()));
+  return true;
 }
 
 bool Phrase::takes(std::string_view literal) {

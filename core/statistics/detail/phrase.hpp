@@ -32,6 +32,8 @@ class Phrase {
   void expect(std::string_view literal);
   /// True if this word comes next; it is then read.
   [[nodiscard]] bool takes(std::string_view literal);
+  /// True if this text comes next, a sign; it is then read.
+  [[nodiscard]] bool takes_sign(std::string_view literal);
   /// True if this word is the last one of the phrase.
   [[nodiscard]] bool ends_with(std::string_view literal) const;
   void expect_end();

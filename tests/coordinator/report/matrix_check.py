@@ -70,13 +70,13 @@ def errors_of(database, name):
 
 def expected_row(database, requirement):
     """What the row of a requirement must hold."""
-    form = r"(?:(\w+) < (\S+)|all objectives) for ([\d.]+)% with ([\d.]+)%"
-    name, limit, coverage, confidence = re.search(form, requirement).groups()
+    form = r"(?:(\w+) (<=?) (\S+)|all objectives) for ([\d.]+)% with ([\d.]+)%"
+    name, sign, limit, coverage, confidence = re.search(form, requirement).groups()
     coverage, confidence = float(coverage) / 100, float(confidence) / 100
     if name:
         limit = float(limit)
         values = errors_of(database, name)
-        beyond = sum(value > limit for value in values.values())
+        beyond = sum(value > limit or (sign == "<" and value == limit) for value in values.values())
     else:
         limit = 1.0
         values = {}
@@ -150,7 +150,8 @@ def write_requirements(file, database):
     requirements = [f"a_c12 < {limit} for {tolerance}"
                     for limit in (9e-4, 9e-3, 9e-2)
                     for tolerance in ("95% with 90%", "50% with 99%", "99.9% with 95%")]
-    requirements += [f"a_c13 < {middle!r} for 50% with 95%", "k2c < 1e9 for 90% with 99.5%",
+    requirements += [f"a_c13 < {middle!r} for 50% with 95%", f"a_c13 <= {middle!r} for 50% with 95%",
+                     "k2c < 1e9 for 90% with 99.5%",
                      "all objectives for 40% with 90%"]
     with open(file, "w", encoding="utf-8") as stream:
         for number, requirement in enumerate(requirements):
@@ -162,7 +163,7 @@ def check(programs, folder):
     small_campaign(programs, folder)
     database = sqlite3.connect(f"file:{folder / 'small.db'}?mode=ro", uri=True)
     stated = write_requirements(folder / "requirements.toml", database)
-    objectives = [f"{name} < {objective!r} for 95% with 90%" for name, objective in database.execute(
+    objectives = [f"{name} <= {objective!r} for 95% with 90%" for name, objective in database.execute(
         "SELECT parameter, objective FROM parameter ORDER BY position")] + ["all objectives for 95% with 90%"]
     problems, verdicts = [], set()
     for options, requirements in ((["--requirements", folder / "requirements.toml"], stated),

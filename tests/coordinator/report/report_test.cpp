@@ -135,6 +135,29 @@ TEST(ErrorTable, SaysThatItLeavesOutDrawsWithoutAnEstimate) {
   EXPECT_THAT(error_text(review), ::testing::Not(HasSubstr("beyond: ")));
 }
 
+// Of 100 errors of 0.1 but for two of −4.9, whose law has the mean 0: t is large, the skewness
+// −6.9.
+TEST(ErrorTable, NamesNoBiasOfErrorsThatAreTooSkewed) {
+  CampaignStatistics statistics = paper_statistics(100);
+  for (const Parameter parameter : {Parameter::a_c12, Parameter::k2c}) {
+    ErrorStatistic& error = statistics.accuracy[index(parameter)].error;
+    error.bias = 1.0;
+    error.standard_deviation = 1.0;
+    error.skewness = parameter == Parameter::k2c ? -6.9 : 0.5;
+  }
+  EXPECT_THAT(error_text(review_of(MicroscopeCampaign(), statistics)),
+              ::testing::AllOf(HasSubstr("the bias\n  differs from 0 of a_c12."),
+                               HasSubstr("Too skewed to tell from 100 runs: K2c/K1c².")));
+}
+
+// A rule that stops where errors are small makes the worst one too small.
+TEST(IntervalTable, ClaimsNothingOfTheWorstOneAfterAStop) {
+  Review review = review_of(MicroscopeCampaign(), paper_statistics(100));
+  EXPECT_THAT(interval_text(review), HasSubstr("worst of 100: with 95 % confidence 97.048 %"));
+  review.stop.emplace();
+  EXPECT_THAT(interval_text(review), ::testing::Not(HasSubstr("worst of")));
+}
+
 TEST(ErrorTable, HasNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   CampaignStatistics statistics = paper_statistics(40);
   leave_out_intervals(statistics);
@@ -301,7 +324,7 @@ TEST(RequirementText, TellsBoundsAndHowManyDrawsDecide) {
        "             none decide if"},
       {"a_c12 < 9e-4 for 99.0031% with 95%", 299, 0,
        "at least 0 % and at most 0.99691 % of all draws,\n"},
-      {"a_d11_prime < 9e-4 for 95% with 95%", 59, 0, " below 0.0001, with 95 %\n"},
+      {"a_d11_prime < 9e-4 for 95% with 95%", 59, 0, " at most 0.0001, with 95 %\n"},
       {"all objectives for 95% with 90%", 100, 3,
        "Answer       undecided\n" + fixed +
            "Holding      97 of 100 runs; at least 93.44 % and at most 98.89 % of all draws,\n"

@@ -343,7 +343,7 @@ TEST(MatrixRequirements, AreTheObjectivesIfThereAreNone) {
   const std::vector<StatedRequirement> requirements =
       matrix_requirements(test::schema(), {}, objectives);
   ASSERT_EQ(requirements.size(), num_parameters);  // One less, and all together.
-  EXPECT_EQ(requirements[0].requirement, "a_c11_delta_x < 0.3333333333333333 for 95% with 90%");
+  EXPECT_EQ(requirements[0].requirement, "a_c11_delta_x <= 0.3333333333333333 for 95% with 90%");
   EXPECT_EQ(test::parse_requirement(requirements[0].requirement).limit, objectives[0]);
   EXPECT_EQ(requirements.back().requirement, "all objectives for 95% with 90%");
 }

@@ -44,6 +44,8 @@ TEST(ParseRequirement, TakesBlanksAsTheyCome) {
   const Requirement requirement = test::parse_requirement("  k2d<1000 for 99.9 %  with 90% ");
   EXPECT_EQ(requirement.parameter, index(Parameter::k2d));
   EXPECT_EQ(requirement.limit, 1000.0);
+  EXPECT_FALSE(requirement.admits_limit);
+  EXPECT_TRUE(test::parse_requirement("k2d<=1000 for 99.9% with 90%").admits_limit);
   EXPECT_DOUBLE_EQ(requirement.tolerance.coverage, 0.999);
 }
 
@@ -113,9 +115,11 @@ TEST(Exceeds, IsAboutOneParameterOrAll) {
   objectives.assign(num_parameters, 2.0);
   std::vector<double> errors(num_parameters);
   errors[index(Parameter::k2c)] = -2.0;
-  const Requirement one{.parameter = index(Parameter::k2c), .limit = 2.0, .tolerance = {0.9, 0.9}};
+  Requirement one{.parameter = index(Parameter::k2c), .limit = 2.0, .tolerance = {0.9, 0.9}};
   const Requirement all{.tolerance = {0.9, 0.9}, .subject = Requirement::Subject::all_objectives};
-  EXPECT_FALSE(exceeds(one, errors, objectives));  // On the limit holds.
+  EXPECT_TRUE(exceeds(one, errors, objectives));  // On the limit is not below it.
+  one.admits_limit = true;
+  EXPECT_FALSE(exceeds(one, errors, objectives));
   EXPECT_FALSE(exceeds(all, errors, objectives));  // On the objective holds.
   errors[index(Parameter::k2c)] = 1.9;
   errors[index(Parameter::a_d13)] = -2.1;
