@@ -101,7 +101,8 @@ struct DispatchConfig {
 struct ModelIdentity {
   std::string version;                 ///< Model::version().
   std::uint64_t reference_digest = 0;  ///< Model::reference_digest().
-  bool operator==(const ModelIdentity&) const = default;
+  /// fnv1a() of Model::description(): the same also where another digest is tolerated.
+  std::uint64_t description_digest = 0;
 };
 
 /// A batch that a worker computes, and since when it has come no further.
@@ -383,6 +384,9 @@ struct State {
 
 /// True if every run is settled, and every audit done.
 [[nodiscard]] bool is_finished(const CampaignState& campaign);
+
+/// True if who has the model computes runs of the campaign, or others that it tolerates.
+[[nodiscard]] bool is_accepted(const ModelIdentity& model, const CampaignState& campaign);
 
 /// True if the worker has the campaign's model.
 [[nodiscard]] bool has_model(const Worker& worker, const CampaignState& campaign);
