@@ -261,6 +261,7 @@ struct AuditKey {
 struct CampaignState {
   std::shared_ptr<const Campaign> definition;  ///< Shared with messages under way.
   ModelIdentity model;
+  std::string model_refusal;  ///< Why the last worker with another one of this version has none.
   Phase phase = Phase::active;
   int priority = 0;                   ///< Runs of a higher one are lent first.
   double audit_fraction = 0.0;        ///< Of its runs, computed a second time, by another worker.

@@ -33,19 +33,8 @@ ModelIdentity identity_of(const proto::OtherModel& other) {
           .description_digest = other.description_digest()};
 }
 
-/// Why a worker's model is lent no runs: its program computes something else than it did where the
-/// campaigns of this version began.
-std::optional<std::string> refusal_of(const State& state, const proto::OtherModel& other) {
-  const ModelIdentity model = identity_of(other);
-  const ModelIdentity* wanted = nullptr;
-  for (const CampaignId id : state.served) {
-    const CampaignState& campaign = state.campaigns.at(id);
-    if (campaign.model.version != model.version) continue;
-    if (is_accepted(model, campaign)) return std::nullopt;
-    wanted = &campaign.model;
-  }
-  if (wanted == nullptr) return std::nullopt;
-  if (model.description_digest != wanted->description_digest) {
+std::string difference(const ModelIdentity& model, const ModelIdentity& wanted) {
+  if (model.description_digest != wanted.description_digest) {
     return fmt::format(
         "{} has another description than where its campaign began; a model that has changed needs "
         "another version",
@@ -54,11 +43,29 @@ std::optional<std::string> refusal_of(const State& state, const proto::OtherMode
   return fmt::format(
       "reference_digest of {} = {:016x} (must be {:016x}, where its campaign began, "
       "unless that has tolerate_digest = true)",
-      model.version, model.reference_digest, wanted->reference_digest);
+      model.version, model.reference_digest, wanted.reference_digest);
+}
+
+/// Why a worker's model is lent no runs: its program computes something else than it did where the
+/// campaigns of this version began.
+std::optional<std::string> refusal_of(State& state, const proto::OtherModel& other) {
+  const ModelIdentity model = identity_of(other);
+  std::optional<std::string> why;
+  bool is_lent_some = false;
+  for (const CampaignId id : state.served) {
+    CampaignState& campaign = state.campaigns.at(id);
+    if (campaign.model.version != model.version) continue;
+    if (is_accepted(model, campaign)) {
+      is_lent_some = true;
+    } else {
+      why = campaign.model_refusal = difference(model, campaign.model);
+    }
+  }
+  return is_lent_some ? std::nullopt : why;
 }
 
 /// Why a worker that says Hello cannot be taken, as a Reject; nothing if it can.
-std::optional<proto::Envelope> refusal(const State& state, const HostId& host,
+std::optional<proto::Envelope> refusal(State& state, const HostId& host,
                                        const proto::Hello& hello) {
   const std::string_view own_version = built_in_model().version();
   if (hello.model_version() != own_version) {
