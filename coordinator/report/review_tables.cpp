@@ -128,7 +128,7 @@ Table execution_table(const Review& review) {
        {"starts of a coordinator", std::to_string(execution.num_coordinators)},
        {"results of a later attempt than the first", std::to_string(execution.num_retried)},
        {"results computed a second time",
-        fmt::format("{}, {} of them differed", execution.num_audited, execution.num_contradicting)},
+        fmt::format("{}, {} of them differed", execution.num_audited, review.num_contradicting)},
        {"runs given up", std::to_string(review.results.missing.num_given_up)}});
   for (const LossCount& loss : execution.losses) {
     table.rows.push_back(
