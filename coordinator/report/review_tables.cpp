@@ -85,7 +85,8 @@ Table cause_table(const Review& review) {
   }
   table.notes.push_back(fmt::format(
       "Computed from {} of {} runs with an estimate{}. Of the variance: beyond that of the terms "
-      "above. p: that chance alone makes one of all quantities and products look so.",
+      "above. p: that chance alone makes one of all quantities, or of products beyond their "
+      "factors, look so.",
       review.causes->num_runs, review.causes->num_with_estimate,
       review.causes->num_runs < review.causes->num_with_estimate ? ", the first ones" : ""));
   return table;

@@ -151,8 +151,8 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
                           {"p", false, 11}}};
   table.notes = {
       fmt::format("{}; of variance: R², beyond that of the terms above; p: that chance "
-                  "alone makes one of all quantities and products of two look so in one "
-                  "of {} errors",
+                  "alone makes one of all quantities, or of products of two beyond their "
+                  "factors, look so in one of {} errors",
                   position ? fmt::format("of this run: what the term, less its mean, "
                                          "adds to the error, {}",
                                          info.display_unit)
