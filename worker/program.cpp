@@ -20,6 +20,7 @@
 #include "core/campaign/device.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
@@ -232,6 +233,7 @@ void add_models(proto::Hello& hello, const wire::Log& log) {
       proto::OtherModel& other = *hello.add_other_models();
       other.set_version(version);
       other.set_reference_digest(digest);
+      other.set_description_digest(fnv1a(model->description()));
     }
   }
   if (!failure.empty() && hello.other_models_size() == 0) throw Error(failure);

@@ -52,10 +52,8 @@ std::vector<CommonQuantity> common_quantities(std::span<const Quantity> first,
                                               std::span<const Quantity> second) {
   std::vector<CommonQuantity> common;
   for (std::size_t i = 0; i < first.size(); ++i) {
-    const auto found = std::ranges::find(second, first[i].name, &Quantity::name);
-    if (found == second.end()) continue;
-    common.push_back(
-        {.in_first = i, .in_second = static_cast<std::size_t>(found - second.begin())});
+    const std::size_t place = place_of(first[i], second);
+    if (place < second.size()) common.push_back({.in_first = i, .in_second = place});
   }
   return common;
 }
@@ -283,14 +281,18 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
   return comparison;
 }
 
-std::vector<std::string> lacking(std::span<const Quantity> first,
-                                 std::span<const Quantity> second) {
-  std::vector<std::string> names;
-  for (const Quantity& quantity : first) {
-    if (std::ranges::find(second, quantity.name, &Quantity::name) != second.end()) continue;
-    names.push_back(quantity.name);
-  }
-  return names;
+std::size_t place_of(const Quantity& quantity, std::span<const Quantity> among) {
+  const auto found = std::ranges::find_if(among, [&](const Quantity& other) {
+    return other.name == quantity.name && other.unit == quantity.unit;
+  });
+  return static_cast<std::size_t>(found - among.begin());
+}
+
+std::vector<Quantity> lacking(std::span<const Quantity> first, std::span<const Quantity> second) {
+  std::vector<Quantity> own(first.begin(), first.end());
+  std::erase_if(
+      own, [&](const Quantity& quantity) { return place_of(quantity, second) < second.size(); });
+  return own;
 }
 
 std::vector<ComparedCampaign> compare_several(std::span<const std::filesystem::path> files,

@@ -128,9 +128,13 @@ struct MemberNames {
 /// `A` to `Z`, `AA`, `AB` and so on.
 [[nodiscard]] MemberNames lettered(std::size_t count);
 
-/// Names of the quantities of the first list that the second lacks.
-[[nodiscard]] std::vector<std::string> lacking(std::span<const Quantity> first,
-                                               std::span<const Quantity> second);
+/// Where the quantity is among those of another campaign, by name and unit; their number if it is
+/// not there: numbers of two units have nothing to do with one another.
+[[nodiscard]] std::size_t place_of(const Quantity& quantity, std::span<const Quantity> among);
+
+/// The quantities of the first list that the second lacks.
+[[nodiscard]] std::vector<Quantity> lacking(std::span<const Quantity> first,
+                                            std::span<const Quantity> second);
 
 /// The campaigns, the keys of their definitions that differ, and tables of bias, scatter and
 /// |error| with a row for each parameter and each campaign that has it. Lines have at most 80

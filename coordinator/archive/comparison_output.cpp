@@ -102,10 +102,15 @@ void add_own_quantities(const ComparedCampaign& first, const ComparedCampaign& o
                         std::string_view first_name, std::string_view other_name, Table& table) {
   const auto add = [&](const ComparedCampaign& one, std::string_view name,
                        const ComparedCampaign& two, std::string_view without) {
-    const std::vector<std::string> own = lacking(one.quantities, two.quantities);
+    std::string own;
+    for (const Quantity& quantity : lacking(one.quantities, two.quantities)) {
+      if (!own.empty()) own += ", ";
+      own += quantity.name;
+      if (quantity.unit != "1") own += fmt::format(" in {}", quantity.unit);
+    }
     if (own.empty()) return;
-    table.notes.push_back(fmt::format("not compared, as {} has them and {} has not: {}", name,
-                                      without, fmt::join(own, ", ")));
+    table.notes.push_back(
+        fmt::format("not compared, as {} has them and {} has not: {}", name, without, own));
   };
   add(first, first_name, other, other_name);
   add(other, other_name, first, first_name);
@@ -159,18 +164,18 @@ bool has_changes(const ComparedCampaign& member) {
 }
 
 /// How a quantity differs from the first campaign. Null where that is not compared.
-const ParameterComparison* change_in(const ComparedCampaign& member, const std::string& quantity) {
+const ParameterComparison* change_in(const ComparedCampaign& member, const Quantity& quantity) {
   if (!has_changes(member)) return nullptr;
-  const std::vector<ParameterComparison>& all = member.comparison->parameters;
-  const auto found = std::ranges::find_if(
-      all, [&](const ParameterComparison& one) { return one.quantity.name == quantity; });
-  return found == all.end() ? nullptr : &*found;
+  for (const ParameterComparison& one : member.comparison->parameters) {
+    if (place_of(quantity, {&one.quantity, 1}) == 0) return &one;
+  }
+  return nullptr;
 }
 
 /// Errors of a campaign in the runs that are compared: of the first one, with the first other that
 /// can be. Null if it has none.
 const ComparedAccuracy* accuracy_of(std::span<const ComparedCampaign> members, std::size_t member,
-                                    const std::string& quantity) {
+                                    const Quantity& quantity) {
   if (member > 0) {
     const ParameterComparison* const change = change_in(members[member], quantity);
     return change == nullptr ? nullptr : &change->second;
@@ -186,8 +191,7 @@ std::vector<Quantity> all_quantities(std::span<const ComparedCampaign> members) 
   std::vector<Quantity> all;
   for (const ComparedCampaign& member : members) {
     for (const Quantity& quantity : member.quantities) {
-      const bool is_new = std::ranges::find(all, quantity.name, &Quantity::name) == all.end();
-      if (is_new) all.push_back(quantity);
+      if (place_of(quantity, all) == all.size()) all.push_back(quantity);
     }
   }
   return all;
@@ -218,13 +222,13 @@ Table table_of(std::span<const ComparedCampaign> members, const MemberNames& nam
     bool is_first = true;
     for (std::size_t member = 0; member < members.size(); ++member) {
       const std::vector<Quantity>& own = members[member].quantities;
-      const auto found = std::ranges::find(own, quantity.name, &Quantity::name);
-      if (found == own.end()) continue;
+      const std::size_t place = place_of(quantity, own);
+      if (place == own.size()) continue;
       Row& row = table.rows.emplace_back();
       row.emplace_back(is_first ? quantity.symbol : "");
       row.emplace_back(is_first ? quantity.display_unit : "");
       row.emplace_back(names.names[member]);
-      add_cells(row, member, quantity, static_cast<std::size_t>(found - own.begin()));
+      add_cells(row, member, quantity, place);
       row.resize(table.columns.size(), Cell(""));
       is_first = false;
     }
@@ -235,10 +239,10 @@ Table table_of(std::span<const ComparedCampaign> members, const MemberNames& nam
 Table bias_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity, std::size_t) {
     const double scale = quantity.display_scale;
-    const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity.name);
+    const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity);
     row.emplace_back(accuracy == nullptr ? "-" : figure_with_sign(accuracy->bias / scale));
     if (member == 0 || accuracy == nullptr) return;
-    const ParameterComparison& change = *change_in(members[member], quantity.name);
+    const ParameterComparison& change = *change_in(members[member], quantity);
     row.emplace_back(figure_with_sign(change.bias_change / scale));
     const auto& interval = change.bias_interval;
     row.emplace_back(interval ? figure_with_sign(interval->lower / scale) : "-");
@@ -262,12 +266,12 @@ Table bias_table(std::span<const ComparedCampaign> members, const MemberNames& n
 Table scatter_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   const auto add_cells = [&](Row& row, std::size_t member, const Quantity& quantity, std::size_t) {
     const double scale = quantity.display_scale;
-    const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity.name);
+    const ComparedAccuracy* const accuracy = accuracy_of(members, member, quantity);
     row.emplace_back(accuracy == nullptr ? "-"
                                          : measured_figure(accuracy->standard_deviation / scale));
     if (member == 0 || accuracy == nullptr) return;
     const CampaignComparison& comparison = *members[member].comparison;
-    const ParameterComparison& change = *change_in(members[member], quantity.name);
+    const ParameterComparison& change = *change_in(members[member], quantity);
     add_p(change.adjusted_p_values.scale, row);
     const auto& factor = change.smallest_scale_factor;
     row.emplace_back(factor ? measured_figure(100.0 * (*factor - 1.0)) + " %" : "-");
@@ -391,6 +395,7 @@ Json comparison_object(const ComparedCampaign& first, const ComparedCampaign& se
     return {{"field", of.field}, {"first", of.first}, {"second", of.second}};
   };
   const auto of_parameter = [](const ParameterComparison& of) { return json_of(of); };
+  const auto name_of = [](const Quantity& of) -> Json { return of.name; };
   const bool is_compared = comparison.why_not_compared.empty();
   return {
       {"first", first.file.string()},
@@ -408,8 +413,8 @@ Json comparison_object(const ComparedCampaign& first, const ComparedCampaign& se
       {"num_first_without_estimate", first.results.missing.total()},
       {"num_second_without_estimate", second.results.missing.total()},
       {"confidence", default_confidence},
-      {"only_in_first", lacking(first.quantities, second.quantities)},
-      {"only_in_second", lacking(second.quantities, first.quantities)},
+      {"only_in_first", array_of(lacking(first.quantities, second.quantities), name_of)},
+      {"only_in_second", array_of(lacking(second.quantities, first.quantities), name_of)},
       {"parameters", is_compared ? array_of(comparison.parameters, of_parameter) : Json::array()}};
 }
 

@@ -163,8 +163,11 @@ std::string repetition_text(const Store& store, std::string_view digest) {
   }
   return fmt::format(
       "These commands repeat the {}, and print its digest again if every bit is the same:\n\n"
-      "{}    proofmass report again.db | grep {}\n",
-      is_whole ? "campaign" : "part of the campaign that has results", commands, digest);
+      "{}    proofmass report again.db | grep {}\n{}",
+      is_whole ? "campaign" : "part of the campaign that has results", commands, digest,
+      store.model().description().empty()
+          ? ""
+          : "\nPROGRAM is that of the model, which this archive does not hold.\n");
 }
 
 std::string readme_of(const Store& store, std::string_view digest) {

@@ -104,8 +104,19 @@ LocalWorkers::LocalWorkers(Service& service, ProgressDisplay& display, WorkerPro
 
 void LocalWorkers::replace_dead() {
   for (const WorkerProcesses::Exit& exit : processes_.take_exits()) replace(exit);
-  if (service_.has_crashing_campaign()) {
-    throw Error("the model crashes again and again without a finished run; see what is said above");
+  const State& state = service_.state();
+  for (const auto& [id, campaign] : state.campaigns) {
+    if (crashes_everywhere(state, campaign)) {
+      throw Error(
+          "the model crashes again and again without a finished run; see what is said above");
+    }
+    // Each worker starts the model's program itself, and those that replace them would.
+    if (lacks_workers(state, campaign) && state.workers.size() >= processes_.count()) {
+      throw Error(
+          fmt::format("no worker has the model {}: its program says another version, or crashes, "
+                      "where a worker starts it",
+                      campaign.model.version));
+    }
   }
 }
 

@@ -40,6 +40,8 @@ class WorkerProcesses {
 
   /// Those that have ended since the last call; does not wait.
   [[nodiscard]] std::vector<Exit> take_exits();
+  /// Those that have not ended, as far as that was seen.
+  [[nodiscard]] std::size_t count() const { return processes_.size(); }
 
  private:
   struct Process {
@@ -64,7 +66,8 @@ class LocalWorkers {
   LocalWorkers(Service& service, ProgressDisplay& display, WorkerProcesses& processes);
 
   /// @throws Error if workers end, or their model crashes, again and again without finishing a run,
-  ///         unless that is the fault of single runs, which the dispatch finds out.
+  ///         unless that is the fault of single runs, which the dispatch finds out; or if all of
+  ///         them lack the model.
   void replace_dead();
 
  private:

@@ -6,6 +6,7 @@
 #include "coordinator/dispatch/detail.hpp"
 #include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
@@ -72,7 +73,8 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
   campaign.model = {.version = std::string(stored.definition->model().version()),
                     .reference_digest = stored.reference_digest != 0
                                             ? stored.reference_digest
-                                            : state.config.reference_digest};
+                                            : state.config.reference_digest,
+                    .description_digest = fnv1a(stored.definition->model().description())};
   campaign.phase = stored.control.phase;
   campaign.priority = stored.control.priority;
   campaign.audit_fraction = stored.control.audit_fraction;

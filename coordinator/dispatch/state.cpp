@@ -56,11 +56,17 @@ bool is_finished(const CampaignState& campaign) {
          campaign.audits.empty() && campaign.num_comparing == 0;
 }
 
+bool is_accepted(const ModelIdentity& model, const CampaignState& campaign) {
+  const ModelIdentity& wanted = campaign.model;
+  if (model.version != wanted.version) return false;
+  if (model.reference_digest == wanted.reference_digest) return true;
+  return campaign.definition->tolerates_digests() &&
+         model.description_digest == wanted.description_digest;
+}
+
 bool has_model(const Worker& worker, const CampaignState& campaign) {
-  return std::ranges::any_of(worker.models, [&](const ModelIdentity& model) {
-    return model == campaign.model ||
-           (campaign.definition->tolerates_digests() && model.version == campaign.model.version);
-  });
+  return std::ranges::any_of(
+      worker.models, [&](const ModelIdentity& model) { return is_accepted(model, campaign); });
 }
 
 bool can_compute(const Worker& worker, const CampaignState& campaign) {

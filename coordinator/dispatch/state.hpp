@@ -101,7 +101,8 @@ struct DispatchConfig {
 struct ModelIdentity {
   std::string version;                 ///< Model::version().
   std::uint64_t reference_digest = 0;  ///< Model::reference_digest().
-  bool operator==(const ModelIdentity&) const = default;
+  /// fnv1a() of Model::description(): the same also where another digest is tolerated.
+  std::uint64_t description_digest = 0;
 };
 
 /// A batch that a worker computes, and since when it has come no further.
@@ -260,6 +261,7 @@ struct AuditKey {
 struct CampaignState {
   std::shared_ptr<const Campaign> definition;  ///< Shared with messages under way.
   ModelIdentity model;
+  std::string model_refusal;  ///< Why the last worker with another one of this version has none.
   Phase phase = Phase::active;
   int priority = 0;                   ///< Runs of a higher one are lent first.
   double audit_fraction = 0.0;        ///< Of its runs, computed a second time, by another worker.
@@ -383,6 +385,9 @@ struct State {
 
 /// True if every run is settled, and every audit done.
 [[nodiscard]] bool is_finished(const CampaignState& campaign);
+
+/// True if who has the model computes runs of the campaign, or others that it tolerates.
+[[nodiscard]] bool is_accepted(const ModelIdentity& model, const CampaignState& campaign);
 
 /// True if the worker has the campaign's model.
 [[nodiscard]] bool has_model(const Worker& worker, const CampaignState& campaign);

@@ -27,27 +27,45 @@ proto::Envelope stop_message() {
   return envelope;
 }
 
-/// Why a worker's model is lent no runs: its program computes something else than it did where the
-/// campaigns of this version began.
-std::optional<std::string> refusal_of(const State& state, const proto::OtherModel& other) {
-  std::optional<std::uint64_t> expected;
-  for (const CampaignId id : state.served) {
-    const CampaignState& campaign = state.campaigns.at(id);
-    const ModelIdentity& wanted = campaign.model;
-    if (wanted.version != other.version()) continue;
-    if (campaign.definition->tolerates_digests()) return std::nullopt;
-    if (wanted.reference_digest == other.reference_digest()) return std::nullopt;
-    expected = wanted.reference_digest;
+ModelIdentity identity_of(const proto::OtherModel& other) {
+  return {.version = other.version(),
+          .reference_digest = other.reference_digest(),
+          .description_digest = other.description_digest()};
+}
+
+std::string difference(const ModelIdentity& model, const ModelIdentity& wanted) {
+  if (model.description_digest != wanted.description_digest) {
+    return fmt::format(
+        "{} has another description than where its campaign began; a model that has changed needs "
+        "another version",
+        model.version);
   }
-  if (!expected) return std::nullopt;
   return fmt::format(
       "reference_digest of {} = {:016x} (must be {:016x}, where its campaign began, "
       "unless that has tolerate_digest = true)",
-      other.version(), other.reference_digest(), *expected);
+      model.version, model.reference_digest, wanted.reference_digest);
+}
+
+/// Why a worker's model is lent no runs: its program computes something else than it did where the
+/// campaigns of this version began.
+std::optional<std::string> refusal_of(State& state, const proto::OtherModel& other) {
+  const ModelIdentity model = identity_of(other);
+  std::optional<std::string> why;
+  bool is_lent_some = false;
+  for (const CampaignId id : state.served) {
+    CampaignState& campaign = state.campaigns.at(id);
+    if (campaign.model.version != model.version) continue;
+    if (is_accepted(model, campaign)) {
+      is_lent_some = true;
+    } else {
+      why = campaign.model_refusal = difference(model, campaign.model);
+    }
+  }
+  return is_lent_some ? std::nullopt : why;
 }
 
 /// Why a worker that says Hello cannot be taken, as a Reject; nothing if it can.
-std::optional<proto::Envelope> refusal(const State& state, const HostId& host,
+std::optional<proto::Envelope> refusal(State& state, const HostId& host,
                                        const proto::Hello& hello) {
   const std::string_view own_version = built_in_model().version();
   if (hello.model_version() != own_version) {
@@ -112,9 +130,10 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   worker.num_card_slots = hello.num_card_slots();
   worker.slots_per_thread = hello.slots_per_thread();
   worker.cards = hello.cards();
-  worker.models.push_back({hello.model_version(), hello.reference_digest()});
+  worker.models.push_back(
+      {.version = hello.model_version(), .reference_digest = hello.reference_digest()});
   for (const proto::OtherModel& other : hello.other_models()) {
-    worker.models.push_back({other.version(), other.reference_digest()});
+    worker.models.push_back(identity_of(other));
   }
   state.absent.erase(session);
   worker.registered_at = now;

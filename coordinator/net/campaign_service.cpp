@@ -72,7 +72,10 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   const std::optional<double> left_s = remaining_s(campaign, status.rate_hz());
   if (left_s) status.set_remaining_s(*left_s);
   status.set_storage_failure(campaign.storage_failure);
-  if (lacks_workers(state_, campaign)) status.set_missing_model(campaign.model.version);
+  if (lacks_workers(state_, campaign)) {
+    status.set_missing_model(campaign.model.version);
+    status.set_model_refusal(campaign.model_refusal);
+  }
   status.set_crashes_everywhere(crashes_everywhere(state_, campaign));
   return record;
 }

@@ -388,12 +388,6 @@ std::optional<WorkerId> Service::worker_of(std::uint64_t process_id) const {
 
 const State& Service::state() const { return impl_->state_; }
 
-bool Service::has_crashing_campaign() const {
-  return std::ranges::any_of(impl_->state_.campaigns, [&](const auto& item) {
-    return crashes_everywhere(impl_->state_, item.second);
-  });
-}
-
 void Service::worker_ended(WorkerId worker, LossReason reason) {
   impl_->worker_ended(worker, reason);
 }

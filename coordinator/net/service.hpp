@@ -141,8 +141,6 @@ class Service {
   [[nodiscard]] std::optional<WorkerId> worker_of(std::uint64_t process_id) const;
   /// What its dispatch knows.
   [[nodiscard]] const State& state() const;
-  /// True if a campaign crashes at all workers that have its model.
-  [[nodiscard]] bool has_crashing_campaign() const;
 
   /// The worker's process is known to have ended: its runs are lent again at once.
   void worker_ended(WorkerId worker, LossReason reason);

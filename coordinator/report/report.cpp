@@ -296,6 +296,7 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
             {"num_lost", missing.num_lost},
             {"losses", array_of(results.losses, of_loss)},
             {"num_given_up", missing.num_given_up},
+            {"num_contradicting", review.num_contradicting},
             {"num_warned", results.warnings.num_runs},
             {"warnings", warnings_of(schema, results.warnings)},
             {"confidence", default_confidence},
@@ -321,6 +322,16 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
 
 namespace {
 
+std::string note_of(const Campaign& campaign, std::uint64_t num_contradicting) {
+  std::string note = campaign.note();
+  if (num_contradicting == 0) return note;
+  if (!note.empty()) note += "; ";
+  return note + fmt::format(
+                    "audits found {}: a worker computes wrongly, and no verdict can be relied on; "
+                    "`proofmass verify` names the runs",
+                    counted(num_contradicting, "contradiction"));
+}
+
 Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDepth depth,
                          std::vector<StatedRequirement> stated) {
   Review review{.name = store.name(),
@@ -329,7 +340,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
                 .model_version = store.model_version(),
                 .is_of_program = !store.model().description().empty(),
                 .is_imported = store.model().is_imported(),
-                .note = campaign.note(),
+                .note = note_of(campaign, store.num_contradicting()),
                 .build = store.build(),
                 .created_utc = store.created_utc(),
                 .definition_digest = store.table_digest(),
@@ -337,7 +348,8 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
                 .objectives = campaign.objectives(),
                 .interpretation = campaign.interpretation(),
                 .budget = campaign.error_budget(),
-                .why_not_independent = why_not_independent(campaign)};
+                .why_not_independent = why_not_independent(campaign),
+                .num_contradicting = store.num_contradicting()};
   if (depth == ReviewDepth::tables) {
     review.results = read_checked_results(store, campaign);
     return review;

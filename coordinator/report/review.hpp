@@ -73,7 +73,7 @@ struct Review {
   std::string model_version = {};
   bool is_of_program = false;  ///< Its model needs one to be simulated again.
   bool is_imported = false;    ///< Model::is_imported().
-  std::string note = {};       ///< Campaign::note().
+  std::string note = {};       ///< Campaign::note(), and of contradictions.
   std::string build = {};
   std::string created_utc = {};
   std::string definition_digest = {};
@@ -90,6 +90,7 @@ struct Review {
   std::optional<Causes> causes = {};       ///< Empty if runs are too few, or not asked for.
   std::optional<RunSpectra> spectra = {};  ///< Of worst_run_of(); empty if not asked for.
   CampaignExecution execution = {};
+  std::uint64_t num_contradicting = 0;  ///< Store::num_contradicting().
   bool is_cancelled = false;
   std::optional<StopOutcome> stop = {};
 };

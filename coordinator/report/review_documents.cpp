@@ -392,8 +392,9 @@ std::string verdicts(const Review& review) {
     parts.push_back(fmt::format("{} {} {}", names.size(), be(names.size()), name_of(verdict)));
     if (verdict != RequirementVerdict::met) parts.back() += fmt::format(" ({})", list_of(names));
   }
-  return fmt::format("Of {}, {}.", counted(review.matrix.size(), "requirement"),
-                     fmt::join(parts, ", "));
+  return fmt::format("Of {}, {}.{}", counted(review.matrix.size(), "requirement"),
+                     fmt::join(parts, ", "),
+                     review.num_contradicting > 0 ? fmt::format(" Note: {}.", review.note) : "");
 }
 
 /// The quantity whose worst error is the largest beside its objective.

@@ -85,7 +85,8 @@ Table cause_table(const Review& review) {
   }
   table.notes.push_back(fmt::format(
       "Computed from {} of {} runs with an estimate{}. Of the variance: beyond that of the terms "
-      "above. p: that chance alone makes one of all quantities and products look so.",
+      "above. p: that chance alone makes one of all quantities, or of products beyond their "
+      "factors, look so.",
       review.causes->num_runs, review.causes->num_with_estimate,
       review.causes->num_runs < review.causes->num_with_estimate ? ", the first ones" : ""));
   return table;
@@ -132,7 +133,7 @@ Table execution_table(const Review& review) {
        {"starts of a coordinator", std::to_string(execution.num_coordinators)},
        {"results of a later attempt than the first", std::to_string(execution.num_retried)},
        {"results computed a second time",
-        fmt::format("{}, {} of them differed", execution.num_audited, execution.num_contradicting)},
+        fmt::format("{}, {} of them differed", execution.num_audited, review.num_contradicting)},
        {"runs given up", std::to_string(review.results.missing.num_given_up)}});
   for (const LossCount& loss : execution.losses) {
     table.rows.push_back(

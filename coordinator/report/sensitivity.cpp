@@ -141,8 +141,7 @@ std::string not_found_text(const DrawnRuns& drawn) {
 /// The sum of quantities and products of two that explains the error.
 /// @param position  Of a run: what each adds to its error, less the mean of all.
 Table term_table(const DrawnRuns& drawn, std::size_t quantity,
-                 std::optional<std::size_t> position) {
-  const std::vector<ExplanatoryTerm> terms = terms_of(drawn, quantity);
+                 std::span<const ExplanatoryTerm> terms, std::optional<std::size_t> position) {
   if (terms.empty()) return {.notes = {not_found_text(drawn)}};
   const Quantity& info = drawn.quantities[quantity];
   Table table{.columns = {{"error as a sum of", true, 44},
@@ -151,8 +150,8 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
                           {"p", false, 11}}};
   table.notes = {
       fmt::format("{}; of variance: R², beyond that of the terms above; p: that chance "
-                  "alone makes one of all quantities and products of two look so in one "
-                  "of {} errors",
+                  "alone makes one of all quantities, or of products of two beyond their "
+                  "factors, look so in one of {} errors",
                   position ? fmt::format("of this run: what the term, less its mean, "
                                          "adds to the error, {}",
                                          info.display_unit)
@@ -316,6 +315,8 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
   const auto both = sensitivities_of(drawn, quantity);
   const auto of_error = first_of(both[0], num_rows), of_magnitude = first_of(both[1], num_rows);
   const bool has_rows = !of_error.empty() || !of_magnitude.empty();
+  const std::vector<ExplanatoryTerm> terms = terms_of(drawn, quantity);
+  if (!position && !has_rows && terms.empty()) return {};
   Table drivers = driver_table(drawn, of_error, "error", position);
   if (has_rows) {
     drivers.notes.push_back(
@@ -331,8 +332,23 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
   return fmt::format("{}\n{}{}\n{}\n{}\n{}{}", heading, limit_line(drawn), left_out(drawn),
                      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
                      terminal_text(drivers, style),
-                     terminal_text(term_table(drawn, quantity, position), style),
+                     terminal_text(term_table(drawn, quantity, terms, position), style),
                      position ? "" : "\n" + worst_run_text(drawn, quantity, has_rows));
+}
+
+std::string unexplained_text(const DrawnRuns& drawn, std::span<const std::size_t> quantities) {
+  std::vector<std::string> names;
+  for (const std::size_t quantity : quantities) {
+    names.push_back(fmt::format("{} (largest: run {})", drawn.quantities[quantity].symbol,
+                                worst_run_of(drawn, quantity).value));
+  }
+  const Table table{
+      .notes = {fmt::format("No input found whose influence on these errors or their magnitudes "
+                            "chance does not explain; --rows 5 lists the first ones nevertheless: "
+                            "{}",
+                            fmt::join(names, ", ")),
+                not_found_text(drawn)}};
+  return limit_line(drawn) + left_out(drawn) + terminal_text(table);
 }
 
 std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,

@@ -67,12 +67,17 @@ inline constexpr std::size_t num_rows_by_default = 5;
 /// of sensitivities() of each, see num_rows_by_default, and the error as a sum of
 /// explanatory_terms(), and how to ask why the worst run is so. Of a run, why it is as far off as
 /// it is: the place of its |error| among the runs, its values of these quantities, each with its
-/// percentile, and what the terms add to its error. Lines have at most 80 characters.
+/// percentile, and what the terms add to its error. Lines have at most 80 characters. Empty without
+/// a run if there is nothing to name, see unexplained_text().
 /// @throws InvalidArgument below 16 runs, or if the run is not among them.
 [[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                                            std::optional<RunIndex> run = {},
                                            std::optional<std::size_t> num_rows = {},
                                            Paint paint = Paint::no);
+
+/// That chance explains the errors of these parameters, of which there is one at least.
+[[nodiscard]] std::string unexplained_text(const DrawnRuns& drawn,
+                                           std::span<const std::size_t> quantities);
 
 /// That for programs, of these parameters, in full precision and SI units; of the run's values only
 /// if there is one. coordinator/cli/README.md lists the keys.

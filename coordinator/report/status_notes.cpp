@@ -73,7 +73,9 @@ std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
     add_trouble("nothing can be stored: " + wire::visible_text(campaign.storage_failure()));
   }
   if (!campaign.missing_model().empty()) {
-    add_trouble("no worker has the model " + wire::visible_text(campaign.missing_model()));
+    const std::string& refusal = campaign.model_refusal();
+    add_trouble("no worker has the model " + wire::visible_text(campaign.missing_model()) +
+                (refusal.empty() ? "" : "; the last refused: " + wire::visible_text(refusal)));
   }
   if (campaign.crashes_everywhere()) {
     add_trouble(
@@ -175,6 +177,7 @@ Json campaign_object(const proto::CampaignStatus& campaign) {
                {"storage_failure", text_or_null(campaign.storage_failure())},
                {"model_version", text_or_null(campaign.model_version())},
                {"missing_model", text_or_null(campaign.missing_model())},
+               {"model_refusal", text_or_null(campaign.model_refusal())},
                {"crashes_everywhere", campaign.crashes_everywhere()},
                {"owner", text_or_null(campaign.owner())}});
   return json;

@@ -155,7 +155,6 @@ struct CampaignExecution {
   std::vector<LossCount> losses;
   std::uint64_t num_retried = 0;  ///< Results that were kept of a later attempt than the first.
   std::uint64_t num_audited = 0;  ///< Results that were compared with a second one.
-  std::uint64_t num_contradicting = 0;  ///< Second results that differed.
   std::optional<std::string> first_result_utc;
   std::optional<std::string> last_result_utc;
 };

@@ -203,6 +203,7 @@ class Store {
   [[nodiscard]] std::uint64_t num_before_blame() const;
   /// Second results that were compared with the stored ones.
   [[nodiscard]] std::uint64_t num_compared() const;
+  [[nodiscard]] std::uint64_t num_contradicting() const;  ///< Those that differed.
   /// Second results that differ from the stored ones, in run order.
   [[nodiscard]] std::vector<Contradiction> contradictions() const;
 

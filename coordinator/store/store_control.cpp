@@ -280,6 +280,10 @@ std::uint64_t Store::num_compared() const {
   return impl_->database.count("SELECT count(*) FROM audit");
 }
 
+std::uint64_t Store::num_contradicting() const {
+  return impl_->database.count("SELECT count(*) FROM audit WHERE NOT is_equal");
+}
+
 std::vector<Contradiction> Store::contradictions() const {
   const auto contradiction = [](const Statement& row) {
     return Contradiction{.run = RunIndex{row.count(0)},
@@ -395,7 +399,6 @@ CampaignExecution Store::execution() const {
   execution.losses = losses_by(database, "reason, is_blamed");
   execution.num_retried = database.count("SELECT count(*) FROM delivery WHERE attempt > 1");
   execution.num_audited = num_compared();
-  execution.num_contradicting = database.count("SELECT count(*) FROM audit WHERE NOT is_equal");
   execution.first_result_utc = utc_of(database, "min");
   execution.last_result_utc = utc_of(database, "max");
   return execution;

@@ -39,12 +39,13 @@ std::vector<std::string> lines_of(const std::string& text, std::size_t first, st
   return lines;
 }
 
-/// Lines of at most `width` columns, whatever the words are.
-std::vector<std::string> broken(const std::string& text, std::size_t width) {
-  std::vector<std::string> lines = lines_of(text, width, width);
+/// The same, whatever the words are.
+std::vector<std::string> broken(const std::string& text, std::size_t first, std::size_t width) {
+  std::vector<std::string> lines = lines_of(text, first, width);
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (display_width(lines[i]) <= width) continue;
-    const std::size_t size = shortened(lines[i], width).size() - std::string_view("…").size();
+    const std::size_t room = std::max(i == 0 ? first : width, text_width_min);
+    if (display_width(lines[i]) <= room) continue;
+    const std::size_t size = shortened(lines[i], room).size() - std::string_view("…").size();
     lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i) + 1, lines[i].substr(size));
     lines[i].resize(size);
   }
@@ -185,7 +186,8 @@ class TerminalTable {
     const std::string text = wire::visible_text(cell.text);
     const bool is_wrapped =
         style_.wraps_cells && shown.column->is_text && display_width(text) > shown.room();
-    return is_wrapped ? broken(text, shown.room()) : std::vector{shortened(text, shown.room())};
+    return is_wrapped ? broken(text, shown.room(), shown.room())
+                      : std::vector{shortened(text, shown.room())};
   }
 
   /// One line of what a cell shows.
@@ -313,7 +315,7 @@ std::string left_aligned(std::string_view text, std::size_t width) {
 }
 
 std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin) {
-  const std::vector<std::string> lines = lines_of(text, columns_max - begin, columns_max - indent);
+  const std::vector<std::string> lines = broken(text, columns_max - begin, columns_max - indent);
   return fmt::format("{}", fmt::join(lines, fmt::format("\n{:{}}", "", indent)));
 }
 

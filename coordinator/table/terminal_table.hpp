@@ -42,8 +42,8 @@ struct TerminalStyle {
 /// Text filled up with spaces on the right to `width` columns of a terminal.
 [[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
 
-/// Text broken between words to lines of at most 80 columns, from the second one on after `indent`
-/// spaces; the first one begins at column `begin`. No end of the last line.
+/// Text broken between words, and in longer ones, to lines of at most 80 columns, from the second
+/// one on after `indent` spaces; the first one begins at column `begin`. No end of the last line.
 [[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin);
 
 /// Lines, those of more than 80 columns broken between words. What follows of such a line stands

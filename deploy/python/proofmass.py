@@ -35,7 +35,7 @@ __all__ = ["Campaign", "CampaignError", "Columns", "Quantity", "Replay", "Series
            "open", "replay"]
 
 APPLICATION_ID = 1349668211  # "PrMs".
-SCHEMA_VERSION = 13  # The newest user_version that this reader knows.
+SCHEMA_VERSION = 14  # The newest user_version that this reader knows.
 OLDEST_SCHEMA_VERSION = 8  # There is no older one.
 STATUSES = ("completed", "not_converged", "not_finite", "no_draw", "lost")  # 1 to 5 in run_result.
 ROWS_AT_A_TIME = 8192

@@ -179,9 +179,9 @@ std::string DescribedModel::why_no_runs() const {
     return fmt::format("its results were imported from {}; no more can be computed",
                        parts_.imported_from);
   }
+  if (find_model(version()) != nullptr) return "its program here has another description";
   const auto other = std::ranges::find_if(models(), [this](const Model* model) {
-    return name_of_model(model->version()) == name_of_model(version()) &&
-           model->version() != version();
+    return name_of_model(model->version()) == name_of_model(version());
   });
   const std::string version_here =
       other == models().end() ? "" : fmt::format(" ({} is)", (*other)->version());

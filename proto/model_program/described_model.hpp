@@ -57,7 +57,7 @@ struct ProgramQuantity {
   std::string symbol;      ///< For people; the name by default.
   std::string unit = "1";  ///< SI.
   double display_scale = 1.0;
-  std::string display_unit;  ///< That of `unit` by default.
+  std::string display_unit;  ///< `unit` by default, after a scale that is given.
   std::string truth;
   double objective = std::numeric_limits<double>::infinity();
   bool has_standard_error = false;

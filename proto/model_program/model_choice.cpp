@@ -43,7 +43,8 @@ std::vector<std::string> named_programs(int argc, const char* const* argv) {
     }
   }
   const char* const listed = std::getenv(variable);
-  if (programs.empty() && listed != nullptr) programs = CLI::detail::split(listed, ':');
+  if (!programs.empty() || listed == nullptr) return programs;
+  programs = CLI::detail::split(listed, ':');
   std::erase(programs, "");
   return programs;
 }
@@ -55,6 +56,7 @@ std::vector<std::string> choose_models(int argc, const char* const* argv, Broken
   std::vector<const Model*> used;
   std::vector<std::string> left_out;
   for (const std::string& named : named_programs(argc, argv)) {
+    if (named.empty()) throw InvalidArgument("model-program = \"\" (must name a file)");
     const std::filesystem::path program = std::filesystem::absolute(named).lexically_normal();
     if (std::ranges::find(chosen, program, &ChosenModel::program) != chosen.end()) continue;
     settle_surroundings();  // Its pipes are to be no standard descriptors.

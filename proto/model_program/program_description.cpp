@@ -128,8 +128,11 @@ ProgramQuantity read_quantity(Document& document, const std::string& path,
   document.read(path + ".symbol", quantity.symbol);
   document.read(path + ".unit", quantity.unit);
   quantity.display_unit = quantity.unit;
+  if (document.read(path + ".display_scale", quantity.display_scale, range::positive)) {
+    const std::string scale = detail::number_text(quantity.display_scale);
+    quantity.display_unit = quantity.unit == "1" ? scale : scale + " " + quantity.unit;
+  }
   document.read(path + ".display_unit", quantity.display_unit);
-  document.read(path + ".display_scale", quantity.display_scale, range::positive);
   document.read(path + ".objective", quantity.objective, range::positive);
   document.read(path + ".standard_error", quantity.has_standard_error);
   return quantity;

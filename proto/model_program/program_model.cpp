@@ -316,8 +316,8 @@ std::string ProgramPlan::question_of(RunIndex run, const std::vector<double>& dr
 std::vector<double> numbers_in(const Json& object, const std::vector<std::string_view>& names,
                                const std::function<void(std::string_view)>& refuse) {
   if (!object.is_object() || object.size() > names.size()) {
-    refuse(
-        fmt::format("must have a number for each of {} quantities and nothing else", names.size()));
+    refuse(fmt::format("must have a number for each of {} declared ones and nothing else",
+                       names.size()));
   }
   std::vector<double> numbers;
   for (const std::string_view name : names) {
@@ -352,13 +352,10 @@ void ProgramPlan::read(std::string_view answer, RunResult& result) const {
     names.push_back(quantity.name);
     if (quantity.has_standard_error) with_errors.push_back(quantity.name);
   }
-  std::vector<double> errors;
-  if (!with_errors.empty()) {
-    errors =
-        numbers_in(json.value("standard_error", Json()), with_errors, refuse_as("standard_error"));
-  }
   set_estimates(numbers_in(json.value("estimate", Json()), names, refuse_as("estimate")),
-                std::move(errors), result);
+                numbers_in(json.value("standard_error", Json::object()), with_errors,
+                           refuse_as("standard_error")),
+                result);
 }
 
 std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> requests,

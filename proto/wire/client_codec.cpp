@@ -209,6 +209,7 @@ void check(const proto::CampaignStatus& message) {
   require_magnitude(message.rate_hz(), "rate_hz");
   require_magnitude(message.remaining_s(), "remaining_s");
   check_text(message.storage_failure(), "storage_failure");
+  check_text(message.model_refusal(), "model_refusal");
   if (!message.missing_model().empty()) {
     require_name(message.missing_model(), "missing_model");
   }

@@ -94,7 +94,9 @@ int list_models(const ModelsOptions& options) {
   if (options.format == OutputFormat::json) {
     print_json(models_json());
   } else {
-    write_standard_output(terminal_text(models_table(), style_of(stdout)));
+    TerminalStyle style = style_of(stdout);
+    style.wraps_cells = true;
+    write_standard_output(terminal_text(models_table(), style));
   }
   return exit_done;
 }

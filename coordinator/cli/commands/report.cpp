@@ -56,7 +56,7 @@ std::string answers_text(const Review& review, const std::vector<StatedRequireme
   for (const StatedRequirement& each : stated) {
     text += (text.empty() ? "" : "\n") + requirement_text(answer_to(each, review), paint);
   }
-  return text;
+  return text + (review.note.empty() ? "" : "\n") + note_text(review.note);
 }
 
 int print_remote_report(const ReportOptions& options) {
@@ -75,7 +75,8 @@ int print_remote_report(const ReportOptions& options) {
 
 int exit_code_of(const Review& review, const std::vector<StatedRequirement>& stated) {
   const bool are_met = std::ranges::all_of(stated, [&](const StatedRequirement& each) {
-    return answer_to(each, review).check.verdict == RequirementVerdict::met;
+    return answer_to(each, review).check.verdict == RequirementVerdict::met &&
+           review.num_contradicting == 0;
   });
   return are_met ? exit_done : exit_not_met;
 }

@@ -376,7 +376,8 @@ int run_campaign(const RunOptions& options) {
   }
   const std::vector<RunRange> given_up = outcome.store.given_up_runs();
   if (!given_up.empty()) return say_given_up(given_up, outcome.store.num_runs());
-  return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
+  const bool is_doubtful = is_rule_missed(outcome.store) || outcome.store.num_contradicting() > 0;
+  return is_doubtful ? exit_not_met : exit_done;
 }
 
 namespace {

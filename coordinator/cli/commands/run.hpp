@@ -38,7 +38,8 @@ void add_run_options(CLI::App& command, RunOptions& options);
 
 /// Runs what is missing of a campaign with local workers and prints its tables. A run that crashes
 /// its workers is given up, and tried again the next time.
-/// @return An ExitCode; exit_not_met if all runs together do not reach the stop rule.
+/// @return An ExitCode; exit_not_met if all runs together do not reach the stop rule, or if
+///         audits contradict them.
 /// @throws Error if the campaign file, the database or the workers cannot be used.
 [[nodiscard]] int run_campaign(const RunOptions& options);
 

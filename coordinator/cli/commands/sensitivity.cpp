@@ -79,11 +79,20 @@ int print_sensitivity(const SensitivityOptions& options) {
   }
   const Paint paint = style_of(stdout).paint;
   std::string_view separator = "";
-  for (const std::size_t quantity : quantities) {
-    write_standard_output(fmt::format(
-        "{}{}", separator, sensitivity_text(drawn, quantity, explained, options.num_rows, paint)));
+  std::vector<std::size_t> unexplained;
+  const auto write = [&](const std::string& text) {
+    write_standard_output(fmt::format("{}{}", separator, text));
     separator = "\n";
+  };
+  for (const std::size_t quantity : quantities) {
+    const std::string text = sensitivity_text(drawn, quantity, explained, options.num_rows, paint);
+    if (text.empty()) {
+      unexplained.push_back(quantity);
+    } else {
+      write(text);
+    }
   }
+  if (!unexplained.empty()) write(unexplained_text(drawn, unexplained));
   return exit_done;
 }
 

@@ -20,7 +20,9 @@ int show_status(const ClientOptions& options) {
     if (options.format == OutputFormat::json) {
       print_json(status_json(status));
     } else {
-      write_standard_output(status_text(status, style_of(stdout)));
+      TerminalStyle style = style_of(stdout);
+      style.wraps_cells = true;
+      write_standard_output(status_text(status, style));
     }
     return exit_done;
   });

@@ -103,7 +103,8 @@ Rest rest_of(const Campaign& campaign, const RunOptions& run) {
                            store.stop_plan() == stop_plan_of(run, campaign.num_runs);
   const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.stop_rule.empty();
   if (is_complete && has_all) {
-    return {.num_missing = 0, .exit_code = is_rule_missed(store) ? exit_not_met : exit_done};
+    const bool is_doubtful = is_rule_missed(store) || store.num_contradicting() > 0;
+    return {.num_missing = 0, .exit_code = is_doubtful ? exit_not_met : exit_done};
   }
   return {.num_missing = campaign.num_runs - num_finished_runs, .exit_code = {}};
 }

@@ -1,5 +1,5 @@
 // Files that older programs made: here those of the first version of the schema, while the newest
-// has the steps of the program and one more (schema/0014_later.sql).
+// has the steps of the program and one more (schema/0015_later.sql).
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -57,7 +57,7 @@ class StoreMigration : public test::StoreTest {
 };
 
 // If the linker took the library's own files, there would be one version less.
-TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 14); }
+TEST_F(StoreMigration, HasOneVersionMoreHere) { EXPECT_EQ(detail::schema_version(), 15); }
 
 TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   make_older_file();
@@ -67,7 +67,7 @@ TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   EXPECT_THAT(store.finished_runs(),
               ElementsAre(RunRange{RunIndex{0}, 2}, RunRange{RunIndex{4}, 1}));
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.integer("PRAGMA user_version"), 14);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 15);
   EXPECT_EQ(
       database.text("SELECT group_concat(run_index || ' ' || worker || ' ' || attempt || ' ' || "
                     "d.compute_s || ' ' || received_unix_s, ';') "

@@ -350,7 +350,7 @@ TEST_F(StoreExecution, SaysWhoComputedTheResultsAndWhen) {
                " last_result_unix_s = 86420 + worker_key");
   const CampaignExecution execution = store.execution();
   EXPECT_EQ(execution.num_audited, 2U);
-  EXPECT_EQ(execution.num_contradicting, 1U);
+  EXPECT_EQ(store.num_contradicting(), 1U);
   EXPECT_EQ(execution.first_result_utc, "1970-01-02T00:00:00Z");
   EXPECT_EQ(execution.last_result_utc, "1970-01-02T03:00:00Z");
   EXPECT_EQ(execution.num_coordinators, 2U);

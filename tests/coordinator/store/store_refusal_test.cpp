@@ -150,7 +150,7 @@ TEST_F(StoreRefusal, OfAFileWhoseSchemaIsNotThatOfACampaign) {
       {"PRAGMA application_id = 77",
        "is not a Proofmass campaign: its application_id is 77, not 1349668211"},
       {"PRAGMA user_version = 99",
-       "is newer than this program: its user_version is 99, the newest known one 13"},
+       "is newer than this program: its user_version is 99, the newest known one 14"},
       {"PRAGMA user_version = 0", "is damaged: user_version = 0; restore it from a copy"},
       {"PRAGMA user_version = -1", "is damaged: user_version = -1; restore it from a copy"},
       {"PRAGMA user_version = 7",

@@ -144,7 +144,8 @@ TEST(Fitted, BreaksLinesThatATerminalHasNoRoomForBelowTheirBeginning) {
             "Label     " + std::string(69, 'a') + "\n          b\nnext\n");
   EXPECT_EQ(fitted("    " + std::string(75, 'a') + " b"),
             "    " + std::string(75, 'a') + "\n      b\n");
-  EXPECT_EQ(fitted(std::string(90, 'a') + " b"), std::string(90, 'a') + "\n  b\n");
+  EXPECT_EQ(fitted(std::string(90, 'a') + " b"),
+            std::string(79, 'a') + "\n  " + std::string(11, 'a') + "\n  b\n");
   EXPECT_EQ(fitted(std::string(90, ' ')), std::string(90, ' ') + "\n");
 }
 

@@ -3,15 +3,15 @@
 ALTER TABLE campaign ADD COLUMN colour TEXT NOT NULL DEFAULT 'grey';
 
 -- Fails on a note that says so.
-CREATE TABLE note_of_14 (
+CREATE TABLE note_of_15 (
   note_id   INTEGER PRIMARY KEY,
   time_utc  TEXT NOT NULL,
   text      TEXT NOT NULL CHECK (text <> 'fails')
 ) STRICT;
-INSERT INTO note_of_14 SELECT * FROM note;
+INSERT INTO note_of_15 SELECT * FROM note;
 DROP TABLE note;
-ALTER TABLE note_of_14 RENAME TO note;
+ALTER TABLE note_of_15 RENAME TO note;
 
 CREATE VIEW notes AS SELECT colour, text FROM campaign, note;
 
-PRAGMA user_version = 14;
+PRAGMA user_version = 15;
