@@ -13,6 +13,7 @@
 #include "coordinator/table/figures.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/statistics/comparison.hpp"
+#include "core/statistics/error_change.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -122,6 +123,29 @@ std::string label(const MemberNames& names, std::size_t member) {
   return names.title == lettered(0).title ? name : fmt::format("{}={}", names.title, name);
 }
 
+bool has_changes(const ComparedCampaign& member) {
+  return member.comparison && member.comparison->why_not_compared.empty();
+}
+
+/// Runs that are lost more often than in the first campaign are no sample of its draws.
+void add_selection(const ComparedCampaign& first, const ComparedCampaign& member,
+                   const MemberNames& names, std::size_t i, Table& table) {
+  if (!has_changes(member)) return;
+  const auto num_all = [](const ComparedCampaign& of) {
+    return of.results.statistics.num_estimated + of.results.missing.total();
+  };
+  const double p = fisher_exact_p_value({.num_first = num_all(first),
+                                         .tail_first = first.results.missing.total(),
+                                         .num_second = num_all(member),
+                                         .tail_second = member.results.missing.total()});
+  if (p >= significance) return;
+  table.remarks.push_back(
+      {fmt::format("{} lacks estimates as {} does not (p {}, Fisher's exact test): the runs that "
+                   "are compared are selected, and what they show does not hold for all draws.",
+                   label(names, i), label(names, 0), measured_figure(p)),
+       Tone::bad});
+}
+
 Table campaign_table(std::span<const ComparedCampaign> members, const MemberNames& names) {
   Table table{.columns = {{names.title, true},
                           {"file", true},
@@ -149,6 +173,7 @@ Table campaign_table(std::span<const ComparedCampaign> members, const MemberName
     if (member.results.missing.total() == 0) continue;
     table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.", names.names[i],
                                          reasons_text(member.results.missing))});
+    add_selection(members.front(), member, names, i, table);
   }
   return table;
 }
@@ -157,10 +182,6 @@ std::string figure_with_sign(double value) {
   const std::string figure = measured_figure(std::abs(value));
   if (figure == "0") return figure;
   return (value < 0.0 ? "-" : "+") + figure;
-}
-
-bool has_changes(const ComparedCampaign& member) {
-  return member.comparison && member.comparison->why_not_compared.empty();
 }
 
 /// How a quantity differs from the first campaign. Null where that is not compared.

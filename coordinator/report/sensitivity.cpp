@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "coordinator/report/json.hpp"
@@ -125,6 +126,29 @@ std::string note_of_p(std::size_t num_inputs, std::size_t num_quantities) {
       num_inputs, num_quantities);
 }
 
+/// Names the drivers whose values go together; empty if there are none.
+std::string dependence_note(const DrawnRuns& drawn, std::span<const Sensitivity> of_error,
+                            std::span<const Sensitivity> of_magnitude) {
+  std::set<std::size_t> inputs;
+  for (const auto& rows : {of_error, of_magnitude}) {
+    for (const Sensitivity& row : rows) inputs.insert(row.input);
+  }
+  // Chance makes less of independent values, and what is less hardly matters: r² is the share.
+  const double least = std::max(0.3, 4.0 / std::sqrt(static_cast<double>(drawn.runs.size())));
+  std::string pairs;
+  for (const std::size_t i : inputs) {
+    for (const std::size_t j : inputs) {
+      if (j <= i) continue;
+      const double r = linear_correlation(drawn.columns[i], drawn.columns[j]).value_or(0.0);
+      if (std::abs(r) < least) continue;
+      pairs += fmt::format("{}{} and {} ({:.2f})", pairs.empty() ? "" : ", ", drawn.names[i],
+                           drawn.names[j], r);
+    }
+  }
+  if (pairs.empty()) return "";
+  return "correlated, so that a share of one may be the other's: " + pairs;
+}
+
 /// What it means that no term was found: the fewer runs, the less.
 std::string not_found_text(const DrawnRuns& drawn) {
   const double percent =
@@ -134,8 +158,10 @@ std::string not_found_text(const DrawnRuns& drawn) {
   if (percent >= 100.0) {
     return fmt::format("{}: {} runs are too few to find any", text, drawn.runs.size());
   }
-  return fmt::format("{}: {} runs find one that explains {} % of its variance in half of the cases",
-                     text, drawn.runs.size(), measured_figure(percent));
+  return fmt::format(
+      "{}: {} runs find a quantity that explains {} % of its variance in half of the cases, a "
+      "product less often",
+      text, drawn.runs.size(), measured_figure(percent));
 }
 
 /// The sum of quantities and products of two that explains the error.
@@ -323,6 +349,8 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
         (position ? "% below: of the runs; "
                   : "% of variance: with its 95 % interval; rank: rank correlation; ") +
         note_of_p(both[1].size(), drawn.errors.size()));
+    const std::string dependence = dependence_note(drawn, of_error, of_magnitude);
+    if (!dependence.empty()) drivers.notes.push_back(dependence);
   }
   const std::string heading = position
                                   ? fmt::format("Run {}: error of {} {}, rank {} of {}", run->value,

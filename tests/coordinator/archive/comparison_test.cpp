@@ -381,6 +381,11 @@ TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
   const auto json = comparison_json(members);
   EXPECT_EQ(json["num_first_without_estimate"], 0);
   EXPECT_EQ(json["num_second_without_estimate"], 3);
+  EXPECT_THAT(comparison_text(members, lettered(2)), ::testing::Not(HasSubstr("are selected")));
+  // Of 0 of 8 and 40 of 46 scipy says 2.886e-6.
+  members[1].results.missing = {.num_lost = 40};
+  EXPECT_THAT(comparison_text(members, lettered(2)),
+              HasSubstr("B lacks estimates as A does not (p 2.9e-06,"));
 }
 
 }  // namespace
