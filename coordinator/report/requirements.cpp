@@ -87,7 +87,7 @@ std::string statement_line(const StatedRequirement& stated) {
 
 std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
-  if (answer.is_joint()) return "";
+  if (answer.is_joint() || answer.num_later > 0) return "";
   if (!answer.bound) {
     return fmt::format(
         "Bound        none of {}, for {} with {}\n",
@@ -166,7 +166,10 @@ std::optional<double> RequirementAnswer::relative_margin() const {
 
 std::string rule_text(const RequirementAnswer& answer) {
   if (answer.check.is_of_fixed_size) {
-    return fmt::format("{} draws, a number fixed before the first result", answer.check.num_runs);
+    const std::string later =
+        answer.num_later > 0 ? fmt::format("; {} more since", answer.num_later) : std::string();
+    return fmt::format("{} draws, a number fixed before the first result{}", answer.check.num_runs,
+                       later);
   }
   return "sequential: holds however often one looks and goes on";
 }
@@ -303,6 +306,13 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
 }
 
 void VerificationMatrix::add(const RunResult& result) {
+  // Where one of the first was given up, it is among all that were.
+  if (num_fixed_ && num_runs_ - missing_.num_given_up == *num_fixed_ &&
+      result.run.value == *num_fixed_) {
+    missing_of_fixed_ = missing_;
+    missing_of_fixed_.num_given_up = 0;
+    for (Row& row : rows_) row.of_fixed = row.exceedances;
+  }
   ++num_runs_;
   missing_.add(result);
   if (!result.is_completed()) return;
@@ -321,12 +331,25 @@ void VerificationMatrix::end_results() {
     row.answer.missing = missing_;
     row.answer.check =
         check_requirement(row.answer.requirement, row.exceedances.of(num_runs_), num_fixed_);
+    if (row.of_fixed) keep_fixed_verdict(row);
     std::ranges::sort(row.values);
     row.set_bound(std::exchange(row.values, {}));
   }
 }
 
+void VerificationMatrix::keep_fixed_verdict(Row& row) const {
+  RequirementAnswer& answer = row.answer;
+  if (answer.check.verdict != RequirementVerdict::undecided) return;
+  const RequirementCheck of_fixed =
+      check_requirement(answer.requirement, row.of_fixed->of(*num_fixed_), num_fixed_);
+  if (of_fixed.verdict == RequirementVerdict::undecided) return;
+  answer.check = of_fixed;
+  answer.missing = missing_of_fixed_;
+  answer.num_later = num_runs_ - *num_fixed_;
+}
+
 void VerificationMatrix::Row::set_bound(std::span<const double> ascending) {
+  if (answer.num_later > 0) return;
   // Runs without an estimate are the largest errors.
   const std::uint64_t order = answer.check.bound_order, num_missing = answer.missing.total();
   if (ascending.empty() || order <= num_missing) return;

@@ -85,6 +85,9 @@ struct RequirementAnswer {
   Quantity subject;  ///< What it is about, see requirement_subject(); unless is_joint().
   RequirementCheck check;
   MissingEstimates missing;  ///< The exceedances for want of an estimate.
+  /// Runs beyond a number that was fixed and decided: a verdict stands, whatever follows. There is
+  /// no bound then.
+  std::uint64_t num_later = 0;
   /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest
   /// ratio of an |error| to its objective.
   double limit = 1.0;
@@ -148,7 +151,7 @@ class VerificationMatrix {
                      std::optional<std::uint64_t> num_fixed,
                      const std::optional<ErrorBudget>& budget = std::nullopt);
 
-  /// @param result  Its numbers are in range.
+  /// @param result  Its numbers are in range. Results come in run order.
   void add(const RunResult& result);
   /// To be called after all results, for each parameter that a requirement is about.
   /// @param magnitudes  |error| of all completed runs, SI, ascending; at least one.
@@ -161,16 +164,18 @@ class VerificationMatrix {
     RequirementAnswer answer;
     Exceedances exceedances;
     std::vector<double> values = {};  ///< Of the runs that have an estimate; none of a parameter.
+    std::optional<Exceedances> of_fixed = {};  ///< Of the first num_fixed runs, if there are more.
 
     /// @param ascending  All values of the runs that have an estimate.
     void set_bound(std::span<const double> ascending);
   };
 
   void end_results();
+  void keep_fixed_verdict(Row& row) const;
 
   std::optional<std::uint64_t> num_fixed_;
   std::vector<Row> rows_;
-  MissingEstimates missing_;
+  MissingEstimates missing_, missing_of_fixed_;
   std::uint64_t num_runs_ = 0;
   bool have_results_ended_ = false;
 };

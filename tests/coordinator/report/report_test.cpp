@@ -369,6 +369,28 @@ TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
   EXPECT_EQ(answer.missing, (MissingEstimates{.num_no_draw = 1, .num_given_up = 1}));
 }
 
+// 0.95⁵⁹ = 0.048. With one run more the sequential verdict takes over, for which 60 are too few.
+TEST_F(StoredRequirement, StandsOnceAFixedNumberHasMetIt) {
+  Store store = Store::create(file(), test::campaign_of(59), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 59);
+  for (Delivery& delivery : deliveries) delivery.result.estimate = delivery.result.truth;
+  store.commit(deliveries);
+  store.extend(test::campaign_of(60), "");
+  std::vector<Delivery> later = test::deliveries_of(59, 60);
+  store.commit(later);
+  const std::vector<std::string> texts{"a_c12 < 9e-4 for 95% with 95%",
+                                       "a_c12 < 9e-4 for 99% with 95%"};
+  const auto rows =
+      read_review(store, test::campaign_of(60), ReviewDepth::matrix, numbered_requirements(texts))
+          .matrix;
+  EXPECT_EQ(rows[0].check.verdict, RequirementVerdict::met);
+  EXPECT_EQ(rows[0].check.num_runs, 59U);
+  EXPECT_EQ(rule_text(rows[0]), "59 draws, a number fixed before the first result; 1 more since");
+  EXPECT_FALSE(rows[0].bound);
+  EXPECT_EQ(rows[1].check.verdict, RequirementVerdict::undecided);
+  EXPECT_EQ(rows[1].check.num_runs, 60U);
+}
+
 TEST_F(StoredRequirement, IsSequentialWithAStopRule) {
   Store store = Store::create(file(), test::campaign_of(60), "");
   store.set_stop_plan({.stop_rule = "std(k2c) within 5%", .num_runs_max = 60, .failures_max = {}});
