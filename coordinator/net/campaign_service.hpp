@@ -133,16 +133,19 @@ class CampaignService {
   /// What a campaign has of those of its owner: nothing if it is finished or cancelled.
   [[nodiscard]] Holdings holdings_of(CampaignId id) const;
 
-  /// Keeps a served campaign from being closed, or changed by a stop rule, until change() or
-  /// let_go().
+  /// Changes a served campaign, which is kept meanwhile from being closed, or changed by a stop
+  /// rule.
+  /// @param change  Of its file, in the background; if it throws, that is the reply.
+  /// @param finish  What follows from it here.
+  /// @return False if too much work is pending: nothing is done.
   /// @throws Error if another request is changing it, or if nothing can be stored.
-  void take_hold(CampaignId id);
+  [[nodiscard]] bool change_held(CampaignId id, std::function<void()> change,
+                                 std::function<void()> finish, Respond respond);
   /// Nothing can be stored any more in the file of this campaign: nothing of it is left to do.
   void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
   [[nodiscard]] std::set<CampaignId> abandoned() const;
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
-  void let_go(CampaignId id) { served_.at(id).is_held = false; }
-  /// Changes a served campaign.
+  /// What follows from a change of a served campaign's file.
   /// @param definition  As its file has it now.
   /// @param wishes      Priority and audit fraction are looked at; if unset, they stay.
   void change(CampaignId id, std::shared_ptr<const Campaign> definition, const StopPlan& plan,
@@ -153,10 +156,13 @@ class CampaignService {
     return state_.campaigns.at(id).definition->num_runs;
   }
 
-  /// Carries out an action on a campaign that is served.
+  /// What the file of a served campaign is to have after an action.
   /// @param priority  For set_priority.
-  [[nodiscard]] proto::ReplyEnvelope control(CampaignId id, wire::ControlAction action,
-                                             int priority);
+  [[nodiscard]] CampaignControl control_after(CampaignId id, wire::ControlAction action,
+                                              int priority) const;
+  /// Carries out an action.
+  /// @param stored  Its control_after(), which is stored by now, for retry after RetriedRuns.
+  void control(CampaignId id, wire::ControlAction action, const CampaignControl& stored);
   [[nodiscard]] proto::ReplyEnvelope done_reply(CampaignId id) const;
 
   /// Takes a campaign that is finished or cancelled from the list and moves its file to where it is
@@ -209,7 +215,7 @@ class CampaignService {
     std::string trouble_told = {};             ///< Empty if all is well.
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
-    bool is_held = false;                      ///< See take_hold().
+    bool is_held = false;                      ///< See change_held().
     bool is_abandoned = false;                 ///< See abandon().
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;    ///< Of the runs committed here.
@@ -241,6 +247,7 @@ class CampaignService {
   void extend(CampaignId id, std::shared_ptr<const Campaign> definition);
   void resume(CampaignId id);
   void review_failures(CampaignId id, const Served& served);
+  [[nodiscard]] CampaignControl control_now(CampaignId id) const;
   void review_control(CampaignId id, Served& served);
   void review_notices(CampaignId id, Served& served);
   /// @param failure  Empty if the campaign is finished.
