@@ -15,7 +15,7 @@ namespace proofmass::coordinator {
 namespace {
 
 std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz) {
-  if (campaign.phase != Phase::active || rate_hz <= 0.0) return std::nullopt;
+  if (campaign.phase != Phase::active || campaign.lent.empty() || rate_hz <= 0.0) return {};
   return static_cast<double>(campaign.definition->num_runs - num_settled(campaign)) / rate_hz;
 }
 
@@ -209,9 +209,12 @@ void CampaignService::review() {
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
     const std::uint64_t num_committed = campaign.num_committed_here;
-    if (num_committed > served.num_committed_seen) {
-      served.rate.add(num_committed - served.num_committed_seen, now);
-      served.num_committed_seen = num_committed;
+    const std::uint64_t num_new = num_committed - served.num_committed_seen;
+    served.num_committed_seen = num_committed;
+    if (num_new > 0 || !campaign.lent.empty()) {
+      served.rate.add(num_new, now);
+    } else {
+      served.rate.wait(now);
     }
     review_failures(id, served);
     review_summary(id, served);

@@ -50,30 +50,37 @@ class WakingTime {
   Duration slept_{};
 };
 
-/// How fast runs have been stored lately: over the last two minutes, or since the meter began.
+/// How fast runs have been stored in the last two minutes, while any were lent.
 class RateMeter {
  public:
-  explicit RateMeter(TimePoint began_at) : began_at_(began_at) {}
+  explicit RateMeter(TimePoint began_at) : asked_at_(began_at) {}
 
-  /// More runs are stored.
+  /// Runs were lent since the last call of this or of wait(), and some are stored.
   /// @param now  Not before any earlier one.
   void add(std::uint64_t num_runs, TimePoint now) {
     if (counts_.empty() || now - counts_.back().began_at >= std::chrono::seconds(1)) {
-      counts_.push_back({.began_at = now, .num_runs = 0});
+      counts_.push_back({.began_at = asked_at_, .lent_for = {}, .num_runs = 0});
     }
     counts_.back().num_runs += num_runs;
+    counts_.back().lent_for += now - asked_at_;
     while (now - counts_.front().began_at > window_) counts_.pop_front();
+    asked_at_ = now;
   }
+
+  /// None was lent.
+  void wait(TimePoint now) { asked_at_ = now; }
 
   /// Runs per second; 0 if none was stored lately.
   [[nodiscard]] double rate_hz(TimePoint now) const {
-    const TimePoint from = std::max(began_at_, now - window_);
+    Duration lent_for{};
     std::uint64_t num_runs = 0;
     for (const Count& count : counts_) {
-      if (count.began_at >= from) num_runs += count.num_runs;
+      if (now - count.began_at > window_) continue;
+      num_runs += count.num_runs;
+      lent_for += count.lent_for;
     }
-    const double elapsed_s = std::chrono::duration<double>(now - from).count();
-    return elapsed_s > 0.0 ? static_cast<double>(num_runs) / elapsed_s : 0.0;
+    const double lent_for_s = std::chrono::duration<double>(lent_for).count();
+    return lent_for_s > 0.0 ? static_cast<double>(num_runs) / lent_for_s : 0.0;
   }
 
  private:
@@ -82,10 +89,11 @@ class RateMeter {
   /// What was stored in a second from `began_at` on.
   struct Count {
     TimePoint began_at;
+    Duration lent_for;  ///< The part of it in which runs were lent.
     std::uint64_t num_runs = 0;
   };
 
-  TimePoint began_at_;
+  TimePoint asked_at_;
   std::deque<Count> counts_;
 };
 
