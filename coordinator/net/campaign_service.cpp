@@ -73,6 +73,9 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   if (left_s) status.set_remaining_s(*left_s);
   status.set_storage_failure(campaign.storage_failure);
   if (lacks_workers(state_, campaign)) status.set_missing_model(campaign.model.version);
+  if (campaign.phase == Phase::cancelled && has_too_many_failures(campaign, served)) {
+    status.set_failures_max(*served.plan.failures_max);
+  }
   status.set_crashes_everywhere(crashes_everywhere(state_, campaign));
   return record;
 }
@@ -231,13 +234,21 @@ void CampaignService::review() {
   close_surplus(std::move(ended), now);
 }
 
+std::uint64_t CampaignService::num_failures_of(const CampaignState& campaign,
+                                               const Served& served) {
+  return served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
+}
+
+bool CampaignService::has_too_many_failures(const CampaignState& campaign, const Served& served) {
+  const std::optional<std::uint64_t>& failures_max = served.plan.failures_max;
+  return failures_max && num_failures_of(campaign, served) > *failures_max;
+}
+
 void CampaignService::review_failures(CampaignId id, const Served& served) {
-  if (!served.plan.failures_max) return;
   const CampaignState& campaign = state_.campaigns.at(id);
   if (campaign.phase != Phase::active && campaign.phase != Phase::paused) return;
-  const std::uint64_t num_failures =
-      served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
-  if (num_failures <= *served.plan.failures_max) return;
+  if (!has_too_many_failures(campaign, served)) return;
+  const std::uint64_t num_failures = num_failures_of(campaign, served);
   on_cancel(state_, id, outbox_);
   tell(served, fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
                            *served.plan.failures_max));

@@ -254,6 +254,11 @@ class CampaignService {
   [[nodiscard]] Phase phase_of(CampaignId id) const;
   void extend(CampaignId id, std::shared_ptr<const Campaign> definition);
   void resume(CampaignId id);
+  /// Runs without an estimate, those that were given up among them.
+  [[nodiscard]] static std::uint64_t num_failures_of(const CampaignState& campaign,
+                                                     const Served& served);
+  [[nodiscard]] static bool has_too_many_failures(const CampaignState& campaign,
+                                                  const Served& served);
   void review_failures(CampaignId id, const Served& served);
   [[nodiscard]] CampaignControl control_now(CampaignId id) const;
   void review_control(CampaignId id, Served& served);

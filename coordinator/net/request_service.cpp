@@ -45,6 +45,12 @@ void require_possible(const proto::CampaignStatus& campaign, wire::ControlAction
     return;
   }
   if (campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED && !is_retry) refuse("is finished");
+  if (action == wire::ControlAction::resume && campaign.has_failures_max()) {
+    refuse(
+        fmt::format("was cancelled as more than {} runs have no estimate; submit its file again "
+                    "with a larger --failures",
+                    campaign.failures_max()));
+  }
   if (campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED && needs_resume)
     refuse("is cancelled; resume it first");
   if (is_retry && campaign.num_given_up() == 0) refuse("has no run that was given up");

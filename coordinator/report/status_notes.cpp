@@ -79,6 +79,10 @@ std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
     add_trouble(
         "its model crashes at each worker, whose log says why; tried again within ten minutes");
   }
+  if (campaign.has_failures_max()) {
+    add_trouble(fmt::format("more than {} have no estimate: --failures cancelled it",
+                            counted(campaign.failures_max(), "run")));
+  }
   if (campaign.num_given_up() > 0) {
     add_trouble(counted(campaign.num_given_up(), "run") + " given up: crashed too often");
   }
