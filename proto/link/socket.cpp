@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <set>
 #include <string>
 #include <utility>
@@ -73,6 +76,19 @@ void enforce_domain(zmq::socket_t& socket) {
   }
 }
 
+/// Whether a socket listens at an ipc:// address. The library takes its path away from it.
+bool is_taken(const std::string& endpoint) {
+  constexpr std::string_view scheme = "ipc://";
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  if (!endpoint.starts_with(scheme) || endpoint.size() - scheme.size() >= sizeof address.sun_path) {
+    return false;
+  }
+  std::ranges::copy(endpoint.substr(scheme.size()), std::begin(address.sun_path));
+  const Descriptor caller(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const auto* const place = reinterpret_cast<const sockaddr*>(&address);
+  return connect(caller.number(), place, sizeof address) == 0 || errno == EAGAIN;
+}
+
 }  // namespace
 
 zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
@@ -89,6 +105,9 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
   }
   socket.set(zmq::sockopt::ipv6, may_be_ipv6(endpoint, EndpointUse::bind));
   if (listener) socket.set(zmq::sockopt::use_fd, *listener);
+  if (!listener && is_taken(endpoint)) {
+    throw Error(fmt::format("{} = {} ({})", option, endpoint, zmq_strerror(EADDRINUSE)));
+  }
   try {
     socket.bind(endpoint);
   } catch (const zmq::error_t& error) {
