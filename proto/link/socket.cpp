@@ -1,6 +1,7 @@
 #include "proto/link/socket.hpp"
 
 #include <fmt/format.h>
+#include <netdb.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -131,6 +132,18 @@ zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& securit
     socket.set(zmq::sockopt::curve_secretkey, security.identity->keys.secret_key.reveal());
   }
   return socket;
+}
+
+std::string reason_if_unknown(const std::string& endpoint) {
+  constexpr std::string_view scheme = "tcp://";
+  if (!endpoint.starts_with(scheme)) return {};
+  const std::size_t end = endpoint.rfind(':');
+  std::string host = endpoint.substr(scheme.size(), end - scheme.size());
+  if (host.starts_with('[')) return {};
+  addrinfo* found = nullptr;
+  const int error = getaddrinfo(host.c_str(), nullptr, nullptr, &found);
+  if (error == 0) freeaddrinfo(found);
+  return error == 0 ? "" : fmt::format("host {}: {}", host, gai_strerror(error));
 }
 
 Wake::Wake() : descriptor_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
@@ -271,6 +284,8 @@ void ConnectionMonitor::take_in(const SocketEvent& event, TimePoint now) {
       retry_at_.reset();
       break;
     case ZMQ_EVENT_DISCONNECTED:
+      // A server of something else, whose answer ZeroMQ takes for one of its first version.
+      if (!is_connected_ && accepted_at) report_break();
       is_connected_ = false;
       break;
     case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
@@ -288,8 +303,8 @@ void ConnectionMonitor::take_in(const SocketEvent& event, TimePoint now) {
       // ZeroMQ tries again by itself.
       if (accepted_at && now - *accepted_at >= silent_handshake_min) {
         report(unanswered_text(endpoint_));
-      } else if (++num_breaks_ >= breaks_before_report) {
-        report(broken_off_text(endpoint_, security_));
+      } else {
+        report_break();
       }
       break;
     default:
@@ -301,6 +316,10 @@ void ConnectionMonitor::refused(const std::string& text, TimePoint now) {
   report(text);
   retry_at_ = now + pause_;
   pause_ = std::min(2 * pause_, pause_max);
+}
+
+void ConnectionMonitor::report_break() {
+  if (++num_breaks_ >= breaks_before_report) report(broken_off_text(endpoint_, security_));
 }
 
 void ConnectionMonitor::report(const std::string& text) {
