@@ -358,13 +358,14 @@ void RequestService::check_limits(const std::string& campaign, const std::string
   holdings.size += added.size;
   const auto& [campaigns_max, size_max] = context_.config.limits;
   if (added.num_campaigns > 0 && holdings.num_campaigns > campaigns_max) {
-    throw Error(fmt::format("campaigns = {} (must be at most {} unfinished ones of the key {})",
-                            holdings.num_campaigns, campaigns_max, owner));
+    throw Error(fmt::format(
+        "campaigns = {} (must be at most {} unfinished ones of the key {}; cancel one, or wait)",
+        holdings.num_campaigns, campaigns_max, owner));
   }
   if (added.size > 0 && holdings.size > size_max) {
     throw Error(fmt::format(
         "definitions size = {} bytes (must be at most {} of the unfinished campaigns of the key "
-        "{})",
+        "{}; cancel one, or wait)",
         holdings.size, size_max, owner));
   }
 }

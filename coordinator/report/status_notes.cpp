@@ -99,7 +99,9 @@ namespace {
 
 std::string quarantine_note(const std::string& host) {
   return fmt::format(
-      "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`", host);
+      "host {0} is in quarantine: too many workers crashed there; `proofmass release {0} --connect "
+      "ADDRESS`",
+      host);
 }
 
 std::string refusal_note(const proto::StatusReply& status) {
