@@ -78,10 +78,10 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
 void require_no_fewer_runs(const Store& store, const Campaign& wanted,
                            const std::filesystem::path& database) {
   if (wanted.num_runs >= store.num_runs()) return;
-  throw UsageError(
-      fmt::format("campaign.runs = {} (must be at least {}, which {} was asked for; the number "
-                  "comes from --runs, or else from the campaign file)",
-                  wanted.num_runs, store.num_runs(), database.string()));
+  throw UsageError(fmt::format(
+      "campaign.runs = {} (must be at least {}, which {} was asked for; set runs in the "
+      "campaign file, or --runs of `run` and `submit`)",
+      wanted.num_runs, store.num_runs(), database.string()));
 }
 
 void check_until(const Campaign& wanted, const std::string& stop_rule) {

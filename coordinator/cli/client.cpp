@@ -171,21 +171,26 @@ void read_answer(const Ask& ask, const proto::AnswerReply& answer,
     throw Error("the answer became shorter while it was read; ask again");
 }
 
+std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer) {
+  if (answer.size() > Answers::size_max) {  // It would have to be held in memory.
+    throw Error(
+        fmt::format("answer = {} bytes (must be at most {})", answer.size(), Answers::size_max));
+  }
+  std::string bytes;
+  read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
+  Sha256 hash;
+  hash.add_bytes(bytes);
+  if (hash.finish() != answer.sha256())
+    throw Error("the answer is not the one that was announced; ask again");
+  return bytes;
+}
+
 int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
                  AnswerText text) {
   return with_connection({.connection = connection}, [&](const Ask& ask) {
     const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
     const proto::AnswerReply& answer = reply.answer();
-    if (answer.size() > Answers::size_max) {  // It would have to be held in memory.
-      throw Error(
-          fmt::format("answer = {} bytes (must be at most {})", answer.size(), Answers::size_max));
-    }
-    std::string bytes;
-    read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
-    Sha256 hash;
-    hash.add_bytes(bytes);
-    if (hash.finish() != answer.sha256())
-      throw Error("the answer is not the one that was announced; ask again");
+    const std::string bytes = answer_bytes(ask, answer);
     if (text == AnswerText::lines) print_lines(bytes);
     if (text == AnswerText::bytes) write_standard_output(bytes);
     flush_standard_output();

@@ -74,6 +74,10 @@ void add_optional_connection(CLI::App& command, ClientConnectionConfig& connecti
 void read_answer(const Ask& ask, const proto::AnswerReply& answer,
                  const std::function<void(std::string_view)>& take);
 
+/// The whole answer.
+/// @throws As read_answer() does; Error if it is too large or arrived damaged.
+[[nodiscard]] std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer);
+
 /// How the answer to a question is printed.
 enum class AnswerText : std::uint8_t {
   lines,  ///< By print_lines().

@@ -365,7 +365,9 @@ int run_proofmass_coordinator(int argc, char** argv) {
       "On SIGTERM it first lets workers deliver their results; on SIGINT or a second\n"
       "SIGTERM it ends at once; on SIGHUP it leaves workers to the next coordinator.",
       "proofmass-coordinator");
-  app.footer(exit_codes_text({exit_interrupted}));
+  app.footer(exit_codes_text({}) +
+             "\n  130  interrupted by SIGINT, with --exit-when-done also by SIGTERM; what is\n"
+             "       stored stands");
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
   wire::add_option_file(app, "File with these options, as in\n`bind = \"tcp://*:5555\"`",
                         "PROOFMASS_CONFIG");

@@ -341,7 +341,7 @@ void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
     state.refused_at = now;
     outbox.log({.severity = Severity::warning,
                 .kind = "worker_refused",
-                .fields = {{"name", hello.worker_name()}, Field::remark(reject->reject().text())}});
+                .fields = {{"name", hello.worker_name()}, Field::reason(reject->reject().text())}});
     outbox.send(id, *std::move(reject));
   } else {
     if (is_new) register_worker(state, id, session, from, hello, now, outbox);

@@ -153,8 +153,9 @@ BatchCommand condor_listing(const FactoryConfig& config) {
 
 BatchCommand local_submission(const FactoryConfig& config) {
   return {{"sh", "-c",
-           "setsid sh -c 'set -- \"$$\"; eval \"$0\"' \"$1\" >/dev/null 2>&1 </dev/null & echo $!",
-           "sh", config.worker_command}};
+           "exec 3>>\"$2\"; setsid sh -c 'set -- \"$$\"; eval \"$0\"' \"$1\" "
+           ">/dev/null 2>&3 </dev/null 3>&- & echo $!",
+           "sh", config.worker_command, config.workers_log}};
 }
 
 BatchCommand local_listing(const FactoryConfig&) { return {{"ps", "-e", "-o", "pid=,args="}}; }

@@ -24,8 +24,9 @@ std::string worker_name(const FactoryConfig& config, const std::string& id) {
   return config.name + "-" + id;
 }
 
-void count_failed_start(FactoryState& state, const std::string& id, const std::string& reason,
-                        const wire::Log& log) {
+void count_failed_start(FactoryState& state, const FactoryConfig& config, const std::string& id,
+                        std::string reason, const wire::Log& log) {
+  if (!config.workers_log.empty()) reason += fmt::format(" (its log: {})", config.workers_log);
   ++state.num_failed_starts;
   state.failure = fmt::format("allocation {}: {}", id, reason);
   log({.severity = wire::Severity::warning,
@@ -57,7 +58,8 @@ void look_at_allocations(FactoryState& state, const FactoryConfig& config, const
 }
 
 /// @return Allocations that run and whose worker does not come.
-std::vector<std::string> give_up_stuck(FactoryState& state, FactoryTime now, const wire::Log& log) {
+std::vector<std::string> give_up_stuck(FactoryState& state, const FactoryConfig& config,
+                                       FactoryTime now, const wire::Log& log) {
   std::vector<std::string> stuck;
   for (auto& [id, known] : state.allocations) {
     if (!is_coming(known) || !known.running_since || now - *known.running_since <= start_wait) {
@@ -65,17 +67,18 @@ std::vector<std::string> give_up_stuck(FactoryState& state, FactoryTime now, con
     }
     known.is_cancelled = true;
     stuck.push_back(id);
-    count_failed_start(state, id, "its worker did not register within 5 minutes", log);
+    count_failed_start(state, config, id, "its worker did not register within 5 minutes", log);
   }
   return stuck;
 }
 
-void forget_ended(FactoryState& state, FactoryTime now, const wire::Log& log) {
+void forget_ended(FactoryState& state, const FactoryConfig& config, FactoryTime now,
+                  const wire::Log& log) {
   std::erase_if(state.allocations, [&](const auto& entry) {
     const auto& [id, known] = entry;
     if (now - known.seen <= absence_wait) return false;
     if (is_coming(known)) {
-      count_failed_start(state, id, "it ended before its worker registered", log);
+      count_failed_start(state, config, id, "it ended before its worker registered", log);
     }
     return true;
   });
@@ -115,8 +118,8 @@ FactoryActions on_view(FactoryState& state, const FactoryConfig& config, const F
                        FactoryTime now, const wire::Log& log) {
   look_at_allocations(state, config, view, now);
   FactoryActions actions;
-  actions.cancelled = give_up_stuck(state, now, log);
-  forget_ended(state, now, log);
+  actions.cancelled = give_up_stuck(state, config, now, log);
+  forget_ended(state, config, now, log);
   if (view.rate_hz > 0.0 && !view.workers.empty()) {
     state.rate_per_worker_hz = view.rate_hz / static_cast<double>(view.workers.size());
   }

@@ -31,7 +31,8 @@ struct FactoryConfig {
   std::optional<unsigned> num_processors = {};   ///< Of a worker; nothing: a node of its own.
   std::vector<std::string> submit_options = {};  ///< Further ones, as the batch system has them.
   std::string batch_system = {};                 ///< Its name.
-  std::uint64_t interval_s = 30;                 ///< Between two looks.
+  std::string workers_log = {};   ///< File of local workers' standard error; else empty.
+  std::uint64_t interval_s = 30;  ///< Between two looks.
 };
 
 /// A worker's place in the queue of a batch system.

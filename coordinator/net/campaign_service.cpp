@@ -15,7 +15,7 @@ namespace proofmass::coordinator {
 namespace {
 
 std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz) {
-  if (campaign.phase != Phase::active || rate_hz <= 0.0) return std::nullopt;
+  if (campaign.phase != Phase::active || campaign.lent.empty() || rate_hz <= 0.0) return {};
   return static_cast<double>(campaign.definition->num_runs - num_settled(campaign)) / rate_hz;
 }
 
@@ -76,6 +76,9 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
     status.set_missing_model(campaign.model.version);
     status.set_model_refusal(campaign.model_refusal);
   }
+  if (campaign.phase == Phase::cancelled && has_too_many_failures(campaign, served)) {
+    status.set_failures_max(*served.plan.failures_max);
+  }
   status.set_crashes_everywhere(crashes_everywhere(state_, campaign));
   return record;
 }
@@ -96,7 +99,8 @@ CampaignService::Holdings CampaignService::holdings_of(CampaignId id) const {
   return {.num_campaigns = 1, .size = definition_size(*state_.campaigns.at(id).definition)};
 }
 
-void CampaignService::take_hold(CampaignId id) {
+bool CampaignService::change_held(CampaignId id, std::function<void()> change,
+                                  std::function<void()> finish, Respond respond) {
   const CampaignState& campaign = state_.campaigns.at(id);
   if (!campaign.storage_failure.empty()) throw Error(campaign.storage_failure);
   Served& served = served_.at(id);
@@ -104,13 +108,25 @@ void CampaignService::take_hold(CampaignId id) {
     throw Error(fmt::format("campaign = {} (is being changed by another request; try again)",
                             served.record.status.name()));
   }
-  served.is_held = true;
+  const auto work = [this, id, change = std::move(change), finish = std::move(finish),
+                     respond = std::move(respond)]() -> Background::Finish {
+    const std::string failure = failure_of(change);
+    return [this, id, failure, finish, respond] {
+      served_.at(id).is_held = false;
+      if (!failure.empty()) return respond(wire::error_reply(failure));
+      respond_or_say_why(respond, [&] {
+        finish();
+        respond(done_reply(id));
+      });
+    };
+  };
+  served.is_held = context_.background.post(work);
+  return served.is_held;
 }
 
 void CampaignService::change(CampaignId id, std::shared_ptr<const Campaign> definition,
                              const StopPlan& plan, const proto::SubmitRequest& wishes) {
   Served& served = served_.at(id);
-  served.is_held = false;
   extend(id, std::move(definition));
   if (plan != served.plan) {
     served.plan = plan;
@@ -135,9 +151,29 @@ void CampaignService::resume(CampaignId id) {
   on_resume(state_, id, context_.now(), outbox_);
 }
 
-proto::ReplyEnvelope CampaignService::control(CampaignId id, wire::ControlAction action,
-                                              int priority) {
+CampaignControl CampaignService::control_now(CampaignId id) const {
   const CampaignState& campaign = state_.campaigns.at(id);
+  return {.phase = phase_of(id),
+          .priority = campaign.priority,
+          .audit_fraction = campaign.audit_fraction};
+}
+
+CampaignControl CampaignService::control_after(CampaignId id, wire::ControlAction action,
+                                               int priority) const {
+  CampaignControl control = control_now(id);
+  const Phase phase = state_.campaigns.at(id).phase;
+  if (action == wire::ControlAction::set_priority) control.priority = priority;
+  if (action == wire::ControlAction::pause && phase == Phase::active) control.phase = Phase::paused;
+  if (action == wire::ControlAction::cancel && !has_ended(phase)) control.phase = Phase::cancelled;
+  if (action == wire::ControlAction::resume && phase != Phase::finished)
+    control.phase = Phase::active;
+  return control;
+}
+
+void CampaignService::control(CampaignId id, wire::ControlAction action,
+                              const CampaignControl& stored) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  served_.at(id).written = stored;  // What happened meanwhile is written after it.
   switch (action) {
     case wire::ControlAction::pause:
       on_pause(state_, id, outbox_);
@@ -149,17 +185,15 @@ proto::ReplyEnvelope CampaignService::control(CampaignId id, wire::ControlAction
       on_cancel(state_, id, outbox_);
       break;
     case wire::ControlAction::set_priority:
-      on_control(state_, id, priority, campaign.audit_fraction);
+      on_control(state_, id, stored.priority, campaign.audit_fraction);
       break;
     case wire::ControlAction::archive:
       PROOFMASS_EXPECT(false);  // See archive().
     case wire::ControlAction::retry:
-      writer_.write(id, RetriedRuns{});
       on_retry(state_, id, context_.now(), outbox_);
       break;
   }
   review();
-  return done_reply(id);
 }
 
 bool CampaignService::is_undecided(CampaignId id) const {
@@ -181,9 +215,12 @@ void CampaignService::review() {
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
     const std::uint64_t num_committed = campaign.num_committed_here;
-    if (num_committed > served.num_committed_seen) {
-      served.rate.add(num_committed - served.num_committed_seen, now);
-      served.num_committed_seen = num_committed;
+    const std::uint64_t num_new = num_committed - served.num_committed_seen;
+    served.num_committed_seen = num_committed;
+    if (num_new > 0 || !campaign.lent.empty()) {
+      served.rate.add(num_new, now);
+    } else {
+      served.rate.wait(now);
     }
     review_failures(id, served);
     review_summary(id, served);
@@ -200,13 +237,21 @@ void CampaignService::review() {
   close_surplus(std::move(ended), now);
 }
 
+std::uint64_t CampaignService::num_failures_of(const CampaignState& campaign,
+                                               const Served& served) {
+  return served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
+}
+
+bool CampaignService::has_too_many_failures(const CampaignState& campaign, const Served& served) {
+  const std::optional<std::uint64_t>& failures_max = served.plan.failures_max;
+  return failures_max && num_failures_of(campaign, served) > *failures_max;
+}
+
 void CampaignService::review_failures(CampaignId id, const Served& served) {
-  if (!served.plan.failures_max) return;
   const CampaignState& campaign = state_.campaigns.at(id);
   if (campaign.phase != Phase::active && campaign.phase != Phase::paused) return;
-  const std::uint64_t num_failures =
-      served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
-  if (num_failures <= *served.plan.failures_max) return;
+  if (!has_too_many_failures(campaign, served)) return;
+  const std::uint64_t num_failures = num_failures_of(campaign, served);
   on_cancel(state_, id, outbox_);
   tell(served, fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
                            *served.plan.failures_max));
@@ -218,13 +263,10 @@ void CampaignService::review_failures(CampaignId id, const Served& served) {
 }
 
 void CampaignService::review_control(CampaignId id, Served& served) {
-  const CampaignState& campaign = state_.campaigns.at(id);
-  const CampaignControl control{.phase = phase_of(id),
-                                .priority = campaign.priority,
-                                .audit_fraction = campaign.audit_fraction};
+  const CampaignControl control = control_now(id);
   if (control == served.written) return;
   writer_.write(id, control);
-  const bool has_new_results = served.num_summarised != campaign.num_committed_here;
+  const bool has_new_results = served.num_summarised != state_.campaigns.at(id).num_committed_here;
   if (control.phase == Phase::finished && has_new_results) {
     served.is_summary_due = files_ != nullptr;
   }

@@ -50,30 +50,37 @@ class WakingTime {
   Duration slept_{};
 };
 
-/// How fast runs have been stored lately: over the last two minutes, or since the meter began.
+/// How fast runs have been stored in the last two minutes, while any were lent.
 class RateMeter {
  public:
-  explicit RateMeter(TimePoint began_at) : began_at_(began_at) {}
+  explicit RateMeter(TimePoint began_at) : asked_at_(began_at) {}
 
-  /// More runs are stored.
+  /// Runs were lent since the last call of this or of wait(), and some are stored.
   /// @param now  Not before any earlier one.
   void add(std::uint64_t num_runs, TimePoint now) {
     if (counts_.empty() || now - counts_.back().began_at >= std::chrono::seconds(1)) {
-      counts_.push_back({.began_at = now, .num_runs = 0});
+      counts_.push_back({.began_at = asked_at_, .lent_for = {}, .num_runs = 0});
     }
     counts_.back().num_runs += num_runs;
+    counts_.back().lent_for += now - asked_at_;
     while (now - counts_.front().began_at > window_) counts_.pop_front();
+    asked_at_ = now;
   }
+
+  /// None was lent.
+  void wait(TimePoint now) { asked_at_ = now; }
 
   /// Runs per second; 0 if none was stored lately.
   [[nodiscard]] double rate_hz(TimePoint now) const {
-    const TimePoint from = std::max(began_at_, now - window_);
+    Duration lent_for{};
     std::uint64_t num_runs = 0;
     for (const Count& count : counts_) {
-      if (count.began_at >= from) num_runs += count.num_runs;
+      if (now - count.began_at > window_) continue;
+      num_runs += count.num_runs;
+      lent_for += count.lent_for;
     }
-    const double elapsed_s = std::chrono::duration<double>(now - from).count();
-    return elapsed_s > 0.0 ? static_cast<double>(num_runs) / elapsed_s : 0.0;
+    const double lent_for_s = std::chrono::duration<double>(lent_for).count();
+    return lent_for_s > 0.0 ? static_cast<double>(num_runs) / lent_for_s : 0.0;
   }
 
  private:
@@ -82,10 +89,11 @@ class RateMeter {
   /// What was stored in a second from `began_at` on.
   struct Count {
     TimePoint began_at;
+    Duration lent_for;  ///< The part of it in which runs were lent.
     std::uint64_t num_runs = 0;
   };
 
-  TimePoint began_at_;
+  TimePoint asked_at_;
   std::deque<Count> counts_;
 };
 
@@ -133,16 +141,19 @@ class CampaignService {
   /// What a campaign has of those of its owner: nothing if it is finished or cancelled.
   [[nodiscard]] Holdings holdings_of(CampaignId id) const;
 
-  /// Keeps a served campaign from being closed, or changed by a stop rule, until change() or
-  /// let_go().
+  /// Changes a served campaign, which is kept meanwhile from being closed, or changed by a stop
+  /// rule.
+  /// @param change  Of its file, in the background; if it throws, that is the reply.
+  /// @param finish  What follows from it here.
+  /// @return False if too much work is pending: nothing is done.
   /// @throws Error if another request is changing it, or if nothing can be stored.
-  void take_hold(CampaignId id);
+  [[nodiscard]] bool change_held(CampaignId id, std::function<void()> change,
+                                 std::function<void()> finish, Respond respond);
   /// Nothing can be stored any more in the file of this campaign: nothing of it is left to do.
   void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
   [[nodiscard]] std::set<CampaignId> abandoned() const;
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
-  void let_go(CampaignId id) { served_.at(id).is_held = false; }
-  /// Changes a served campaign.
+  /// What follows from a change of a served campaign's file.
   /// @param definition  As its file has it now.
   /// @param wishes      Priority and audit fraction are looked at; if unset, they stay.
   void change(CampaignId id, std::shared_ptr<const Campaign> definition, const StopPlan& plan,
@@ -153,10 +164,13 @@ class CampaignService {
     return state_.campaigns.at(id).definition->num_runs;
   }
 
-  /// Carries out an action on a campaign that is served.
+  /// What the file of a served campaign is to have after an action.
   /// @param priority  For set_priority.
-  [[nodiscard]] proto::ReplyEnvelope control(CampaignId id, wire::ControlAction action,
-                                             int priority);
+  [[nodiscard]] CampaignControl control_after(CampaignId id, wire::ControlAction action,
+                                              int priority) const;
+  /// Carries out an action.
+  /// @param stored  Its control_after(), which is stored by now, for retry after RetriedRuns.
+  void control(CampaignId id, wire::ControlAction action, const CampaignControl& stored);
   [[nodiscard]] proto::ReplyEnvelope done_reply(CampaignId id) const;
 
   /// Takes a campaign that is finished or cancelled from the list and moves its file to where it is
@@ -209,7 +223,7 @@ class CampaignService {
     std::string trouble_told = {};             ///< Empty if all is well.
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
-    bool is_held = false;                      ///< See take_hold().
+    bool is_held = false;                      ///< See change_held().
     bool is_abandoned = false;                 ///< See abandon().
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;    ///< Of the runs committed here.
@@ -240,7 +254,13 @@ class CampaignService {
   [[nodiscard]] Phase phase_of(CampaignId id) const;
   void extend(CampaignId id, std::shared_ptr<const Campaign> definition);
   void resume(CampaignId id);
+  /// Runs without an estimate, those that were given up among them.
+  [[nodiscard]] static std::uint64_t num_failures_of(const CampaignState& campaign,
+                                                     const Served& served);
+  [[nodiscard]] static bool has_too_many_failures(const CampaignState& campaign,
+                                                  const Served& served);
   void review_failures(CampaignId id, const Served& served);
+  [[nodiscard]] CampaignControl control_now(CampaignId id) const;
   void review_control(CampaignId id, Served& served);
   void review_notices(CampaignId id, Served& served);
   /// @param failure  Empty if the campaign is finished.

@@ -300,6 +300,10 @@ void CampaignService::archive(CampaignId id, const Respond& respond) {
         "this coordinator has no directory, which archived campaigns need; start it with "
         "--directory");
   }
+  const std::string file = record_of(id).file.stem().string();
+  if (context_.config.directory->has_archived(file)) {
+    throw Error(fmt::format("archived/{}.db is there already; rename that file first", file));
+  }
   const auto found = served_.find(id);
   if (found == served_.end()) return move_to_archive(id, respond);
   // Says what became of the file and how to go on; there is nothing to be moved.

@@ -101,6 +101,8 @@ class ClientConnection::Impl {
                       "overloaded, or no coordinator",
                       waited_s));
     }
+    const std::string reason = wire::reason_if_unknown(config_.endpoint);
+    if (!reason.empty()) fail(reason);
     fail(fmt::format("nobody there; waited {:.3g} s", waited_s));
   }
 

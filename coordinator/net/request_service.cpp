@@ -45,6 +45,12 @@ void require_possible(const proto::CampaignStatus& campaign, wire::ControlAction
     return;
   }
   if (campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED && !is_retry) refuse("is finished");
+  if (action == wire::ControlAction::resume && campaign.has_failures_max()) {
+    refuse(
+        fmt::format("was cancelled as more than {} runs have no estimate; submit its file again "
+                    "with a larger --failures",
+                    campaign.failures_max()));
+  }
   if (campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED && needs_resume)
     refuse("is cancelled; resume it first");
   if (is_retry && campaign.num_given_up() == 0) refuse("has no run that was given up");
@@ -59,6 +65,16 @@ StopPlan plan_of(const Request& request) {
 }
 
 void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
+
+/// Makes a campaign active, with the priority and audit fraction of the request if it has them.
+void write_wishes(Store& store, const Request& request) {
+  const proto::SubmitRequest& sent = request.message.submit();
+  CampaignControl control = store.control();
+  control.phase = Phase::active;
+  if (sent.has_priority()) control.priority = sent.priority();
+  if (sent.has_audit_fraction()) control.audit_fraction = sent.audit_fraction();
+  write(store, control);
+}
 
 /// What cannot be read at all is left to the command that answers, which says why.
 /// @throws Error if another campaign's file has taken the place of this one's.
@@ -144,8 +160,32 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
     return begins ? reopen(*campaign, action, respond)
                   : respond(campaigns_.done_reply(campaign->id));
   }
+  if (campaigns_.is_held(campaign->id)) {
+    return defer([this, request, asker, respond] { control(request, asker, respond); }, respond);
+  }
   check_limits(name, *campaign, action);
-  respond(campaigns_.control(campaign->id, action, request.priority()));
+  control_served(campaign->id, action, request.priority(), respond);
+}
+
+// Stored before it is done and acknowledged: what cannot be stored changes nothing.
+void RequestService::control_served(CampaignId id, wire::ControlAction action, int priority,
+                                    const Respond& respond) {
+  const CampaignControl control = campaigns_.control_after(id, action, priority);
+  const bool is_begun = campaigns_.change_held(
+      id,
+      [this, id, action, control] {
+        std::vector<Entry> entries;
+        if (action == wire::ControlAction::retry) entries.emplace_back(RetriedRuns{});
+        entries.emplace_back(control);
+        context_.writer.access(id, [&](Store& store) { (void)store.write(entries); });
+      },
+      [this, id, action, control] { campaigns_.control(id, action, control); }, respond);
+  if (!is_begun) refuse_as_too_many();
+}
+
+void RequestService::defer(std::function<void()> ask_again, const Respond& respond) {
+  if (deferred_.size() == Background::num_pending_max) refuse_as_too_many();
+  deferred_.push_back({.ask_again = std::move(ask_again), .respond = respond});
 }
 
 proto::ReplyEnvelope RequestService::status(const proto::StatusRequest& request) const {
@@ -250,9 +290,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     require_right(asker, Right::submit);
   }
   if (is_busy(name)) {
-    if (deferred_.size() == Background::num_pending_max) refuse_as_too_many();
-    deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
-    return;
+    return defer([this, request, asker, respond] { submit(request, asker, respond); }, respond);
   }
   UnderWay under_way{.owner = entry ? entry->status.owner() : asker.name,
                      .added = added_by(*request, entry)};
@@ -273,8 +311,7 @@ bool RequestService::is_busy(const std::string& name) const {
 void RequestService::review() {
   answers_.review();
   for (const Deferred& waiting : std::exchange(deferred_, {})) {
-    respond_or_say_why(waiting.respond,
-                       [&] { submit(waiting.request, waiting.asker, waiting.respond); });
+    respond_or_say_why(waiting.respond, waiting.ask_again);
   }
 }
 
@@ -321,13 +358,14 @@ void RequestService::check_limits(const std::string& campaign, const std::string
   holdings.size += added.size;
   const auto& [campaigns_max, size_max] = context_.config.limits;
   if (added.num_campaigns > 0 && holdings.num_campaigns > campaigns_max) {
-    throw Error(fmt::format("campaigns = {} (must be at most {} unfinished ones of the key {})",
-                            holdings.num_campaigns, campaigns_max, owner));
+    throw Error(fmt::format(
+        "campaigns = {} (must be at most {} unfinished ones of the key {}; cancel one, or wait)",
+        holdings.num_campaigns, campaigns_max, owner));
   }
   if (added.size > 0 && holdings.size > size_max) {
     throw Error(fmt::format(
         "definitions size = {} bytes (must be at most {} of the unfinished campaigns of the key "
-        "{})",
+        "{}; cancel one, or wait)",
         holdings.size, size_max, owner));
   }
 }
@@ -343,15 +381,7 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
       [&files, request, asker, known] {
         return files.open(*request->campaign, plan_of(*request), asker, known);
       },
-      [request](Store& store) {
-        const proto::SubmitRequest& sent = request->message.submit();
-        CampaignControl control = store.control();
-        control.phase = Phase::active;
-        if (sent.has_priority()) control.priority = sent.priority();
-        if (sent.has_audit_fraction()) control.audit_fraction = sent.audit_fraction();
-        write(store, control);
-      },
-      std::move(respond));
+      [request](Store& store) { write_wishes(store, *request); }, std::move(respond));
 }
 
 void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction action,
@@ -442,35 +472,28 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
   const std::uint64_t num_runs =
       horizon_of(plan, request->campaign->num_runs, campaigns_.num_runs_of(id));
   const bool has_new_plan = plan != campaigns_.plan_of(id);
-  campaigns_.take_hold(id);
-  const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
-                     file = campaigns_.record_of(id).file]() -> Background::Finish {
-    std::shared_ptr<const Campaign> definition;
-    const std::string failure = failure_of([&] {
-      const std::unique_ptr<Campaign> wanted = request->campaign->clone();
-      wanted->num_runs = num_runs;
-      context_.config.files->require_same(file, *wanted);
-      context_.writer.access(id, [&](Store& store) {
-        definition = context_.config.files->extend(store, *wanted);
-        if (has_new_plan) store.set_stop_plan(plan);
+  const auto extended = std::make_shared<std::shared_ptr<const Campaign>>();
+  const bool is_begun = campaigns_.change_held(
+      id,
+      [this, id, request, plan, num_runs, has_new_plan, extended,
+       file = campaigns_.record_of(id).file] {
+        const std::unique_ptr<Campaign> wanted = request->campaign->clone();
+        wanted->num_runs = num_runs;
+        context_.config.files->require_same(file, *wanted);
+        context_.writer.access(id, [&](Store& store) {
+          *extended = context_.config.files->extend(store, *wanted);
+          if (has_new_plan) store.set_stop_plan(plan);
+          if (store.control().phase != Phase::finished) write_wishes(store, *request);
+        });
+      },
+      [this, id, request, plan, extended] {
+        campaigns_.change(id, *extended, plan, request->message.submit());
+      },
+      [this, request, respond = std::move(respond)](proto::ReplyEnvelope reply) {
+        under_way_.erase(request->campaign->name);
+        respond(std::move(reply));
       });
-    });
-    return [this, id, request, plan, definition, failure, respond] {
-      under_way_.erase(request->campaign->name);
-      if (!failure.empty()) {
-        campaigns_.let_go(id);
-        return respond(wire::error_reply(failure));
-      }
-      respond_or_say_why(respond, [&] {
-        campaigns_.change(id, definition, plan, request->message.submit());
-        respond(campaigns_.done_reply(id));
-      });
-    };
-  };
-  if (!context_.background.post(work)) {
-    campaigns_.let_go(id);
-    refuse_as_too_many();
-  }
+  if (!is_begun) refuse_as_too_many();
   under_way_.emplace(request->campaign->name, std::move(under_way));
 }
 

@@ -50,14 +50,16 @@ class RequestService {
     Holdings added;  ///< To the unfinished campaigns of the owner.
   };
 
-  /// A submission that waits.
+  /// A request that waits until its campaign is no longer being changed.
   struct Deferred {
-    Submitted request;
-    Asker asker;
+    std::function<void()> ask_again;
     Respond respond;
   };
 
   void control(const proto::ControlRequest& request, const Asker& asker, const Respond& respond);
+  void control_served(CampaignId id, wire::ControlAction action, int priority,
+                      const Respond& respond);
+  void defer(std::function<void()> ask_again, const Respond& respond);
   [[nodiscard]] proto::ReplyEnvelope status(const proto::StatusRequest& request) const;
   [[nodiscard]] proto::ReplyEnvelope workers(const proto::WorkersRequest& request) const;
   [[nodiscard]] proto::ReplyEnvelope release_host(const std::string& host);

@@ -81,6 +81,10 @@ std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
     add_trouble(
         "its model crashes at each worker, whose log says why; tried again within ten minutes");
   }
+  if (campaign.has_failures_max()) {
+    add_trouble(fmt::format("more than {} have no estimate: --failures cancelled it",
+                            counted(campaign.failures_max(), "run")));
+  }
   if (campaign.num_given_up() > 0) {
     add_trouble(counted(campaign.num_given_up(), "run") + " given up: crashed too often");
   }
@@ -97,7 +101,9 @@ namespace {
 
 std::string quarantine_note(const std::string& host) {
   return fmt::format(
-      "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`", host);
+      "host {0} is in quarantine: too many workers crashed there; `proofmass release {0} --connect "
+      "ADDRESS`",
+      host);
 }
 
 std::string refusal_note(const proto::StatusReply& status) {

@@ -40,6 +40,18 @@ bool is_complete(const Database& database, const proto::CampaignStatus& status) 
          database.count("SELECT count(*) FROM delivery") == status.num_done();
 }
 
+/// The limit that cancelled the campaign, if one did.
+std::optional<std::uint64_t> failures_exceeded(const Database& database,
+                                               const proto::CampaignStatus& status) {
+  if (status.phase() != proto::CAMPAIGN_PHASE_CANCELLED) return std::nullopt;
+  return database
+      .first_row(
+          "SELECT CASE WHEN failures_max < (SELECT count(*) FROM run_failure) +"
+          " (SELECT count(*) FROM run_result WHERE status <> 1) THEN failures_max END"
+          " FROM campaign")
+      .optional_count(0);
+}
+
 }  // namespace
 
 std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
@@ -75,6 +87,9 @@ CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth)
   proto::CampaignStatus& status = record.status;
   status.set_num_given_up(database.count("SELECT count(*) FROM run_failure"));
   status.set_num_done(database.count("SELECT coalesce(max(num_finished), 0) FROM summary"));
+  if (const auto failures_max = failures_exceeded(database, status)) {
+    status.set_failures_max(*failures_max);
+  }
   const bool is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
   const bool can_go_on =
       kind.model->can_simulate() || kind.model->reference_digest(best_instruction_set()) != 0;

@@ -1,7 +1,10 @@
 #include "proto/link/socket.hpp"
 
 #include <fmt/format.h>
+#include <netdb.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <set>
 #include <string>
 #include <utility>
@@ -73,6 +77,19 @@ void enforce_domain(zmq::socket_t& socket) {
   }
 }
 
+/// Whether a socket listens at an ipc:// address. The library takes its path away from it.
+bool is_taken(const std::string& endpoint) {
+  constexpr std::string_view scheme = "ipc://";
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  if (!endpoint.starts_with(scheme) || endpoint.size() - scheme.size() >= sizeof address.sun_path) {
+    return false;
+  }
+  std::ranges::copy(endpoint.substr(scheme.size()), std::begin(address.sun_path));
+  const Descriptor caller(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const auto* const place = reinterpret_cast<const sockaddr*>(&address);
+  return connect(caller.number(), place, sizeof address) == 0 || errno == EAGAIN;
+}
+
 }  // namespace
 
 zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
@@ -89,6 +106,9 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
   }
   socket.set(zmq::sockopt::ipv6, may_be_ipv6(endpoint, EndpointUse::bind));
   if (listener) socket.set(zmq::sockopt::use_fd, *listener);
+  if (!listener && is_taken(endpoint)) {
+    throw Error(fmt::format("{} = {} ({})", option, endpoint, zmq_strerror(EADDRINUSE)));
+  }
   try {
     socket.bind(endpoint);
   } catch (const zmq::error_t& error) {
@@ -112,6 +132,18 @@ zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& securit
     socket.set(zmq::sockopt::curve_secretkey, security.identity->keys.secret_key.reveal());
   }
   return socket;
+}
+
+std::string reason_if_unknown(const std::string& endpoint) {
+  constexpr std::string_view scheme = "tcp://";
+  if (!endpoint.starts_with(scheme)) return {};
+  const std::size_t end = endpoint.rfind(':');
+  std::string host = endpoint.substr(scheme.size(), end - scheme.size());
+  if (host.starts_with('[')) return {};
+  addrinfo* found = nullptr;
+  const int error = getaddrinfo(host.c_str(), nullptr, nullptr, &found);
+  if (error == 0) freeaddrinfo(found);
+  return error == 0 ? "" : fmt::format("host {}: {}", host, gai_strerror(error));
 }
 
 Wake::Wake() : descriptor_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
@@ -252,6 +284,8 @@ void ConnectionMonitor::take_in(const SocketEvent& event, TimePoint now) {
       retry_at_.reset();
       break;
     case ZMQ_EVENT_DISCONNECTED:
+      // A server of something else, whose answer ZeroMQ takes for one of its first version.
+      if (!is_connected_ && accepted_at) report_break();
       is_connected_ = false;
       break;
     case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
@@ -269,8 +303,8 @@ void ConnectionMonitor::take_in(const SocketEvent& event, TimePoint now) {
       // ZeroMQ tries again by itself.
       if (accepted_at && now - *accepted_at >= silent_handshake_min) {
         report(unanswered_text(endpoint_));
-      } else if (++num_breaks_ >= breaks_before_report) {
-        report(broken_off_text(endpoint_, security_));
+      } else {
+        report_break();
       }
       break;
     default:
@@ -282,6 +316,10 @@ void ConnectionMonitor::refused(const std::string& text, TimePoint now) {
   report(text);
   retry_at_ = now + pause_;
   pause_ = std::min(2 * pause_, pause_max);
+}
+
+void ConnectionMonitor::report_break() {
+  if (++num_breaks_ >= breaks_before_report) report(broken_off_text(endpoint_, security_));
 }
 
 void ConnectionMonitor::report(const std::string& text) {

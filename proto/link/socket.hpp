@@ -46,6 +46,11 @@ inline constexpr std::chrono::milliseconds handshake_duration_max{5000};
 [[nodiscard]] zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security,
                                         KeyRole role = KeyRole::worker);
 
+/// Why the host of an address to connect to has no address, for people; empty if it has one. Waits
+/// for the answer.
+/// @param endpoint  check_endpoint() holds.
+[[nodiscard]] std::string reason_if_unknown(const std::string& endpoint);
+
 /// Wakes a loop that polls file descriptors, from any thread.
 class Wake {
  public:
@@ -128,6 +133,7 @@ class ConnectionMonitor {
 
   void take_in(const SocketEvent& event, TimePoint now);
   void refused(const std::string& text, TimePoint now);
+  void report_break();
   void report(const std::string& text);
   void connect();
   void reconnect(TimePoint now);

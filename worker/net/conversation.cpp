@@ -220,9 +220,9 @@ void Conversation::on_progress(TimePoint now) {
 
 void Conversation::on_tick(TimePoint now) {
   if (ending_) return;
-  if (now - heard_at_ >= config_.give_up_after) {
+  if (silence(now) >= config_.give_up_after) {
     return end(Ending::Kind::failed,
-               fmt::format("coordinator = silent for {} s ({})", whole_seconds(now - heard_at_),
+               fmt::format("coordinator = silent for {} s ({})", whole_seconds(silence(now)),
                            refusal_.empty() ? "is it running?" : refusal_));
   }
   if (revocation_ && now - revocation_->first >= config_.refusal_memory) {

@@ -106,6 +106,8 @@ class Conversation {
 
   /// Present once the conversation is over.
   [[nodiscard]] const std::optional<Ending>& ending() const { return ending_; }
+  /// Since it was last heard of the coordinator, or since the conversation began.
+  [[nodiscard]] Duration silence(TimePoint now) const { return now - heard_at_; }
   [[nodiscard]] bool is_registered() const { return is_registered_; }
   [[nodiscard]] bool is_leaving() const { return leaving_.has_value(); }
   [[nodiscard]] std::size_t num_unacknowledged() const { return unacknowledged_.size(); }

@@ -36,6 +36,7 @@ constexpr std::chrono::milliseconds tick_interval(100);
 constexpr std::chrono::seconds awake_turn_max(1);       ///< Longer ones were spent asleep.
 constexpr std::chrono::milliseconds fault_interval(5);  ///< How exactly faults are timed.
 constexpr std::chrono::seconds spool_interval(30);
+constexpr std::chrono::seconds silence_min(10);  ///< Of which a warning says that nobody answers.
 
 TimePoint time_now() { return std::chrono::steady_clock::now(); }
 
@@ -229,8 +230,10 @@ class Service {
   Service(const ServeConfig& config, Execution& execution, const wire::Wake& progress,
           StopSignals& signals)
       : log_(config.log),
+        endpoint_(config.endpoint),
         progress_(progress),
         signals_(signals),
+        silence_min_(std::min<Duration>(silence_min, config.conversation.give_up_after / 2)),
         link_(config.endpoint, config.security),
         wait_max_(link_.has_faults() ? fault_interval : tick_interval),
         conversation_(
@@ -240,6 +243,11 @@ class Service {
         keeping_(config.spool, config.hello.model_version(), conversation_, log_) {}
 
   Ending run() {
+    if (const std::string reason = wire::reason_if_unknown(endpoint_); !reason.empty()) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "coordinator_unknown",
+            .fields = {{"connect", endpoint_}, Field::reason(reason)}});
+    }
     TimePoint tick_at = time_now();
     TimePoint turned_at = tick_at;
     while (!conversation_.ending()) {
@@ -311,8 +319,22 @@ class Service {
     }
   }
 
+  /// After twice the time each time.
+  void warn_of_silence(Duration silence) {
+    if (silence < silence_min_) warn_after_ = silence_min_;
+    if (silence < warn_after_) return;
+    warn_after_ = 2 * silence;
+    const auto silent_s = std::chrono::floor<std::chrono::seconds>(silence).count();
+    log_({.severity = wire::Severity::warning,
+          .kind = "coordinator_silent",
+          .fields = {{"connect", endpoint_},
+                     {"silent_s", static_cast<std::uint64_t>(silent_s)},
+                     Field::remark("(tries again)")}});
+  }
+
   void on_tick(TimePoint now) {
     conversation_.on_tick(now);
+    warn_of_silence(conversation_.silence(now));
     if (conversation_.take_reconnection()) link_.reconnect();
     keeping_.on_tick(now);
     if (conversation_.is_registered()) notices_.ready();
@@ -321,9 +343,12 @@ class Service {
   }
 
   const wire::Log& log_;
+  const std::string& endpoint_;
   const wire::Wake& progress_;
   StopSignals& signals_;
   EndRequest former_request_ = EndRequest::none;
+  Duration silence_min_;  ///< Before it gives up, in any case.
+  Duration warn_after_ = silence_min_;
   CoordinatorLink link_;
   Duration wait_max_;
   Conversation conversation_;

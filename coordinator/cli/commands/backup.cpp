@@ -1,6 +1,7 @@
 #include <filesystem>
 
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
@@ -14,9 +15,14 @@ struct BackupOptions {
 
 int back_up_database(const BackupOptions& options, const IsStopped& is_stopped) {
   check_new_file("destination", options.destination);
-  Store::open_read_only(options.database).back_up(options.destination, [&] {
+  const auto heed_stop = [&] {
     if (is_stopped()) throw Interrupted();
-  });
+  };
+  const Store store = Store::open_read_only(options.database);
+  // A copy may be all that is left some day: one of a damaged file must not pass for a good one.
+  check_definition_digest(store);
+  (void)walk_checked(store, [&](const RunResult&) { heed_stop(); });
+  store.back_up(options.destination, heed_stop);
   print_written(options.destination, options.format);
   return exit_done;
 }

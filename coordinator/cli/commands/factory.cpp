@@ -94,6 +94,13 @@ FactoryConfig checked(const FactoryOptions& options) {
                                  config.workers_min, config.workers_max));
   }
   config.worker_command = worker_command(options);
+  if (options.system.running.empty()) {
+    config.workers_log = std::filesystem::absolute(config.name + "-workers.log").string();
+    if (!options.worker_keys.empty() && !std::filesystem::is_directory(options.worker_keys)) {
+      throw UsageError(
+          fmt::format("--worker-keys = {} (must be a directory)", options.worker_keys));
+    }
+  }
   for (const std::string& option : config.submit_options) {
     (void)checked_line("submit-option", option);
   }

@@ -106,6 +106,7 @@ void add_submit(CLI::App& app, Command& chosen) {
   command.add_flag("--wait", options.waits,
                    "Show the progress until the campaign is\nfinished, as `watch` does");
   add_client_options(command, options.client);
+  command.footer(exit_codes_text({exit_not_met}));
 }
 
 }  // namespace proofmass::coordinator

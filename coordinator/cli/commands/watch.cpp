@@ -122,6 +122,22 @@ WatchMode mode_for(OutputFormat format) {
   return takes_escapes(stdout) ? WatchMode::screen : WatchMode::lines;
 }
 
+/// As `run` does, says that a finished campaign has missed its stop rule. A coordinator without the
+/// program that answers cannot tell.
+int exit_code_by_rule(const Ask& ask, const std::string& campaign) {
+  proto::RequestEnvelope question = question_about(campaign, proto::QUESTION_REPORT);
+  question.mutable_answer()->add_options("--json");
+  const proto::ReplyEnvelope reply = ask(question);
+  if (!reply.has_answer()) return exit_done;
+  const Json report = Json::parse(answer_bytes(ask, reply.answer()), nullptr, false);
+  const Json stop = report.is_object() ? report.value("stop", Json()) : Json();
+  if (!stop.is_object() || !stop.value("is_missed", false)) return exit_done;
+  const Json answer = stop.value("answer", Json());
+  wire::say(fmt::format("{}: {}: {}\n", campaign, stop.value("rule", ""),
+                        answer.is_string() ? answer.get<std::string>() : "not checked"));
+  return exit_not_met;
+}
+
 }  // namespace
 
 int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
@@ -143,8 +159,9 @@ int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
 int watch_on_standard_output(const Ask& ask, const std::optional<std::string>& campaign,
                              OutputFormat format) {
   WatchDisplay display(mode_for(format), stdout);
-  return watch_until_over(ask, campaign, display,
-                          [] { std::this_thread::sleep_for(std::chrono::seconds(1)); });
+  const int exit_code = watch_until_over(
+      ask, campaign, display, [] { std::this_thread::sleep_for(std::chrono::seconds(1)); });
+  return campaign && exit_code == exit_done ? exit_code_by_rule(ask, *campaign) : exit_code;
 }
 
 namespace {
@@ -168,6 +185,7 @@ void add_watch(CLI::App& app, Command& chosen) {
       app, chosen, "watch", "Show the progress until campaigns are finished", watch_campaigns);
   command.add_option("NAME", options.campaign, "Campaign; all by default");
   add_client_options(command, options.client);
+  command.footer(exit_codes_text({exit_not_met}));
 }
 
 }  // namespace proofmass::coordinator

@@ -60,6 +60,7 @@ class WatchDisplay {
                                    WatchDisplay& display, const std::function<void()>& pause);
 
 /// watch_until_over() with a WatchDisplay on standard output, each second.
+/// @return Also exit_not_met, if the campaign that is named has missed its stop rule.
 [[nodiscard]] int watch_on_standard_output(const Ask& ask,
                                            const std::optional<std::string>& campaign,
                                            OutputFormat format);

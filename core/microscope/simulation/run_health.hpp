@@ -64,6 +64,12 @@ struct LoopMonitor {
     common_square.add(square(common.x));
     sensor_square[0].add(square(m1.x));
     sensor_square[1].add(square(m2.x));
+    add_residual(common, weights);
+  }
+
+  /// The line at f_EP alone.
+  template <typename Weight>
+  PROOFMASS_INLINE void add_residual(const Vector3<T>& common, const Weight* weights) {
     for (std::size_t i = 0; i < 2; ++i) {
       residual[0][i] = residual[0][i] + T(weights[i]) * common.x;
       residual[1][i] = residual[1][i] + T(weights[i]) * common.y;

@@ -373,7 +373,11 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
       if constexpr (kind.is_test || kind.lines == RecordedLines::further) {
         if (weights.residual == nullptr) continue;
       }
-      if constexpr (kind.monitoring == Monitoring::on) {
+      if constexpr (kind.is_test) {
+        using T = std::remove_cvref_t<decltype(eotvos_parameter)>;
+        const auto& measured = observation.measured_K;
+        monitor.add_residual(T(0.5) * (measured[0] + measured[1]), weights.residual + 2 * k);
+      } else if constexpr (kind.monitoring == Monitoring::on) {
         monitor.add(constants.sensors, observation, weights.residual + 2 * k);
       }
     }

@@ -61,7 +61,7 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
                      "not served, tried again: campaign database = d/b.db (is locked)\n"
                      "and 1 more such file\n"
                      "host n7 is in quarantine: too many workers crashed there; "
-                     "`proofmass release n7`\n"))
+                     "`proofmass release n7\n  --connect ADDRESS`\n"))
       << text;
 }
 
@@ -198,7 +198,8 @@ TEST(StatusTable, MarksTroubleAndNothingElse) {
         "mine: 3 runs without an estimate",
         "mine: 1 result compared with a second computation: 1 differ (none may)",
         "not served, tried again: is damaged",
-        "host node7 is in quarantine: too many workers crashed there; `proofmass release node7`"}) {
+        "host node7 is in quarantine: too many workers crashed there; `proofmass release node7 "
+        "--connect ADDRESS`"}) {
     EXPECT_NE(text.find(bad + line + plain + "\n"), std::string::npos) << line << "\n" << text;
   }
   EXPECT_EQ(std::ranges::count(text, '\033'), 14) << "and the titles";

@@ -13,7 +13,7 @@ class WorkerTest : public DispatchFixture {
     const auto reject = outbox.take_sent<proto::Reject>(second);
     EXPECT_EQ(reject.reason(), reason);
     EXPECT_EQ(reject.text(), text);
-    EXPECT_EQ(outbox.take_events(), Strings{"worker_refused name=w " + text});
+    EXPECT_EQ(outbox.take_events(), Strings{"worker_refused name=w reason=\"" + text + "\""});
     EXPECT_FALSE(state.workers.contains(second));
     EXPECT_EQ(state.num_refusals, num_refusals_before + 1);
     EXPECT_EQ(state.last_refusal, "w: " + text);

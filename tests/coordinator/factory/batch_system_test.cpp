@@ -161,16 +161,18 @@ TEST(BatchSystem, FindsLocalWorkersByNameAndProcess) {
               ElementsAre("17 runs"));
 }
 
-TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
+TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifierAndALog) {
   FactoryConfig config = example();
   const std::string file = testing::TempDir() + "/started-by-factory";
-  config.worker_command = "echo \"$1\" $$ > " + wire::shell_word(file + ".new") + " && mv " +
-                          wire::shell_word(file + ".new") + " " + wire::shell_word(file);
+  config.workers_log = file + ".log";
+  config.worker_command = "echo here >&2; echo \"$1\" $$ > " + wire::shell_word(file + ".new") +
+                          " && mv " + wire::shell_word(file + ".new") + " " +
+                          wire::shell_word(file);
   const BatchSystem& local = system_of("local");
   const std::string id = id_in(output_of(local.submission(config)), "sh");
   const std::string seen = output_of(
-      {{"sh", "-c", "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\"; rm \"$0\"", file}});
-  EXPECT_EQ(seen, id + " " + id + "\n");
+      {{"sh", "-c", "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\"*; rm \"$0\"*", file}});
+  EXPECT_EQ(seen, id + " " + id + "\nhere\n");
 }
 
 TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {

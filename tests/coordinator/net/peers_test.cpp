@@ -214,17 +214,23 @@ TEST(WakingTime, LeavesOutWhatIsLongerThanAGap) {
   EXPECT_EQ(time.at(zero_hour + hours(2)), zero_hour + 2 * WakingTime::gap_max + milliseconds(100));
 }
 
-TEST(RateMeter, CountsFromItsBeginning) {
+TEST(RateMeter, LeavesOutTheTimeInWhichNothingIsLent) {
   RateMeter meter(zero_hour);
   EXPECT_EQ(meter.rate_hz(zero_hour), 0.0);
-  meter.add(30, zero_hour + seconds(5));
-  EXPECT_EQ(meter.rate_hz(zero_hour + seconds(10)), 3.0);
+  meter.wait(zero_hour + seconds(50));
+  EXPECT_EQ(meter.rate_hz(zero_hour + seconds(50)), 0.0);
+  meter.add(0, zero_hour + seconds(55));
+  meter.add(30, zero_hour + seconds(60));
+  EXPECT_EQ(meter.rate_hz(zero_hour + seconds(60)), 3.0);
+  meter.wait(zero_hour + seconds(90));
+  EXPECT_EQ(meter.rate_hz(zero_hour + seconds(90)), 3.0);
 }
 
 TEST(RateMeter, ForgetsWhatIsOlderThanTwoMinutes) {
   RateMeter meter(zero_hour);
   meter.add(1000, zero_hour + seconds(1));
-  meter.add(240, zero_hour + seconds(200));
+  meter.wait(zero_hour + seconds(190));
+  meter.add(20, zero_hour + seconds(200));
   EXPECT_EQ(meter.rate_hz(zero_hour + seconds(200)), 2.0);
   EXPECT_EQ(meter.rate_hz(zero_hour + seconds(400)), 0.0);
 }
@@ -233,6 +239,7 @@ TEST(RateMeter, ForgetsWhatIsOlderThanTwoMinutes) {
 TEST(RateMeter, CountsAllOfASecondTogether) {
   RateMeter meter(zero_hour);
   for (int i = 0; i < 1000; ++i) meter.add(2, zero_hour + milliseconds(i));
+  meter.add(0, zero_hour + seconds(10));
   EXPECT_EQ(meter.rate_hz(zero_hour + seconds(10)), 200.0);
 }
 

@@ -72,7 +72,8 @@ class ServiceLimits : public test::ServiceTest {
   }
 
   const std::string too_many =
-      "error: campaigns = 2 (must be at most 1 unfinished ones of the key anna)";
+      "error: campaigns = 2 (must be at most 1 unfinished ones of the key anna; cancel one, or "
+      "wait)";
   const Asker anna{.name = "anna", .rights = usual_rights};
   const wire::KeyPair coordinator_keys = wire::make_key_pair();
   const wire::KeyPair client_keys = wire::make_key_pair();
@@ -122,7 +123,7 @@ TEST_F(ServiceLimits, HoldForALargerDefinitionOfAnUnfinishedCampaign) {
   EXPECT_THAT(submit(with_table("a", 10)), StartsWith("campaign a: active"));
   EXPECT_EQ(submit(with_table("a", 20)),
             fmt::format("error: definitions size = {} bytes (must be at most {} of the unfinished "
-                        "campaigns of the key anna)",
+                        "campaigns of the key anna; cancel one, or wait)",
                         larger_size, size));
   EXPECT_THAT(submit(with_table("a", 10)), StartsWith("campaign a: active, 10 runs"));
 }
@@ -150,7 +151,7 @@ TEST_F(ServiceLimits, HoldForTheDefinitionsOfClosedCampaigns) {
   EXPECT_THAT(submit("c"), StartsWith("campaign c: active"));
   EXPECT_EQ(control(ControlAction::resume, "b"),
             fmt::format("error: definitions size = {} bytes (must be at most {} of the unfinished "
-                        "campaigns of the key anna)",
+                        "campaigns of the key anna; cancel one, or wait)",
                         2 * size, 2 * size - 1));
   EXPECT_EQ(Store::open_read_only(directory / "b.db").control().phase,
             wire::CampaignPhase::cancelled);

@@ -143,6 +143,20 @@ TEST_F(ServeTest, ComesAgainOnAnotherConnectionIfItIsClosedOut) {
   EXPECT_EQ(ending.get().reason, "told to stop");
 }
 
+TEST_F(ServeTest, WarnsOfAnAddressAtWhichNobodyAnswers) {
+  std::vector<std::string> events;
+  config.log = [&](const wire::Event& event) { events.push_back(wire::to_text(event)); };
+  config.conversation.give_up_after = std::chrono::seconds(1);
+  EXPECT_EQ(start_worker().get().kind, Ending::Kind::failed);
+  EXPECT_EQ(events.front(),
+            "coordinator_silent connect=" + config.endpoint + " silent_s=0 (tries again)");
+  events.clear();
+  config.endpoint = "tcp://coordinator.invalid:5555";
+  EXPECT_EQ(start_worker().get().kind, Ending::Kind::failed);
+  EXPECT_THAT(events.front(), testing::StartsWith("coordinator_unknown connect=" + config.endpoint +
+                                                  " reason=\"host coordinator.invalid: "));
+}
+
 TEST_F(ServeTest, SaysWhyTheSpoolCannotBeUsed) {
   config.spool = directory / "missing" / "spool";
   std::future<Ending> ending = start_worker();
