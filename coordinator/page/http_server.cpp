@@ -275,22 +275,6 @@ tcp::endpoint endpoint_of(const HttpConfig& config) {
 /// when it makes the descriptor.
 void keep_from_children(int descriptor) { (void)fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
-/// Signals are for the other threads of the process.
-class BlockedSignals {
- public:
-  BlockedSignals() {
-    sigset_t all;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~BlockedSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  BlockedSignals(const BlockedSignals&) = delete;
-  BlockedSignals& operator=(const BlockedSignals&) = delete;
-
- private:
-  sigset_t before_{};
-};
-
 }  // namespace
 
 HttpAnswer plain_answer(unsigned status, std::string_view text) {
@@ -304,8 +288,12 @@ struct HttpServer::Impl {
     shared.config = config;
     shared.handler = std::move(handler);
     listen();
-    const BlockedSignals blocked;
-    thread = std::thread([this] { context.run(); });
+    thread = std::thread([this] {
+      sigset_t all;  // Signals are for the other threads of the process.
+      sigfillset(&all);
+      pthread_sigmask(SIG_SETMASK, &all, nullptr);
+      context.run();
+    });
   }
   ~Impl() {
     context.stop();

@@ -1,14 +1,15 @@
-#include <dirent.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <sstream>
 #include <string_view>
+#include <system_error>
 
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/status_notes.hpp"
@@ -160,14 +161,11 @@ double boot_unix_s() {
 }
 
 std::uint64_t num_open_descriptors() {
-  DIR* const directory = opendir("/proc/self/fd");
-  if (directory == nullptr) return 0;
-  std::uint64_t count = 0;
-  while (const dirent* entry = readdir(directory)) {
-    if (entry->d_name[0] != '.') ++count;
-  }
-  closedir(directory);
-  return count - 1;  // Without the directory itself.
+  std::error_code error;
+  const std::filesystem::directory_iterator directory("/proc/self/fd", error);
+  if (error) return 0;
+  // Without the directory itself.
+  return static_cast<std::uint64_t>(std::distance(begin(directory), end(directory))) - 1;
 }
 
 }  // namespace

@@ -40,7 +40,6 @@ void check_name(const std::filesystem::path& path) {
   if (!path.has_filename()) detail::refuse_file(path, "names no file");
 }
 
-/// @param fill  Writes what a new campaign does not have.
 void check_deliveries(std::span<const Entry> entries, const ResultSchema& results,
                       std::uint64_t num_runs) {
   for (const Entry& entry : entries) {
@@ -49,6 +48,7 @@ void check_deliveries(std::span<const Entry> entries, const ResultSchema& result
   }
 }
 
+/// @param fill  Writes what a new campaign does not have, in transactions of its own.
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition, const std::function<void(Database&)>& fill) {
   Database database(draft, Access::create);
@@ -58,8 +58,8 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   detail::migrate(database, campaign.model(), campaign.results());
   detail::insert_campaign(database, campaign, definition);
   detail::replace_budgets(database, campaign.error_budget(), {});
-  fill(database);
   transaction.commit();
+  fill(database);
 }
 
 }  // namespace
@@ -92,6 +92,7 @@ Store Store::create_with_results(const std::filesystem::path& path, const Campai
                                  std::string_view definition, bool is_number_fixed,
                                  const std::function<std::vector<Entry>()>& next_entries) {
   return create_filled(path, campaign, definition, [&](Database& database) {
+    Transaction transaction(database);
     if (!is_number_fixed) {
       database.execute("UPDATE campaign SET num_runs_fixed = NULL");
       detail::write_table_digest(database, campaign.model());
@@ -102,6 +103,7 @@ Store Store::create_with_results(const std::filesystem::path& path, const Campai
       check_deliveries(entries, results, campaign.num_runs);
       (void)rows.write(entries);
     }
+    transaction.commit();
   });
 }
 

@@ -77,8 +77,6 @@ class Statement {
   void bind(int position, const std::optional<Value>& value) {
     value ? bind(position, *value) : bind_null(position);
   }
-  /// Binds what a cell of a row of another statement holds.
-  void bind_cell(int position, const Statement& row, int column);
 
   /// Goes to the next row; false, and reset, after the last.
   [[nodiscard]] bool step();

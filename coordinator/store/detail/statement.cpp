@@ -42,11 +42,6 @@ void Statement::bind(int position, double value) {
 
 void Statement::bind_null(int position) { check(sqlite3_bind_null(statement_.get(), position)); }
 
-void Statement::bind_cell(int position, const Statement& row, int column) {
-  check(sqlite3_bind_value(statement_.get(), position,
-                           sqlite3_column_value(row.statement_.get(), column)));
-}
-
 void Statement::bind(int position, std::string_view value) {
   check(sqlite3_bind_text64(statement_.get(), position, value.data(), value.size(),
                             SQLITE_TRANSIENT, SQLITE_UTF8));
