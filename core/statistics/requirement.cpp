@@ -251,10 +251,11 @@ std::optional<std::uint64_t> runs_to_decide(const VerdictRule& rule,
 }  // namespace
 
 Requirement parse_requirement(std::string_view text, std::span<const std::string_view> parameters) {
-  detail::Phrase phrase("requirement", text,
-                        "PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%\" or \"all objectives "
-                        "for COVERAGE% with CONFIDENCE%",
-                        parameters);
+  detail::Phrase phrase(
+      "requirement", text,
+      "PARAMETER < LIMIT (or <=) for COVERAGE% with CONFIDENCE%\" or \"all objectives "
+      "for COVERAGE% with CONFIDENCE%",
+      parameters);
   const Requirement requirement = detail::read_requirement(phrase);
   phrase.expect_end();
   return requirement;
