@@ -127,22 +127,27 @@ bool has_changes(const ComparedCampaign& member) {
   return member.comparison && member.comparison->why_not_compared.empty();
 }
 
-/// Runs that are lost more often than in the first campaign are no sample of its draws.
-void add_selection(const ComparedCampaign& first, const ComparedCampaign& member,
-                   const MemberNames& names, std::size_t i, Table& table) {
-  if (!has_changes(member)) return;
-  const auto num_all = [](const ComparedCampaign& of) {
-    return of.results.statistics.num_estimated + of.results.missing.total();
+/// Runs that are lost more or less often than in the first campaign select others of the draws.
+void add_selection(std::span<const ComparedCampaign> members, const MemberNames& names,
+                   std::size_t i, Table& table) {
+  if (i == 0 || !has_changes(members[i])) return;
+  const MissingEstimates &first = members.front().results.missing,
+                         &other = members[i].results.missing;
+  const auto num_all = [&](std::size_t member) {
+    const ReadResults& results = members[member].results;
+    return results.statistics.num_estimated + results.missing.total();
   };
-  const double p = fisher_exact_p_value({.num_first = num_all(first),
-                                         .tail_first = first.results.missing.total(),
-                                         .num_second = num_all(member),
-                                         .tail_second = member.results.missing.total()});
-  if (p >= significance) return;
+  const double p = fisher_exact_p_value({.num_first = num_all(0),
+                                         .tail_first = first.total(),
+                                         .num_second = num_all(i),
+                                         .tail_second = other.total()});
+  const auto num_others = static_cast<double>(members.size() - 1);
+  if (p * num_others >= significance) return;  // By Bonferroni.
   table.remarks.push_back(
-      {fmt::format("{} lacks estimates as {} does not (p {}, Fisher's exact test): the runs that "
-                   "are compared are selected, and what they show does not hold for all draws.",
-                   label(names, i), label(names, 0), measured_figure(p)),
+      {fmt::format("{} and {} lack estimates not equally often (p {}, Fisher's exact test): the "
+                   "runs that are compared are selected, and what they show does not hold for all "
+                   "draws.",
+                   label(names, 0), label(names, i), measured_figure(p)),
        Tone::bad});
 }
 
@@ -170,10 +175,11 @@ Table campaign_table(std::span<const ComparedCampaign> members, const MemberName
       add_unpaired(of.second, of.num_pairs, other, first, table);
     }
     add_own_quantities(members.front(), member, names.names.front(), names.names[i], table);
-    if (member.results.missing.total() == 0) continue;
-    table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.", names.names[i],
-                                         reasons_text(member.results.missing))});
-    add_selection(members.front(), member, names, i, table);
+    if (member.results.missing.total() > 0) {
+      table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.",
+                                           names.names[i], reasons_text(member.results.missing))});
+    }
+    add_selection(members, names, i, table);
   }
   return table;
 }

@@ -55,7 +55,8 @@ std::string exit_codes_text(std::initializer_list<ExitCode> further) {
       "  0    done\n"
       "  1    cannot be done: disk, database, address, workers that crash, time limit\n"
       "  2    wrong usage, campaign file or query";
-  if (may_be(exit_not_met)) text += "\n  3    a requirement, a stop rule or an audit is not met";
+  if (may_be(exit_not_met))
+    text += "\n  3    a requirement or stop rule is not met, or audits contradict";
   if (may_be(exit_interrupted)) {
     text += "\n  130  interrupted by SIGINT or SIGTERM; what is stored stands";
   }

@@ -268,8 +268,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
       "so many draws meet the requirement.",
       "Bound: with the confidence of the row, the stated part of all draws does not exceed it "
-      "(order "
-      "statistics, any law). Margin: (limit − bound) / limit."};
+      "(order statistics, any law). Margin: (limit − bound) / limit."};
   if (std::ranges::any_of(review.matrix, &RequirementAnswer::is_joint)) {
     notes.emplace_back(
         "All objectives together: limit and bound are of the largest ratio of an |error| to its "

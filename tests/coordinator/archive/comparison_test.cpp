@@ -385,7 +385,9 @@ TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
   // Of 0 of 8 and 40 of 46 scipy says 2.886e-6.
   members[1].results.missing = {.num_lost = 40};
   EXPECT_THAT(comparison_text(members, lettered(2)),
-              HasSubstr("B lacks estimates as A does not (p 2.9e-06,"));
+              HasSubstr("A and B lack estimates not equally often (p 2.9e-06,"));
+  std::swap(members[0].results.missing, members[1].results.missing);
+  EXPECT_THAT(comparison_text(members, lettered(2)), HasSubstr("not equally often"));
 }
 
 }  // namespace
