@@ -92,7 +92,7 @@ struct RequirementAnswer {
   /// ratio of an |error| to its objective.
   double limit = 1.0;
   /// Upper tolerance bound of the |error| or of that ratio by order statistics: with the confidence
-  /// of the requirement, `coverage` of all draws stay below. Empty if draws are too few.
+  /// of the requirement, `coverage` of all draws do not exceed it. Empty if draws are too few.
   std::optional<double> bound;
   bool is_of_error = false;       ///< About the |error| of a parameter, not a budget or all.
   std::optional<RunValue> worst;  ///< In the unit of the limit; empty if no run has an estimate.
