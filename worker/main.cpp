@@ -1,5 +1,8 @@
-#include "worker/program.hpp"
+namespace proofmass::worker {
 
-int main(int argc, char** argv) {
-  return proofmass::worker::run_worker(argc, argv, {.name = "proofmass-worker"});
-}
+// Not by its header, which takes the compiler two seconds: each model's programs compile this.
+int run_proofmass_worker(int argc, char** argv);
+
+}  // namespace proofmass::worker
+
+int main(int argc, char** argv) { return proofmass::worker::run_proofmass_worker(argc, argv); }

@@ -450,4 +450,8 @@ int run_worker(int argc, char** argv, const Program& program) {
   });
 }
 
+int run_proofmass_worker(int argc, char** argv) {
+  return run_worker(argc, argv, {.name = "proofmass-worker"});
+}
+
 }  // namespace proofmass::worker

@@ -63,4 +63,7 @@ struct Program {
 /// usage, 3 a computation hangs.
 [[nodiscard]] int run_worker(int argc, char** argv, const Program& program);
 
+/// `proofmass-worker`.
+[[nodiscard]] int run_proofmass_worker(int argc, char** argv);
+
 }  // namespace proofmass::worker

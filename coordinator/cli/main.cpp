@@ -1,3 +1,8 @@
-#include "coordinator/cli/program.hpp"
+namespace proofmass::coordinator {
+
+// Not by its header, which takes the compiler five seconds: each model's programs compile this.
+int run_proofmass(int argc, char** argv);
+
+}  // namespace proofmass::coordinator
 
 int main(int argc, char** argv) { return proofmass::coordinator::run_proofmass(argc, argv); }

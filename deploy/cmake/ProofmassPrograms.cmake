@@ -14,17 +14,19 @@ function(proofmass_add_programs)
 
 std::vector<const proofmass::Model*> proofmass::further_models() { return {&microscope_model()}; }
 ]])
+  set(models ${programs_NAME}_further_models)
+  add_library(${models} OBJECT ${further_models})
+  target_link_libraries(${models} PRIVATE proofmass::microscope)
   set(proofmass_main coordinator/cli/main.cpp)
   set(proofmass-coordinator_main coordinator/cli/coordinator_main.cpp)
   set(proofmass-worker_main worker/main.cpp)
   foreach(program proofmass proofmass-coordinator proofmass-worker)
     set(target ${programs_NAME}_${program})
-    add_executable(${target} ${PROOFMASS_SOURCES}/${${program}_main}
-      ${further_models})
+    add_executable(${target} ${PROOFMASS_SOURCES}/${${program}_main})
     set_target_properties(${target} PROPERTIES
       OUTPUT_NAME ${program} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${programs_NAME})
     target_link_libraries(${target} PRIVATE proofmass::cli proofmass::worker_program proofmass::microscope
-      ${programs_MODEL})
+      ${models} ${programs_MODEL})
   endforeach()
   add_dependencies(${programs_NAME}_proofmass ${programs_NAME}_proofmass-worker)
 endfunction()
