@@ -158,10 +158,10 @@ class Model {
 /// That of models() with this version; null if there is none.
 [[nodiscard]] const Model* find_model(std::string_view version);
 
-/// Versions of models(), for messages: `hardy2013-10 and oscillator-1`.
+/// Versions of models(), for messages: `hardy2013-11 and oscillator-1`.
 [[nodiscard]] std::string model_versions();
 
-/// `hardy2013` of the version `hardy2013-10`; empty if there is no such name.
+/// `hardy2013` of the version `hardy2013-11`; empty if there is no such name.
 [[nodiscard]] std::string_view name_of_model(std::string_view version);
 
 /// Puts models before the built-in one, before anything asks for models().

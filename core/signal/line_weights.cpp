@@ -67,13 +67,13 @@ LineWeights::LineWeights(const LineFit& fit) : fit_(fit), lines_hz_(fit.fit_hz) 
                                       fit.num_samples - std::min(fit.num_dropped, fit.num_samples),
                                       fit.num_samples, 2 * lines_hz_.size()));
   }
-  PROOFMASS_EXPECT(fit.fit_hz.size() == 1 || fit.fit_hz.size() == 2);
-  PROOFMASS_EXPECT(lines_hz_.size() <= num_lines_max);
+  PROOFMASS_EXPECT(fit.fit_hz.size() <= 2 && lines_hz_.size() <= num_lines_max);
+  marks_ = Marks(0, (fit_.num_samples + block_size - 1) / block_size);
+  if (fit.fit_hz.empty()) return;
   solve_design();
 
   const std::size_t num_outputs = 2 * num_fit_lines();
   means_.assign(num_outputs, 0.0);
-  marks_ = Marks(0, (fit_.num_samples + block_size - 1) / block_size);
   States states{};
   std::vector<double> weights(block_size * num_outputs);
   std::vector<double> sums(num_outputs, 0.0);
@@ -265,6 +265,7 @@ void LineWeights::refine(const Marks& coarse, std::size_t stretch, Marks& fine,
 
 void WeightReader::fill_block(std::size_t block, std::span<double> weights) {
   const std::size_t num_outputs = weights_.means_.size();
+  if (num_outputs == 0) return;
   const std::size_t num_samples = weights_.samples_in(block);
   PROOFMASS_EXPECT(weights.size() >=
                    num_outputs * std::min(weights_.num_samples(), LineWeights::block_size));

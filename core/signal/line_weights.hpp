@@ -17,7 +17,7 @@ struct LineFit {
   std::size_t num_dropped = 0;  ///< Filtered samples dropped at the start, < num_samples.
   double sample_period_s = 0.25;
   BandPass filter{};
-  std::vector<double> fit_hz;    ///< Lines whose phasors are wanted: one or two.
+  std::vector<double> fit_hz;    ///< Lines whose phasors are wanted: two at most.
   std::vector<double> known_hz;  ///< Further lines; at most LineWeights::num_lines_max in all.
 };
 

@@ -66,6 +66,7 @@ struct Resonator {
   /// @param input_S  What DragFreeController::advance() would be given, m/s².
   /// @returns What it is given instead.
   PROOFMASS_INLINE Vector3<T> advance(const ResonatorGains& gains, const Vector3<T>& input_S) {
+    if (gains.input == 0.0) return input_S;
     const T cosine = T(gains.cosine), sine = T(gains.sine);
     const Vector3<T> turned_S = cosine * in_phase_S - sine * quadrature_S;
     quadrature_S = sine * in_phase_S + cosine * quadrature_S;

@@ -15,12 +15,8 @@ LineFit line_fit(const Scenario& scenario, const Session& session) {
   fit.num_samples = static_cast<std::size_t>(num_record_samples(scenario, session));
   fit.num_dropped = static_cast<std::size_t>(std::ceil(scenario.estimation.transient_s / period_s));
   fit.sample_period_s = period_s;
+  if (is_test(session)) return fit;
   double centre_hz = 0.0;
-  if (is_test(session)) {
-    centre_hz = test_frequency_hz(session, scenario.orbit.period_s);
-    fit.fit_hz = {centre_hz};
-    fit.known_hz = {2.0 * centre_hz};
-  }
   for (const LineMultiple& line : session.fit_lines) {
     fit.fit_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
     centre_hz += fit.fit_hz.back() / static_cast<double>(session.fit_lines.size());

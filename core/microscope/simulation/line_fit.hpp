@@ -10,8 +10,8 @@
 
 namespace proofmass {
 
-/// The fit of a session's record: of Session::fit_lines, with the known lines beside them; in a
-/// test of f_EP, with 2 f_EP beside it.
+/// The fit of a session's record: of Session::fit_lines, with the known lines beside them. A test
+/// has none.
 [[nodiscard]] LineFit line_fit(const Scenario& scenario, const Session& session);
 
 /// Fits of a session's record in which one or two of the known lines are those whose phasors are

@@ -129,7 +129,8 @@ struct RunPlan::Impl : RunParts {
                             LaneGroup<double, Noise, Realism>& alone, const Observer& observer,
                             const SessionProgress& progress, RunRecord& record) const {
     Readers readers(*this, i);
-    const std::vector<float> of_windows = window_weights(i, record.run);
+    std::vector<float> room;
+    const std::span<const float> of_windows = window_weights(i, record.run, room);
     alone.test.window_weights.runs[0] = of_windows.data();
     record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
                    observer);
@@ -168,8 +169,7 @@ struct RunPlan::Impl : RunParts {
         batch.constants[l] = make_loop_constants(lane.instrument, impl.campaign.scenario, session);
         batch.eotvos_parameters[l] = lane.instrument.eotvos_parameter;
         batch.noise_states[l] = stationary_states(impl.noise, impl.campaign.seed, lane.run, starts);
-        of_windows[l] = impl.window_weights(i, lane.run);
-        batch.window_weights[l] = of_windows[l].data();
+        batch.window_weights[l] = impl.window_weights(i, lane.run, of_windows[l]).data();
       }
     }
     SessionOfBatch(const SessionOfBatch&) = delete;

@@ -6,6 +6,7 @@
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
+#include "core/microscope/estimation/ep_test/ep_test.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/line_fit.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
@@ -124,9 +125,10 @@ LoopHealth session_health(const Scenario& scenario, const Session& session,
   LoopHealth health{.acceleration_m_s2 = bounded(record.acceleration_m_s2),
                     .attitude_rad = bounded(record.attitude_rad)};
   // Loops that grew beyond all numbers left none to look at.
-  const auto& differential = phasors.amplitude[index(Signal::differential_x)];
-  if (!std::isfinite(differential[0].real())) health.acceleration_m_s2 = magnitude_max;
-  if (!record.is_monitored || is_test(session)) return health;
+  const double left = is_test(session) ? phasors.test_products[index(TestSignal::differential_x)]
+                                       : phasors.amplitude[index(Signal::differential_x)][0].real();
+  if (!std::isfinite(left)) health.acceleration_m_s2 = magnitude_max;
+  if (!record.is_monitored) return health;
   health.residual_m_s2 = residual_amplitude(scenario, record);
   health.quadratic_noise =
       bounded(density(record.monitor.quadratic.squares, num_steps(scenario, session),
@@ -195,7 +197,7 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
   QuietSums quiet;
   for (std::size_t i = 0; i < record.size(); ++i) {
     const SessionHealth& of_session = record[i];
-    if (!of_session.is_monitored || is_test(scenario.sessions[i])) continue;
+    if (!of_session.is_monitored) continue;
     quiet.common_squares += of_session.monitor.common_square.squares;
     quiet.sensor_squares[0] += of_session.monitor.sensor_square[0].squares;
     quiet.sensor_squares[1] += of_session.monitor.sensor_square[1].squares;
@@ -206,9 +208,9 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
     const Session& session = scenario.sessions[i];
     const LoopHealth health = session_health(scenario, session, record[i], phasors[i]);
     take_larger(finding.health, health);
-    if (is_test(session) && record[i].is_monitored) {
+    if (is_test(session)) {
       finding.test_residual_m_s2 =
-          std::max(finding.test_residual_m_s2, residual_amplitude(scenario, record[i]));
+          std::max(finding.test_residual_m_s2, bounded(test_residual_m_s2(phasors[i])));
     }
     const bool is_saturated = health.acceleration_m_s2 > scenario.sensor.range_m_s2;
     if (finding.loss.cause != LossCause::none || !is_saturated) continue;

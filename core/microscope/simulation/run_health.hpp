@@ -37,8 +37,8 @@ struct BlockSteps {
   }
 };
 
-/// What a session without excitation tells of the loops, sample after sample. With an excitation
-/// the signals would be those of its lines.
+/// What a calibration without excitation tells of the loops, sample after sample. With an
+/// excitation the signals would be those of its lines.
 template <typename T>
 struct LoopMonitor {
   BlockSteps<T> quadratic;      ///< ½(K2_1 Γ_App,1x² − K2_2 Γ_App,2x²), m/s².
@@ -64,12 +64,6 @@ struct LoopMonitor {
     common_square.add(square(common.x));
     sensor_square[0].add(square(m1.x));
     sensor_square[1].add(square(m2.x));
-    add_residual(common, weights);
-  }
-
-  /// The line at f_EP alone.
-  template <typename Weight>
-  PROOFMASS_INLINE void add_residual(const Vector3<T>& common, const Weight* weights) {
     for (std::size_t i = 0; i < 2; ++i) {
       residual[0][i] = residual[0][i] + T(weights[i]) * common.x;
       residual[1][i] = residual[1][i] + T(weights[i]) * common.y;
@@ -95,8 +89,8 @@ struct SessionHealth {
 /// What is kept of the sessions of a run, in the scenario's order.
 using HealthRecord = std::vector<SessionHealth>;
 
-/// The line at f_EP in a session without excitation, with that session's own lines beside it. Where
-/// the frame turns with the Earth's direction, so that f_EP is 0, the line is f_orb.
+/// The line at f_EP in a calibration without excitation, with that session's own lines beside it.
+/// Where the frame turns with the Earth's direction, so that f_EP is 0, the line is f_orb.
 [[nodiscard]] LineFit residual_fit(const Scenario& scenario, const Session& session);
 
 /// The health of a run and, if it is lost, why.

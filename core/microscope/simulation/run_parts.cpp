@@ -69,7 +69,7 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
     PROOFMASS_EXPECT(groups.back().size() <= num_line_readers_max);
     auto& of_groups = group_weights.emplace_back();
     for (const LineGroup& group : groups.back()) of_groups.emplace_back(group.fit);
-    if (!session.excitations.empty() || is_monitored_before(i)) continue;
+    if (is_test(session) || !session.excitations.empty() || is_monitored_before(i)) continue;
     residual_weights[i].emplace(residual_fit(campaign.scenario, session));
   }
   for (std::size_t i = 0; i < tests.size(); ++i) regressors.push_back(nominal_regressors(i));
@@ -77,8 +77,9 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
   // The windows of every run are those of the first.
   for (std::size_t i = 0; i < tests.size(); ++i) {
     const std::vector<WindowRegressors> of_windows = std::move(regressors[i]);
-    noise_of_complete.push_back(
-        weights_of_windows.noise_products(window_weights(i, RunIndex{0}), of_windows));
+    const auto& of_complete =
+        weights_of_complete.emplace_back(weights_of_windows.of(lost(i, RunIndex{0})));
+    noise_of_complete.push_back(weights_of_windows.noise_products(of_complete, of_windows));
   }
 }
 
@@ -89,13 +90,17 @@ std::vector<bool> RunParts::lost(std::size_t i, RunIndex run) const {
                      scenario.orbit.period_s, scenario.simulation.sample_period_s);
 }
 
-std::vector<float> RunParts::window_weights(std::size_t i, RunIndex run) const {
-  return weights_of_windows.of(lost(i, run));
+std::span<const float> RunParts::window_weights(std::size_t i, RunIndex run,
+                                                std::vector<float>& room) const {
+  if (!weights_of_complete.empty()) return weights_of_complete[i];
+  room = weights_of_windows.of(lost(i, run));
+  return room;
 }
 
 RegressorProducts RunParts::window_noise(std::size_t i, RunIndex run) const {
   if (!noise_of_complete.empty()) return noise_of_complete[i];
-  return weights_of_windows.noise_products(window_weights(i, run), regressors[i]);
+  std::vector<float> room;
+  return weights_of_windows.noise_products(window_weights(i, run, room), regressors[i]);
 }
 
 std::vector<WindowRegressors> RunParts::nominal_regressors(std::size_t i) const {
@@ -127,8 +132,7 @@ bool RunParts::is_monitored_before(std::size_t i) const {
   const Session& session = campaign.scenario.sessions[i];
   for (std::size_t k = 0; k < i; ++k) {
     const Session& before = campaign.scenario.sessions[k];
-    if (is_monitored(k) && is_test(before) == is_test(session) &&
-        before.spin_rate_rad_s == session.spin_rate_rad_s &&
+    if (is_monitored(k) && before.spin_rate_rad_s == session.spin_rate_rad_s &&
         before.drag_free == session.drag_free) {
       return true;
     }

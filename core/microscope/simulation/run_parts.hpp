@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
@@ -49,7 +50,9 @@ struct RunParts {
   [[nodiscard]] std::vector<bool> lost(std::size_t i, RunIndex run) const;
 
   /// Weights of the windows of a run's session; none unless it tests.
-  [[nodiscard]] std::vector<float> window_weights(std::size_t i, RunIndex run) const;
+  /// @param room  Outlives them.
+  [[nodiscard]] std::span<const float> window_weights(std::size_t i, RunIndex run,
+                                                      std::vector<float>& room) const;
 
   /// SessionPhasors::test_noise of a run's session that tests.
   [[nodiscard]] RegressorProducts window_noise(std::size_t i, RunIndex run) const;
@@ -79,7 +82,9 @@ struct RunParts {
   WindowWeights weights_of_windows;
   /// Of each session; none unless it tests and loses data.
   std::vector<std::vector<WindowRegressors>> regressors;
-  std::vector<RegressorProducts> noise_of_complete;  ///< Of each session, if none loses data.
+  /// Of each session, if none loses data: what runs have in common.
+  std::vector<std::vector<float>> weights_of_complete;
+  std::vector<RegressorProducts> noise_of_complete;
 
   /// Whether the masses of any session feel stiffness.
   [[nodiscard]] bool has_stiffness() const;
@@ -92,7 +97,6 @@ struct RunParts {
   [[nodiscard]] ResonatorGains resonator(const Session& session) const;
 
   /// True if the loops of a session without excitation are those of one before, which tells enough.
-  /// That one tests as well, or neither does.
   [[nodiscard]] bool is_monitored_before(std::size_t i) const;
 };
 

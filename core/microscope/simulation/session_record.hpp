@@ -315,20 +315,30 @@ inline constexpr std::size_t general_kind = sample_kinds.size() - 1;
 
 /// By how much the masses of a group fall apart in a session of a kind.
 template <SampleKind kind, typename T>
-PROOFMASS_INLINE auto violation_of(const T& eotvos_parameter, const SessionSetup& setup,
-                                   const SharedSample& shared) {
+PROOFMASS_INLINE auto violation_of(const T& eotvos_parameter, double gravity_m_s2) {
   if constexpr (kind.is_test) {
-    return Violation<T>{eotvos_parameter, setup.test->gravity_m_s2(shared)};
+    return Violation<T>{eotvos_parameter, gravity_m_s2};
   } else {
     return NoViolation{};
   }
 }
 
+/// The drag-free controller gets what a resonator makes of it.
+template <typename T>
+struct Resonant {
+  Resonator<T>& resonator;
+  const ResonatorGains& gains;
+
+  PROOFMASS_INLINE Vector3<T> operator()(const Vector3<T>& input_S) const {
+    return resonator.advance(gains, input_S);
+  }
+};
+
 /// What the drag-free controller gets in a session of a kind.
 template <SampleKind kind, typename T>
 PROOFMASS_INLINE auto shaping_of(Resonator<T>& resonator, const ResonatorGains& gains) {
   if constexpr (kind.is_test) {
-    return [&](const Vector3<T>& input_S) { return resonator.advance(gains, input_S); };
+    return Resonant<T>{resonator, gains};
   } else {
     return AsMeasured{};
   }
@@ -347,37 +357,34 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   const SignalSet recorded = kind.signals == SignalSet::all ? setup.signals : SignalSet::common;
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
+    const double gravity_m_s2 = kind.is_test ? setup.test->gravity_m_s2(shared) : 0.0;
     for (auto& [constants, noise, loop, sums, monitor, further, eotvos_parameter, resonator, test,
                 hardware] : groups) {
       hardware.begin_sample(constants);
       if constexpr (Observer::is_active) observer.begin_sample(loop);
       const auto observation = loop.template advance<kind.masses>(
           constants, setup.drag_free, setup.attitude, shared, noise.next(),
-          k % 4 == 0 ? Watch::yes : Watch::no, violation_of<kind>(eotvos_parameter, setup, shared),
+          k % 4 == 0 ? Watch::yes : Watch::no, violation_of<kind>(eotvos_parameter, gravity_m_s2),
           shaping_of<kind>(resonator, setup.resonator), hardware);
       if constexpr (Observer::is_active) {
         observer(shared, observation, ground_signals(observation, shared, setup.product));
       }
       if (weights.lines == nullptr) continue;
       const auto values = ground_signals(observation, shared, product);
-      add_sample(values, weights.lines + k * num_outputs, num_outputs, product, recorded, sums);
+      if constexpr (!kind.is_test) {
+        add_sample(values, weights.lines + k * num_outputs, num_outputs, product, recorded, sums);
+      }
       if constexpr (kind.lines == RecordedLines::further) {
         add_further(values, observation, shared, setup, weights.further, k, further);
       }
       if constexpr (kind.is_test) {
-        using T = std::remove_cvref_t<decltype(eotvos_parameter)>;
         const auto radial_S = ground_radial_S(ground_angle_RS_S(observation, shared), shared);
-        const auto gravity_x = T(-setup.test->gravity_m_s2(shared)) * radial_S.x;
-        test.add(test_signals(values, gravity_x), k % test_block_size, *setup.test);
+        test.add(test_signals(values, gravity_m_s2, radial_S), k % test_block_size, *setup.test);
       }
-      if constexpr (kind.is_test || kind.lines == RecordedLines::further) {
+      if constexpr (kind.lines == RecordedLines::further) {
         if (weights.residual == nullptr) continue;
       }
-      if constexpr (kind.is_test) {
-        using T = std::remove_cvref_t<decltype(eotvos_parameter)>;
-        const auto& measured = observation.measured_K;
-        monitor.add_residual(T(0.5) * (measured[0] + measured[1]), weights.residual + 2 * k);
-      } else if constexpr (kind.monitoring == Monitoring::on) {
+      if constexpr (kind.monitoring == Monitoring::on) {
         monitor.add(constants.sensors, observation, weights.residual + 2 * k);
       }
     }
@@ -396,8 +403,8 @@ template <typename Signals, typename Group, typename Observer>
 AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
   using enum TestMasses;
   if (setup.test != nullptr) {
-    constexpr SampleKind kind{at_rest,        SignalSet::all,     false,
-                              Monitoring::on, RecordedLines::own, true};
+    constexpr SampleKind kind{at_rest,         SignalSet::all,     false,
+                              Monitoring::off, RecordedLines::own, true};
     return advance_groups<kind, Signals, Group, Observer>;
   }
   if (!setup.line_readers.empty() || setup.masses == moving_twice) {

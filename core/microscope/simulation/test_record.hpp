@@ -40,76 +40,77 @@ struct WeightsOfRuns {
 };
 
 /// Sums of a test session. A window is two neighbouring blocks: its weights rise from 0 to 1 in the
-/// first and fall in the second. So each signal has two sums of the open block, one with the rising
-/// weights.
+/// first and fall in the second.
 template <typename T>
 struct TestSums {
-  std::array<T, num_averaged_signals> plain{};   ///< Of the open block.
-  std::array<T, num_averaged_signals> rising{};  ///< Of the open block, with rising weights.
-  std::array<T, num_averaged_signals> before{};  ///< `rising` of the block before.
-  std::array<T, num_test_products> products{};   ///< Over the windows, as TestProducts.
-  std::size_t num_blocks = 0;                    ///< That ended.
+  using Averaged = std::array<T, num_averaged_signals>;
+
+  Averaged plain{};  ///< Of the open block.
+  /// Of `plain` after each sample of the open block: in it the sample k of n counts n − k times.
+  Averaged of_plain{};
+  Averaged rising{};                            ///< Of the block before, with rising weights.
+  std::array<T, num_test_products> products{};  ///< Over the windows, as TestProducts.
+  std::size_t num_blocks = 0;                   ///< That ended.
   WeightsOfRuns<T> window_weights{};
 
   /// Adds the sample `k` of a block.
-  PROOFMASS_INLINE void add(const std::array<T, num_averaged_signals>& values, std::size_t k,
-                            const TestSetup& setup) {
-    const T weight((static_cast<double>(k) + 0.5) / static_cast<double>(test_block_size));
+  PROOFMASS_INLINE void add(const Averaged& values, std::size_t k, const TestSetup& setup) {
     for (std::size_t s = 0; s < num_averaged_signals; ++s) {
       plain[s] = plain[s] + values[s];
-      rising[s] = rising[s] + weight * values[s];
+      of_plain[s] = of_plain[s] + plain[s];
     }
     if (k + 1 == test_block_size) end_block(setup);
   }
 
  private:
   PROOFMASS_INLINE void end_block(const TestSetup& setup) {
-    if (num_blocks > 0) add_window(setup);
-    before = rising;
-    for (std::size_t s = 0; s < num_averaged_signals; ++s) plain[s] = rising[s] = T(0.0);
+    Averaged falling;
+    for (std::size_t s = 0; s < num_averaged_signals; ++s) {
+      falling[s] =
+          T(1.0 / static_cast<double>(test_block_size)) * (of_plain[s] - T(0.5) * plain[s]);
+    }
+    if (num_blocks > 0) add_window(falling, setup);
+    for (std::size_t s = 0; s < num_averaged_signals; ++s) {
+      rising[s] = plain[s] - falling[s];
+      plain[s] = of_plain[s] = T(0.0);
+    }
     ++num_blocks;
   }
 
-  PROOFMASS_INLINE void add_window(const TestSetup& setup) {
-    std::array<T, num_test_signals> means;
-    for (std::size_t s = 0; s < num_averaged_signals; ++s) {
-      means[s] =
-          T(1.0 / static_cast<double>(test_block_size)) * (before[s] + (plain[s] - rising[s]));
-    }
+  PROOFMASS_INLINE void add_window(const Averaged& falling, const TestSetup& setup) {
     // Of the window's middle.
     const double time =
         2.0 * static_cast<double>(num_blocks) / static_cast<double>(setup.num_blocks) - 1.0;
-    means[index(TestSignal::one)] = T(1.0);
-    means[index(TestSignal::time)] = T(time);
-    means[index(TestSignal::time_squared)] = T(time * time);
-    means[index(TestSignal::time_cubed)] = T(time * time * time);
+    std::array<T, num_test_signals> means{T(1.0), T(time), T(time * time), T(time * time * time)};
+    for (std::size_t s = 0; s < num_averaged_signals; ++s) {
+      means[num_powers + s] =
+          T(1.0 / static_cast<double>(test_block_size)) * (rising[s] + falling[s]);
+    }
     const T weight = window_weights.at(num_blocks - 1);
-    std::size_t at = 0;
-    for (std::size_t i = 0; i < num_test_signals; ++i) {
-      const T weighted = weight * means[i];
-      for (std::size_t j = i; j < num_test_signals; ++j, ++at) {
-        products[at] = products[at] + weighted * means[j];
-      }
+    std::array<T, num_test_signals> weighted;
+    for (std::size_t s = 0; s < num_test_signals; ++s) weighted[s] = weight * means[s];
+    for (std::size_t k = 0; k < num_test_products; ++k) {
+      const auto [i, j] = test_product_pairs[k];
+      products[k] = products[k] + weighted[i] * means[j];
     }
   }
 };
 
 /// The signals of one sample of a test, those that are averaged, in the order of TestSignal.
-/// @param values     ground_signals().
-/// @param gravity_x  g(O_sat) along X in the estimated attitude, m/s².
+/// @param values        ground_signals().
+/// @param gravity_m_s2  |g(O_sat)|.
+/// @param radial_S      û in the estimated attitude.
 template <typename T>
 PROOFMASS_INLINE std::array<T, num_averaged_signals> test_signals(
-    const std::array<T, num_signals>& values, const T& gravity_x) {
-  const T& differential = values[index(Signal::differential_x)];
-  const T& common = values[index(Signal::common_x)];
-  std::array<T, num_averaged_signals> signals;
-  constexpr std::size_t rows = index(Signal::gradient_yx), of_test = index(TestSignal::gradient_yx);
-  for (std::size_t s = 0; s < of_test; ++s) signals[s] = values[s];  // The same in both lists.
-  for (std::size_t s = 0; s < 6; ++s) signals[of_test + s] = values[rows + s];
-  signals[index(TestSignal::common_squared)] = common * common;
-  signals[index(TestSignal::common_product)] = common * differential;
-  signals[index(TestSignal::gravity_x)] = gravity_x;
-  return signals;
+    const std::array<T, num_signals>& values, double gravity_m_s2, const Vector3<T>& radial_S) {
+  const auto at = [&](Signal signal) { return values[index(signal)]; };
+  const T differential_x = at(Signal::differential_x), common_x = at(Signal::common_x);
+  return {T(-gravity_m_s2) * radial_S.x, at(Signal::gradient_xx),  at(Signal::gradient_xz),
+          T(-gravity_m_s2) * radial_S.z, differential_x,           common_x,
+          at(Signal::common_y),          at(Signal::common_z),     at(Signal::gradient_xy),
+          at(Signal::gradient_yx),       at(Signal::gradient_yy),  at(Signal::gradient_yz),
+          at(Signal::gradient_zx),       at(Signal::gradient_zy),  at(Signal::gradient_zz),
+          common_x * common_x,           common_x * differential_x};
 }
 
 }  // namespace proofmass

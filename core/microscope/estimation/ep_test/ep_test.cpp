@@ -20,61 +20,83 @@ using enum TestSignal;
 constexpr auto num_averaged = static_cast<Eigen::Index>(num_averaged_signals);
 constexpr auto num_fitted = static_cast<Eigen::Index>(num_test_regressors);
 constexpr auto num_calibrated = static_cast<Eigen::Index>(num_parameters);
-constexpr auto num_powers = static_cast<Eigen::Index>(num_test_signals - num_averaged_signals);
+constexpr auto num_times = static_cast<Eigen::Index>(num_powers);
+constexpr auto num_columns = static_cast<Eigen::Index>(num_test_columns) - num_times;
+constexpr auto num_squared = static_cast<Eigen::Index>(num_squares);
 
-/// Sums of products of the averaged signals, without the cubic polynomials in time.
-using Products = Eigen::Matrix<double, num_averaged, num_averaged>;
 /// Factors of the averaged signals in a sum of them.
 using Factors = Eigen::Matrix<double, num_averaged, 1>;
 using Fitted = Eigen::Matrix<double, num_fitted, 1>;
 using FittedMatrix = Eigen::Matrix<double, num_fitted, num_fitted>;
 
-Eigen::Index row(TestSignal signal) { return static_cast<Eigen::Index>(index(signal)); }
+/// Among the averaged signals. The first are what the fitted parameters multiply by half, in the
+/// order of TestParameter.
+constexpr Eigen::Index place(TestSignal signal) {
+  return static_cast<Eigen::Index>(index(signal)) - num_times;
+}
+static_assert(place(gravity_x) == 0 && place(gradient_xx) == 1 && place(gradient_xz) == 2);
 
-/// What each fitted parameter of the test multiplies, in the order of TestParameter; half of it.
-constexpr std::array<TestSignal, num_fitted> regressors{gravity_x, gradient_xx, gradient_xz};
-
-/// A session that tests.
-struct TestRecord {
-  Products products;
-  double common_mean = 0.0;        ///< Γ_mes,cx, m/s².
-  double differential_mean = 0.0;  ///< Γ_mes,dx, m/s².
-  /// Γ_App,cx over Γ_App,dx of what is constant: 0 if the loop nulls both sensors, −1 or 1 if it
-  /// nulls the first or the second.
-  double common_part = 0.0;
-  Eigen::Vector3d mean_gradient;  ///< First row of [T̂] − [În], s⁻²; the satellite may spin.
-  FittedMatrix noise;             ///< XᵀRX of the regressors, of noise of scale 1.
-  double num_windows = 0.0;       ///< By weight.
-  double weight = 0.0;            ///< 1/S(f_EP), Hz/(m/s²)².
+/// Sums of products over the windows that a session did not lose.
+struct WindowSums {
+  double num_windows = 0.0;          ///< By weight.
+  Factors means;                     ///< Of the averaged signals.
+  double mean_square_gravity = 0.0;  ///< Of g_x² + g_z², (m/s²)².
+  /// Of the columns that are no power of time with the averaged signals, and of the squares, both
+  /// without their cubic polynomials in time.
+  Eigen::Matrix<double, num_columns, num_averaged> products;
+  Eigen::Matrix<double, num_squared, num_squared> squares;
 };
 
-/// None if what was not lost determines no cubic polynomial: then the session tells nothing.
-std::optional<TestRecord> test_record(const SessionPhasors& record, const Session& session,
-                                      const EstimationInput& input) {
+/// None if what was not lost determines no cubic polynomial.
+std::optional<WindowSums> window_sums(const SessionPhasors& record) {
   constexpr auto size = static_cast<Eigen::Index>(num_test_signals);
   PROOFMASS_EXPECT(record.test_products.size() == num_test_products);
-  Eigen::Matrix<double, size, size> all;
-  std::size_t at = 0;
-  for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index j = i; j < size; ++j) all(i, j) = all(j, i) = record.test_products[at++];
+  Eigen::Matrix<double, size, size> all = Eigen::Matrix<double, size, size>::Zero();
+  for (std::size_t k = 0; k < num_test_products; ++k) {
+    const auto [i, j] = test_product_pairs[k];
+    all(i, j) = all(j, i) = record.test_products[k];
   }
-  const Eigen::Matrix<double, num_powers, num_powers> powers =
-      all.bottomRightCorner<num_powers, num_powers>();
-  const Eigen::Matrix<double, num_averaged, num_powers> mixed =
-      all.topRightCorner<num_averaged, num_powers>();
+  const Eigen::Matrix<double, num_times, num_times> powers =
+      all.topLeftCorner<num_times, num_times>();
+  const Eigen::Matrix<double, num_times, num_averaged> mixed =
+      all.topRightCorner<num_times, num_averaged>();
   // Of 16 digits of the products six at least are left without their polynomial; windows that lie
   // within some percent of a record leave fewer.
   constexpr double condition_min = 1e-10;
-  const Eigen::LLT<Eigen::Matrix<double, num_powers, num_powers>> factored(powers);
+  const Eigen::LLT<Eigen::Matrix<double, num_times, num_times>> factored(powers);
   if (factored.info() != Eigen::Success || factored.rcond() < condition_min) return std::nullopt;
+  const Eigen::Matrix<double, num_times, num_averaged> polynomials = factored.solve(mixed);
+  WindowSums sums;
+  sums.num_windows = powers(0, 0);
+  sums.means = mixed.row(0).transpose() / sums.num_windows;
+  const auto square = [&](TestSignal signal) {
+    return all(num_times + place(signal), num_times + place(signal));
+  };
+  sums.mean_square_gravity = (square(gravity_x) + square(gravity_z)) / sums.num_windows;
+  sums.products = all.block<num_columns, num_averaged>(num_times, num_times) -
+                  mixed.leftCols<num_columns>().transpose() * polynomials;
+  sums.squares = all.bottomRightCorner<num_squared, num_squared>() -
+                 mixed.rightCols<num_squared>().transpose() * polynomials.rightCols<num_squared>();
+  return sums;
+}
+
+/// A session that tests.
+struct TestRecord {
+  WindowSums sums;
+  /// Γ_App,cx over Γ_App,dx of what is constant: 0 if the loop nulls both sensors, −1 or 1 if it
+  /// nulls the first or the second.
+  double common_part = 0.0;
+  FittedMatrix noise;   ///< XᵀRX of the regressors, of noise of scale 1.
+  double weight = 0.0;  ///< 1/S(f_EP), Hz/(m/s²)².
+};
+
+/// None if the session tells nothing.
+std::optional<TestRecord> test_record(const SessionPhasors& record, const Session& session,
+                                      const EstimationInput& input) {
+  const std::optional<WindowSums> sums = window_sums(record);
+  if (!sums) return std::nullopt;
   TestRecord of;
-  of.products =
-      all.topLeftCorner<num_averaged, num_averaged>() - mixed * factored.solve(mixed.transpose());
-  of.num_windows = powers(0, 0);
-  const auto mean = [&](TestSignal signal) { return mixed(row(signal), 0) / of.num_windows; };
-  of.common_mean = mean(common_x);
-  of.differential_mean = mean(differential_x);
-  of.mean_gradient << mean(gradient_xx), mean(gradient_xy), mean(gradient_xz);
+  of.sums = *sums;
   if (session.drag_free == DragFreeSource::sensor_1) of.common_part = -1.0;
   if (session.drag_free == DragFreeSource::sensor_2) of.common_part = 1.0;
   for (Eigen::Index i = 0; i < num_fitted; ++i) {
@@ -92,8 +114,8 @@ std::optional<TestRecord> test_record(const SessionPhasors& record, const Sessio
 Factors corrected(const TestRecord& record, const ParameterArray& calibration) {
   const auto known = [&](Parameter parameter) { return calibration[index(parameter)]; };
   Factors factors = Factors::Zero();
-  factors[row(differential_x)] = 1.0;
-  const auto subtract = [&](TestSignal signal, double factor) { factors[row(signal)] -= factor; };
+  factors[place(differential_x)] = 1.0;
+  const auto subtract = [&](TestSignal signal, double factor) { factors[place(signal)] -= factor; };
   subtract(common_x, known(Parameter::a_d11_prime));
   subtract(common_y, known(Parameter::a_d12));
   subtract(common_z, known(Parameter::a_d13));
@@ -108,9 +130,10 @@ Factors corrected(const TestRecord& record, const ParameterArray& calibration) {
   subtract(gradient_zy, known(Parameter::a_c13) * y);
   subtract(gradient_zz, known(Parameter::a_c13) * z);
   // Squares about the means: a_d11' holds what the means make, but for that of the gradient.
-  const double of_gradient = record.mean_gradient.dot(Eigen::Vector3d(x, y, z));
-  const double known_mean = record.differential_mean - of_gradient;
-  const double known_common_mean = record.common_mean - record.common_part * of_gradient;
+  const auto mean = [&](TestSignal signal) { return record.sums.means[place(signal)]; };
+  const double of_gradient = mean(gradient_xx) * x + mean(gradient_xy) * y + mean(gradient_xz) * z;
+  const double known_mean = mean(differential_x) - of_gradient;
+  const double known_common_mean = mean(common_x) - record.common_part * of_gradient;
   const double k2d = known(Parameter::k2d), twice_k2c = 2.0 * known(Parameter::k2c);
   subtract(common_squared, k2d);
   subtract(common_x, -2.0 * k2d * known_common_mean);
@@ -120,22 +143,14 @@ Factors corrected(const TestRecord& record, const ParameterArray& calibration) {
   return factors;
 }
 
-/// The regressors' rows of the products.
-Eigen::Matrix<double, num_fitted, num_averaged> fitted_rows(const TestRecord& record) {
-  Eigen::Matrix<double, num_fitted, num_averaged> rows;
-  for (Eigen::Index i = 0; i < num_fitted; ++i) {
-    rows.row(i) = record.products.row(row(regressors[static_cast<std::size_t>(i)]));
-  }
-  return rows;
+/// Products of the fitted regressors.
+FittedMatrix fitted_block(const TestRecord& record) {
+  return record.sums.products.topLeftCorner<num_fitted, num_fitted>();
 }
 
-FittedMatrix fitted_block(const TestRecord& record) {
-  const auto rows = fitted_rows(record);
-  FittedMatrix block;
-  for (Eigen::Index i = 0; i < num_fitted; ++i) {
-    block.col(i) = rows.col(row(regressors[static_cast<std::size_t>(i)]));
-  }
-  return block;
+/// Products of the fitted regressors with a sum of signals.
+Fitted fitted_with(const TestRecord& record, const Factors& sum) {
+  return record.sums.products.topRows<num_fitted>() * sum;
 }
 
 /// Covariance of a window with all others, (m/s²)², by the noise of the squares that corrected()
@@ -145,13 +160,14 @@ FittedMatrix fitted_block(const TestRecord& record) {
 double square_noise(const TestRecord& record, const ParameterArray& calibration) {
   constexpr auto size = static_cast<double>(test_block_size);
   constexpr double whitened = 1.5 / (1.0 - 0.25 / (size * size));
-  Factors squares = Factors::Zero();
-  squares[row(common_squared)] = calibration[index(Parameter::k2d)];
-  squares[row(common_product)] = 2.0 * calibration[index(Parameter::k2c)];
-  const Fitted mixed = fitted_rows(record) * squares;
-  const double of_windows =
-      squares.dot(record.products * squares) - mixed.dot(fitted_block(record).llt().solve(mixed));
-  return whitened * std::max(of_windows, 0.0) / record.num_windows;
+  Factors sum = Factors::Zero();
+  sum[place(common_squared)] = calibration[index(Parameter::k2d)];
+  sum[place(common_product)] = 2.0 * calibration[index(Parameter::k2c)];
+  const auto squares = sum.tail<num_squared>();
+  const Fitted mixed = fitted_with(record, sum);
+  const double of_windows = squares.dot(record.sums.squares * squares) -
+                            mixed.dot(fitted_block(record).llt().solve(mixed));
+  return whitened * std::max(of_windows, 0.0) / record.sums.num_windows;
 }
 
 /// Covariance of the calibration's estimates; 0 if it has no standard errors.
@@ -184,7 +200,7 @@ class TestFit {
   [[nodiscard]] Fitted values(const ParameterArray& calibration) const {
     Fitted sum = Fitted::Zero();
     for (const TestRecord& test : tests_) {
-      sum += test.weight * (fitted_rows(test) * corrected(test, calibration));
+      sum += test.weight * fitted_with(test, corrected(test, calibration));
     }
     return 2.0 * (inverse_ * sum);
   }
@@ -220,6 +236,24 @@ class TestFit {
 
 }  // namespace
 
+double test_residual_m_s2(const SessionPhasors& record) {
+  const std::optional<WindowSums> sums = window_sums(record);
+  if (!sums) return 0.0;
+  using Gravity = Eigen::Matrix<double, 2, 1>;
+  const auto with = [&](TestSignal signal) {
+    return Gravity(sums->products(place(gravity_x), place(signal)),
+                   sums->products(place(gravity_z), place(signal)));
+  };
+  Eigen::Matrix2d normal;
+  normal << with(gravity_x), with(gravity_z);
+  const Eigen::LDLT<Eigen::Matrix2d> factored(normal);
+  double largest = 0.0;
+  for (const TestSignal axis : {common_x, common_y, common_z}) {
+    largest = std::max(largest, factored.solve(with(axis)).norm());
+  }
+  return largest * std::sqrt(sums->mean_square_gravity);
+}
+
 double window_noise_psd(const SensorNoise& sensor, double frequency_hz, double sample_period_s) {
   constexpr auto num_samples = static_cast<double>(test_block_size);
   // Two blocks' means, one after the other, and the mean of two samples: slopes in steps.
@@ -250,7 +284,7 @@ TestEstimation estimate_ep_test(const RunPhasors& records, const EstimationInput
   const Eigen::RowVectorXd with_calibration = jacobian.row(eotvos) * of_calibration;
 
   TestEstimation result;
-  for (std::size_t i = 0; i < regressors.size(); ++i) {
+  for (std::size_t i = 0; i < num_test_regressors; ++i) {
     result.values[i] = values[static_cast<Eigen::Index>(i)];
   }
   result.values[index(TestParameter::uncorrected)] = fit.values({})[eotvos];

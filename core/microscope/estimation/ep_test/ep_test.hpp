@@ -26,6 +26,11 @@ struct TestEstimation {
                                               const EstimationInput& input,
                                               const Estimation& calibration);
 
+/// Amplitude of Γ_mes,c as the gravity at O_sat turns in S, at f_EP therefore, in what a test's
+/// session did not lose: the largest of an axis, m/s²; 0 if too little is left. README.md has the
+/// equation.
+[[nodiscard]] double test_residual_m_s2(const SessionPhasors& record);
+
 /// One-sided density of Γ_mes,dx averaged over the windows of a test, (m/s²)²/Hz, at a frequency
 /// below half of the rate of windows: that of half the difference of two sensors behind the
 /// window's gain, with what the average folds down from multiples of that rate.

@@ -58,10 +58,10 @@ TEST(MicroscopeCampaign, HasAFitOfEachSessionSinceTheSixthVersion) {
   EXPECT_EQ(schema.fit[8].name, "chi_squared_A_C12");
   EXPECT_EQ(schema.fit[10].name, "chi_squared_a_c12_");  // Names of columns have no case.
   EXPECT_EQ(schema.fit[11].name, "degrees_of_freedom_a_c12_");
-  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-10x", "other-7", ""}) {
+  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-11x", "other-7", ""}) {
     EXPECT_EQ(model().results_of(definition, version).fit.size(), 2U) << version;
   }
-  EXPECT_EQ(model().results_of(definition, "hardy2013-10").fit.size(), schema.fit.size());
+  EXPECT_EQ(model().results_of(definition, "hardy2013-11").fit.size(), schema.fit.size());
   EXPECT_EQ(model().results_of("[[session", model_version).fit.size(), 2U);
 }
 
