@@ -143,7 +143,7 @@ struct ServeOptions {
   ServiceConfig service;                ///< As far as options set it; see config_of().
   double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
-  PageOptions page;
+  PageConfig page;
   NoticeCommands::Config commands;
   wire::LogFormat log_format = wire::LogFormat::text;
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
@@ -255,7 +255,7 @@ bool has_given_up_runs(const Service& service) {
 int serve_campaigns(const ServeOptions& options) {
   wire::ignore_broken_pipes();  // The service outlives what reads its log.
   wire::require_threads(num_service_threads);
-  const std::optional<PageConfig> page_config = page_config_of(options.page);
+  options.page.validate();
   const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
@@ -263,10 +263,10 @@ int serve_campaigns(const ServeOptions& options) {
   ServiceConfig config = config_of(options, folder);
   NoticeCommands commands(options.commands, log);
   config.on_notice = [&](const CampaignNotice& notice) { commands.take(notice); };
-  if (page_config) config.num_descriptors_reserved = page_descriptors_max();
+  if (options.page.is_wanted()) config.num_descriptors_reserved = page_descriptors_max();
   Service service(campaigns_of(options, folder), config, log);
   std::optional<Page> page;
-  if (page_config) page.emplace(*page_config, log);
+  if (options.page.is_wanted()) page.emplace(options.page, log);
   log_start(service, log);
   wire::ServiceNotices notices;
   notices.ready();

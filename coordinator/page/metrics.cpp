@@ -131,16 +131,6 @@ void write_page(const HttpCounts& page, double age_s, MetricWriter& writer) {
                age_s);
 }
 
-void write_process(const ProcessFigures& process, MetricWriter& writer) {
-  writer.write("process_cpu_seconds_total", "Processor time in seconds.", process.cpu_s);
-  writer.write("process_resident_memory_bytes", "Resident memory in bytes.", process.resident_size);
-  writer.write("process_virtual_memory_bytes", "Virtual memory in bytes.", process.virtual_size);
-  writer.write("process_open_fds", "Open descriptors.", process.num_descriptors);
-  writer.write("process_max_fds", "Descriptors that may be open.", process.num_descriptors_max);
-  writer.write("process_start_time_seconds", "When the process started, in seconds since 1970.",
-               process.start_unix_s);
-}
-
 /// The fields of /proc/self/stat behind the name of the program, which may hold anything.
 std::vector<double> stat_fields() {
   std::ifstream file("/proc/self/stat");
@@ -168,6 +158,34 @@ std::uint64_t num_open_descriptors() {
   return static_cast<std::uint64_t>(std::distance(begin(directory), end(directory))) - 1;
 }
 
+double seconds_of(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
+
+/// What the kernel says of this process. What cannot be read is 0.
+void write_process(MetricWriter& writer) {
+  // Places behind the state: proc(5) counts them from 4 on.
+  constexpr std::size_t start_ticks = 22 - 4, virtual_size = 23 - 4, resident_pages = 24 - 4;
+  rusage usage{};
+  rlimit limit{};
+  (void)getrusage(RUSAGE_SELF, &usage);
+  (void)getrlimit(RLIMIT_NOFILE, &limit);
+  std::vector<double> fields = stat_fields();
+  const double boot_s = fields.empty() ? 0.0 : boot_unix_s();
+  fields.resize(std::max(fields.size(), resident_pages + 1));
+  const auto page_size = static_cast<double>(sysconf(_SC_PAGESIZE));
+  const auto ticks_per_s = static_cast<double>(sysconf(_SC_CLK_TCK));
+  writer.write("process_cpu_seconds_total", "Processor time in seconds.",
+               seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime));
+  writer.write("process_resident_memory_bytes", "Resident memory in bytes.",
+               fields[resident_pages] * page_size);
+  writer.write("process_virtual_memory_bytes", "Virtual memory in bytes.", fields[virtual_size]);
+  writer.write("process_open_fds", "Open descriptors.", num_open_descriptors());
+  writer.write("process_max_fds", "Descriptors that may be open.", limit.rlim_cur);
+  writer.write("process_start_time_seconds", "When the process started, in seconds since 1970.",
+               boot_s + fields[start_ticks] / ticks_per_s);
+}
+
 }  // namespace
 
 std::string label_value(std::string_view text) {
@@ -187,33 +205,7 @@ std::string label_value(std::string_view text) {
   return value;
 }
 
-ProcessFigures process_figures() {
-  // Places behind the state: proc(5) counts them from 4 on.
-  constexpr std::size_t start_ticks = 22 - 4, virtual_size = 23 - 4, resident_pages = 24 - 4;
-  ProcessFigures figures;
-  rusage usage{};
-  if (getrusage(RUSAGE_SELF, &usage) == 0) {
-    const auto time_s = [](const timeval& time) {
-      return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-    };
-    figures.cpu_s = time_s(usage.ru_utime) + time_s(usage.ru_stime);
-  }
-  const std::vector<double> fields = stat_fields();
-  if (fields.size() > resident_pages) {
-    const auto page_size = static_cast<double>(sysconf(_SC_PAGESIZE));
-    figures.virtual_size = static_cast<std::uint64_t>(fields[virtual_size]);
-    figures.resident_size = static_cast<std::uint64_t>(fields[resident_pages] * page_size);
-    figures.start_unix_s =
-        boot_unix_s() + fields[start_ticks] / static_cast<double>(sysconf(_SC_CLK_TCK));
-  }
-  rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) figures.num_descriptors_max = limit.rlim_cur;
-  figures.num_descriptors = num_open_descriptors();
-  return figures;
-}
-
-std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
-                         const ProcessFigures& process, const HttpCounts& page) {
+std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now, const HttpCounts& page) {
   MetricWriter writer;
   const double age_s = seconds(now - snapshot.taken_at);
   write_service(snapshot, writer);
@@ -221,7 +213,7 @@ std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
                snapshot.status.uptime_s() + age_s);
   write_campaigns(snapshot, writer);
   write_page(page, age_s, writer);
-  write_process(process, writer);
+  write_process(writer);
   return writer.take();
 }
 

@@ -42,46 +42,60 @@ std::vector<std::pair<std::string, std::string>> headers_of_all_answers() {
           {"Cache-Control", "no-store"}};
 }
 
-HttpConfig http_config(const PageConfig& config) {
+HttpConfig http_config(const PageAddress& address) {
   HttpConfig http;
-  http.host = config.address.host;
-  http.port = config.address.port;
+  http.host = address.host;
+  http.port = address.port;
   http.num_connections_max = connections_allowed();
   http.headers = headers_of_all_answers();
   return http;
 }
 
-std::optional<PageToken> token_of(const PageConfig& config) {
-  if (config.token_file) return PageToken::read(*config.token_file);
-  if (config.address.is_loopback) return std::nullopt;
+PageAddress address_of(const PageConfig& config) {
+  return parse_page_address(config.address == "true" ? page_address_by_default
+                                                     : std::string_view(config.address));
+}
+
+PageAccess access_of(const PageConfig& config) {
+  if (config.token_file) return PageAccess::read(*config.token_file);
+  const PageAddress address = address_of(config);
+  if (address.is_loopback) return PageAccess();
   throw InvalidArgument(
       fmt::format("page = {}:{} (must be a loopback address, or with --page-token-file)",
-                  config.address.host, config.address.port));
+                  address.host, address.port));
 }
 
 }  // namespace
 
-void PageConfig::validate() const { (void)token_of(*this); }
+void PageConfig::validate() const {
+  if (is_wanted()) {
+    (void)address_of(*this);
+    (void)access_of(*this);
+  } else if (token_file) {
+    throw InvalidArgument(
+        fmt::format("page token file = {} (must be with --page)", token_file->string()));
+  }
+}
 
 std::uint64_t page_descriptors_max() { return connections_allowed() + further_descriptors; }
 
 Page::Page(const PageConfig& config, const Log& log)
-    : address_(config.address),
+    : address_(address_of(config)),
       board_(clock_now()),
       reader_(read_details),
-      site_({.access = PageAccess(token_of(config)),
+      site_({.access = access_of(config),
              .board = &board_,
              .details = [this](const CampaignRecord& campaign,
                                TimePoint now) { return reader_.details(campaign, now); },
              .counts = [this] { return server_->counts(); },
              .now = clock_now}) {
   server_ = std::make_unique<HttpServer>(
-      http_config(config), [this](const HttpRequest& request, HttpServer::Patience patience) {
+      http_config(address_), [this](const HttpRequest& request, HttpServer::Patience patience) {
         return site_.answer(request, patience);
       });
   address_.port = server_->port();
   log({.kind = "page_served", .fields = {{"url", url()}}});
-  if (config.address.is_loopback) return;
+  if (address_.is_loopback) return;
   log({.severity = wire::Severity::warning,
        .kind = "page_not_encrypted",
        .fields = {{"url", url()},
@@ -90,7 +104,7 @@ Page::Page(const PageConfig& config, const Log& log)
 }
 
 void Page::on_turn(const Service& service) {
-  board_.on_turn(clock_now(), [&](SnapshotDepth depth) { return service.snapshot(depth); });
+  board_.on_turn(clock_now(), [&] { return service.snapshot(); });
 }
 
 std::string Page::url() const { return url_of(address_); }
@@ -148,7 +162,7 @@ HttpAnswer answer_of(const PageSite& site, const PageRequest& request,
   }
   if (path.size() == 1 && path[0] == "metrics") {
     return {.content_type = "text/plain; version=0.0.4; charset=utf-8",
-            .body = metrics_text(snapshot, now, process_figures(), site.counts())};
+            .body = metrics_text(snapshot, now, site.counts())};
   }
   if (path.size() == 2 && path[0] == "campaigns") return about_campaign(site, request, snapshot);
   return not_found();
@@ -161,10 +175,7 @@ std::optional<HttpAnswer> answer_to_visitor(const PageSite& site, const PageRequ
   if (path.size() == 1) {
     if (auto file = file_answer(path[0])) return file;
   }
-  const SnapshotDepth depth = !path.empty() && path.back() == "workers"
-                                  ? SnapshotDepth::with_workers
-                                  : SnapshotDepth::without_workers;
-  std::shared_ptr<const ServiceSnapshot> snapshot = site.board->want(depth, site.now());
+  std::shared_ptr<const ServiceSnapshot> snapshot = site.board->want(site.now());
   if (snapshot == nullptr && patience == Patience::left) return std::nullopt;
   if (snapshot == nullptr) snapshot = site.board->newest();
   if (snapshot == nullptr) return plain_answer(503, "the coordinator has not said anything yet");
@@ -187,15 +198,10 @@ std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http, Patience pat
   return given;
 }
 
-std::shared_ptr<const ServiceSnapshot> SnapshotBoard::want(SnapshotDepth depth, TimePoint now) {
-  const bool needs_workers = depth == SnapshotDepth::with_workers;
+std::shared_ptr<const ServiceSnapshot> SnapshotBoard::want(TimePoint now) {
   const std::lock_guard lock(mutex_);
   asked_at_ = now;
-  if (needs_workers) asked_for_workers_at_ = now;
-  const bool is_deep = !needs_workers || newest_depth_ == SnapshotDepth::with_workers;
-  const bool is_there = newest_ != nullptr && is_deep && now - newest_->taken_at <= age_max;
-  is_urgent_ = is_urgent_ || !is_there;
-  return is_there ? newest_ : nullptr;
+  return newest_ != nullptr && now - newest_->taken_at <= age_max ? newest_ : nullptr;
 }
 
 std::shared_ptr<const ServiceSnapshot> SnapshotBoard::newest() const {
@@ -203,25 +209,17 @@ std::shared_ptr<const ServiceSnapshot> SnapshotBoard::newest() const {
   return newest_;
 }
 
-void SnapshotBoard::on_turn(TimePoint now,
-                            const std::function<ServiceSnapshot(SnapshotDepth)>& take) {
+void SnapshotBoard::on_turn(TimePoint now, const std::function<ServiceSnapshot()>& take) {
   std::unique_lock lock(mutex_);
   turned_at_ = now;
-  if (!is_wanted(asked_at_, now)) return;
-  const bool is_due = newest_ == nullptr || now - newest_->taken_at >= interval;
-  const SnapshotDepth depth = is_wanted(asked_for_workers_at_, now)
-                                  ? SnapshotDepth::with_workers
-                                  : SnapshotDepth::without_workers;
-  // Workers that are asked for the first time need not wait for the second to end.
-  if (!is_due && (!is_urgent_ || depth == newest_depth_)) return;
+  const bool is_wanted = asked_at_ && now - *asked_at_ < wanted_for;
+  if (!is_wanted || (newest_ != nullptr && now - newest_->taken_at < interval)) return;
   lock.unlock();
-  ServiceSnapshot taken = take(depth);
+  ServiceSnapshot taken = take();
   taken.taken_at = now;
   auto snapshot = std::make_shared<const ServiceSnapshot>(std::move(taken));
   lock.lock();
   newest_.swap(snapshot);  // What nobody uses any more is freed without the lock.
-  newest_depth_ = depth;
-  is_urgent_ = false;
   lock.unlock();
 }
 

@@ -135,9 +135,8 @@ ServiceConfig service_config(RunStart& start, CampaignFiles& files) {
 /// A page for people who watch the campaign, and a line that says where it is; null if none is
 /// wanted.
 std::unique_ptr<Page> begin_page(const RunOptions& options, ProgressDisplay& display) {
-  const std::optional<PageConfig> config = page_config_of(options.page);
-  if (!config) return nullptr;
-  auto page = std::make_unique<Page>(*config, [&display](const Event& event) {
+  if (!options.page.is_wanted()) return nullptr;
+  auto page = std::make_unique<Page>(options.page, [&display](const Event& event) {
     if (event.severity != Severity::info) display.note("proofmass: warning: " + to_text(event));
   });
   display.note(fmt::format("proofmass: live page at {}", page->url()));
@@ -354,7 +353,7 @@ int run_campaign(const RunOptions& options) {
       read_campaign(options.campaign_file, options.overrides);
   check_until(*campaign, options.stop.stop_rule);
   check_part(options, *campaign);
-  (void)page_config_of(options.page);  // Before any file is made.
+  options.page.validate();  // Before any file is made.
   const std::filesystem::path database = database_of(options);
   const std::uint64_t num_runs = campaign->num_runs;
   compute_reference_digest(campaign->model(), options);

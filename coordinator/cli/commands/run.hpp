@@ -23,7 +23,7 @@ struct RunOptions {
   std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
   std::optional<RunRange> part;          ///< Only these runs are computed.
   StopPlan stop;                         ///< Without StopPlan::num_runs_max.
-  PageOptions page;
+  PageConfig page;
   bool is_quiet = false;
   RunOutput output = RunOutput::tables;
 };

@@ -12,18 +12,16 @@ using namespace std::chrono_literals;
 class SnapshotBoardTest : public ::testing::Test {
  protected:
   void turn() {
-    board.on_turn(now, [this](SnapshotDepth depth) {
+    board.on_turn(now, [this] {
       ++num_taken;
-      last_depth = depth;
       return ServiceSnapshot{};
     });
   }
-  auto want(SnapshotDepth depth = SnapshotDepth::without_workers) { return board.want(depth, now); }
+  auto want() { return board.want(now); }
 
   TimePoint now{1000s};
   SnapshotBoard board{now};
   int num_taken = 0;
-  SnapshotDepth last_depth = SnapshotDepth::without_workers;
 };
 
 TEST_F(SnapshotBoardTest, CostsNothingWhileNobodyAsks) {
@@ -61,23 +59,6 @@ TEST_F(SnapshotBoardTest, HandsOutNothingOld) {
   now += 1ms;
   EXPECT_EQ(want(), nullptr);
   EXPECT_NE(board.newest(), nullptr);  // For those who cannot wait.
-}
-
-TEST_F(SnapshotBoardTest, CopiesWorkersOnlyIfTheyAreAskedFor) {
-  (void)want();
-  turn();
-  EXPECT_EQ(last_depth, SnapshotDepth::without_workers);
-  EXPECT_EQ(want(SnapshotDepth::with_workers), nullptr);
-  now += 100ms;
-  turn();  // Without waiting for the second to end.
-  EXPECT_EQ(last_depth, SnapshotDepth::with_workers);
-  EXPECT_NE(want(SnapshotDepth::with_workers), nullptr);
-  EXPECT_NE(want(), nullptr);
-  EXPECT_EQ(num_taken, 2);
-  now += SnapshotBoard::wanted_for;
-  (void)want();
-  turn();
-  EXPECT_EQ(last_depth, SnapshotDepth::without_workers);
 }
 
 TEST_F(SnapshotBoardTest, TellsHowLongTheServiceHasNotComeRound) {
