@@ -28,8 +28,7 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::chrono::seconds reading_interval_min(2);
-constexpr int reading_share = 150;
-constexpr int reading_share_of_all = 75;
+constexpr int reading_share = 75;
 constexpr int reading_niceness = 10;
 constexpr std::chrono::seconds pause_without_memory(2);
 
@@ -185,12 +184,8 @@ CampaignDetails read_details(const CampaignRecord& campaign, const CampaignDetai
   return now;
 }
 
-TimePoint next_reading(TimePoint ended_at, Duration cpu_time) {
-  return ended_at + std::max<Duration>(reading_interval_min, reading_share * cpu_time);
-}
-
 TimePoint end_of_rest(TimePoint ended_at, Duration cpu_time) {
-  return ended_at + reading_share_of_all * cpu_time;
+  return ended_at + reading_share * cpu_time;
 }
 
 DetailReader::DetailReader(ReadDetails read)
@@ -247,12 +242,11 @@ void DetailReader::read(const std::string& name, std::unique_lock<std::mutex>& l
   // What a reading that failed has is as old as before.
   if (before == nullptr || details->failure.empty()) details->read_at = began_at;
   const TimePoint ended_at = steady_now();
-  const Duration cpu_time = cpu_time_of_thread() - cpu_before;
   lock.lock();
-  rests_until_ = end_of_rest(ended_at, cpu_time);
+  rests_until_ = end_of_rest(ended_at, cpu_time_of_thread() - cpu_before);
   const auto found = watched_.find(name);
   if (found == watched_.end() || !is_same(found->second.campaign, campaign)) return;
-  found->second.due = next_reading(ended_at, cpu_time);
+  found->second.due = ended_at + reading_interval_min;
   found->second.details = std::move(details);
 }
 

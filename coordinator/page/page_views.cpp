@@ -80,6 +80,28 @@ std::vector<Remark> overview_notes(const ServiceSnapshot& service, const PageOfL
 
 // Workers.
 
+std::string_view name_of(WorkerOrder order) {
+  constexpr std::array<std::string_view, 3> names{"name", "state", "throughput"};
+  return names.at(static_cast<std::size_t>(order));
+}
+
+/// What the parameters `sort`, `filter` and `page` say; unknown values count as absent.
+WorkerChoice worker_choice(const PageRequest& request) {
+  constexpr std::size_t filter_size_max = 128;
+  WorkerChoice choice{.filter = request.text("filter").substr(0, filter_size_max),
+                      .page = page_number(request, "page")};
+  for (const WorkerOrder order : {WorkerOrder::state, WorkerOrder::throughput}) {
+    if (request.text("sort") == name_of(order)) choice.order = order;
+  }
+  return choice;
+}
+
+/// Since the worker registered.
+double results_per_h(const RegisteredWorker& worker) {
+  if (worker.registered_s <= 0.0) return 0.0;
+  return 3600.0 * static_cast<double>(worker.status.num_results()) / worker.registered_s;
+}
+
 /// In the order of worker_activities: those that need a look come first.
 int place_of(WorkerActivity activity) {
   constexpr std::array places{2, 3, 1, 0};
@@ -155,26 +177,6 @@ std::string filter_form(const WorkerChoice& choice) {
 }
 
 }  // namespace
-
-std::string_view name_of(WorkerOrder order) {
-  constexpr std::array<std::string_view, 3> names{"name", "state", "throughput"};
-  return names.at(static_cast<std::size_t>(order));
-}
-
-WorkerChoice worker_choice(const PageRequest& request) {
-  constexpr std::size_t filter_size_max = 128;
-  WorkerChoice choice{.filter = request.text("filter").substr(0, filter_size_max),
-                      .page = page_number(request, "page")};
-  for (const WorkerOrder order : {WorkerOrder::state, WorkerOrder::throughput}) {
-    if (request.text("sort") == name_of(order)) choice.order = order;
-  }
-  return choice;
-}
-
-double results_per_h(const RegisteredWorker& worker) {
-  if (worker.registered_s <= 0.0) return 0.0;
-  return 3600.0 * static_cast<double>(worker.status.num_results()) / worker.registered_s;
-}
 
 ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
                              const WorkerChoice& choice) {

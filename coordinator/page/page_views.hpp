@@ -78,10 +78,6 @@ struct WorkerChoice {
   std::size_t page = 1;
 };
 
-/// @return What the parameters `sort`, `filter` and `page` say; unknown values count as absent.
-[[nodiscard]] WorkerChoice worker_choice(const PageRequest& request);
-[[nodiscard]] std::string_view name_of(WorkerOrder order);
-
 /// The workers of one page.
 struct ChosenWorkers {
   PageOfList list;
@@ -92,9 +88,6 @@ struct ChosenWorkers {
 /// largest throughput first. Takes some milliseconds for 10,000 workers.
 [[nodiscard]] ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
                                            const WorkerChoice& choice);
-
-/// Results per hour since the worker registered.
-[[nodiscard]] double results_per_h(const RegisteredWorker& worker);
 
 /// The first page: all campaigns, fifty at a time.
 [[nodiscard]] PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& request,

@@ -27,14 +27,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(NextReading, ComesAfterTwoSecondsOrHundredAndFiftyTimesWhatTheLastTook) {
-  const TimePoint ended{1000s};
-  EXPECT_EQ(next_reading(ended, 0s), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 10ms), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 100ms), ended + 15s);
-  EXPECT_EQ(next_reading(ended, 8s), ended + 1200s);
-}
-
 TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
   const TimePoint ended{1000s};
   EXPECT_EQ(end_of_rest(ended, 0s), ended);
