@@ -165,33 +165,6 @@ std::optional<HeatMap> cause_map(const Review& review) {
   return map;
 }
 
-std::vector<NamedPicture> review_pictures(const Review& review) {
-  std::vector<NamedPicture> pictures{{"errors", magnitude_overview(review)},
-                                     {"convergence", convergence_overview(review)}};
-  const std::vector<Quantity>& quantities = review.schema.quantities;
-  for (std::size_t i = 0; i < quantities.size(); ++i) {
-    const std::string& name = quantities[i].name;
-    pictures.push_back({fmt::format("histogram:{}", name), magnitude_chart(review, i)});
-    pictures.push_back({fmt::format("error:{}", name), error_chart(review, i)});
-    pictures.push_back({fmt::format("convergence:{}", name), convergence_chart(review, i)});
-  }
-  if (auto grid = pull_overview(review.schema, review.results.standard_errors)) {
-    pictures.push_back({"pulls", *std::move(grid)});
-  }
-  for (Chart& chart : characteristic_charts(review)) {
-    pictures.push_back({"characteristic", std::move(chart)});
-    break;  // Without requirements there is one: that of the default tolerance.
-  }
-  if (auto chart = budget_chart(review)) pictures.push_back({"budget", *std::move(chart)});
-  if (auto map = cause_map(review)) pictures.push_back({"causes", *std::move(map)});
-  if (!review.spectra) return pictures;
-  std::vector<Chart> spectra = spectrum_charts(review);
-  for (std::size_t i = 0; i < spectra.size(); ++i) {
-    pictures.push_back({spectrum_name(review.spectra->sessions[i].session), std::move(spectra[i])});
-  }
-  return pictures;
-}
-
 bool needs_causes(std::string_view name) { return name == "causes"; }
 
 namespace {

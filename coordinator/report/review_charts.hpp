@@ -49,11 +49,11 @@ namespace proofmass::coordinator {
 
 /// A chart with the name by which `proofmass plot` knows it: `histogram:gain`.
 struct NamedPicture {
-  std::string name;
+  std::string name;  ///< Empty: it does not know it.
   Picture picture;
 };
 
-/// All of them, in the order of the report.
+/// All that have a name: two overviews, and those of the report in its order.
 [[nodiscard]] std::vector<NamedPicture> review_pictures(const Review& review);
 
 /// True if a chart of this name needs Review::causes.

@@ -72,7 +72,7 @@ Table review_budget_table(const Review& review) {
 }
 
 Table cause_table(const Review& review) {
-  if (!review.causes) return {};
+  if (!review.causes || review.causes->terms.empty()) return {};
   Table table{
       .id = "cause-table",
       .caption = "The errors as sums of draws and of products of two",
@@ -151,6 +151,7 @@ std::string rate_text(const HostShare& host) {
 }
 
 Table host_table(const Review& review) {
+  if (review.execution.hosts.empty()) return {};
   Table table{
       .id = "machines",
       .caption = "Machines",
