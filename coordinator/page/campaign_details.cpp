@@ -122,7 +122,7 @@ ResultsReading::ResultsReading(const Store& store, const Campaign& campaign)
               .objectives = campaign.objectives(),
               .why_not_independent = why_not_independent(campaign)},
       statistics_(review_.objectives),
-      standard_errors_(review_.schema),
+      standard_errors_(review_.schema, review_.why_not_independent.empty()),
       figures_(review_.objectives.size(), 0) {}
 
 bool ResultsReading::is_of(const Store& store) const { return campaign_ == store.id(); }
@@ -157,10 +157,8 @@ std::string ResultsReading::html() const {
   Review review = review_;
   review.results.statistics = statistics();
   review.figures = ErrorFigures(figures_).figures();
-  StandardErrorStatistics errors = standard_errors_.statistics();
-  if (!review.why_not_independent.empty()) leave_out_intervals(errors);
   std::string html = "<h3>Accuracy so far</h3>\n" + html_table(accuracy_table(review));
-  for (const Table& table : standard_error_tables(review.schema, errors)) {
+  for (const Table& table : standard_error_tables(review.schema, standard_errors_.statistics())) {
     html += table_or_nothing(table);
   }
   return html + "<h3>Errors so far</h3>\n<figure>\n" +

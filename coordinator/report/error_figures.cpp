@@ -38,8 +38,11 @@ std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs) {
   return counts;
 }
 
-ErrorFigures::ErrorFigures(std::size_t num_quantities, std::uint64_t num_runs)
-    : counts_(convergence_counts(num_runs)), quantities_(num_quantities) {}
+ErrorFigures::ErrorFigures(std::size_t num_quantities, std::uint64_t num_runs,
+                           bool are_draws_independent)
+    : are_draws_independent_(are_draws_independent),
+      counts_(convergence_counts(num_runs)),
+      quantities_(num_quantities) {}
 
 void ErrorFigures::add_error(RunIndex run, double error, Growing& quantity) {
   const double magnitude = std::abs(error);
@@ -53,13 +56,14 @@ void ErrorFigures::add_error(RunIndex run, double error, Growing& quantity) {
 void ErrorFigures::add_convergence() {
   for (Growing& quantity : quantities_) {
     const Moments moments = quantity.sums->moments();
-    quantity.figures.convergence.push_back(
-        {.num_runs = num_estimated_,
-         .worst = quantity.figures.worst.front().value,
-         .mean = moments.mean,
-         .mean_interval = mean_interval(moments, default_confidence),
-         .standard_deviation = moments.standard_deviation,
-         .deviation_interval = deviation_interval(moments, default_confidence)});
+    ConvergencePoint& point = quantity.figures.convergence.emplace_back(
+        ConvergencePoint{.num_runs = num_estimated_,
+                         .worst = quantity.figures.worst.front().value,
+                         .mean = moments.mean,
+                         .standard_deviation = moments.standard_deviation});
+    if (!are_draws_independent_) continue;
+    point.mean_interval = mean_interval(moments, default_confidence);
+    point.deviation_interval = deviation_interval(moments, default_confidence);
   }
 }
 
@@ -72,13 +76,6 @@ void ErrorFigures::add(const RunResult& result) {
   if (next_count_ >= counts_.size() || num_estimated_ < counts_[next_count_]) return;
   ++next_count_;
   add_convergence();
-}
-
-void leave_out_intervals(QuantityFigures& figures) {
-  for (ConvergencePoint& point : figures.convergence) {
-    point.mean_interval.reset();
-    point.deviation_interval.reset();
-  }
 }
 
 std::vector<QuantityFigures> ErrorFigures::figures() {

@@ -17,11 +17,11 @@ struct ConvergencePoint {
   std::uint64_t num_runs = 0;
   double worst = 0.0;
   double mean = 0.0;
-  std::optional<Interval> mean_interval;  ///< 95 %; empty for one run.
+  std::optional<Interval> mean_interval = {};  ///< 95 %; empty for one run.
   double standard_deviation = 0.0;
   /// 95 %, by the kurtosis of the errors; empty below five runs. The bootstrap of the tables would
   /// need all errors at each point.
-  std::optional<Interval> deviation_interval;
+  std::optional<Interval> deviation_interval = {};
 };
 
 /// What the charts of one quantity show: binned or thinned, whatever the number of runs.
@@ -37,9 +37,6 @@ struct QuantityFigures {
 /// @param count  Of those that are kept; at least 1.
 void keep_largest(const RunValue& candidate, std::size_t count, std::vector<RunValue>& largest);
 
-/// For draws that are not independent.
-void leave_out_intervals(QuantityFigures& figures);
-
 /// The numbers of runs at which convergence is shown: 40 from 5 on, equally spaced on a logarithmic
 /// axis. Ascending, without repetition.
 /// @param num_runs  The last one, unless it is 0.
@@ -48,8 +45,10 @@ void leave_out_intervals(QuantityFigures& figures);
 /// Computes them from results that are seen once, in run order. Memory is some 100 kB.
 class ErrorFigures {
  public:
-  /// @param num_runs  Finished runs, with an estimate or without.
-  ErrorFigures(std::size_t num_quantities, std::uint64_t num_runs);
+  /// @param num_runs               Finished runs, with an estimate or without.
+  /// @param are_draws_independent  Else there are no intervals.
+  ErrorFigures(std::size_t num_quantities, std::uint64_t num_runs,
+               bool are_draws_independent = true);
 
   void add(const RunResult& result);
 
@@ -67,6 +66,7 @@ class ErrorFigures {
   static void add_error(RunIndex run, double error, Growing& quantity);
   void add_convergence();
 
+  bool are_draws_independent_;
   std::uint64_t num_estimated_ = 0;
   std::vector<std::uint64_t> counts_;
   std::size_t next_count_ = 0;

@@ -218,7 +218,8 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   ReadResults results;
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
-  RunningStandardErrors standard_errors(store.schema());
+  const bool are_independent = why_not_independent(campaign).empty();
+  RunningStandardErrors standard_errors(store.schema(), are_independent);
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
@@ -252,10 +253,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       complete(results.statistics.accuracy[i], errors);
       if (further.magnitudes) further.magnitudes(i, errors);
     }
-    if (!why_not_independent(campaign).empty()) {
-      leave_out_intervals(results.statistics);
-      leave_out_intervals(results.standard_errors);
-    }
+    if (!are_independent) leave_out_intervals(results.statistics);
     groups.finish(results);
   });
   return results;

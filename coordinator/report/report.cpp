@@ -354,7 +354,9 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
     review.results = read_checked_results(store, campaign);
     return review;
   }
-  ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()));
+  const bool are_independent = review.why_not_independent.empty();
+  ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()),
+                       are_independent);
   VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives,
                             num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
                             review.budget);
@@ -371,11 +373,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
   if (depth == ReviewDepth::matrix) return review;
   review.execution = store.execution();
   review.figures = figures.figures();
-  if (!review.why_not_independent.empty()) {
-    for (QuantityFigures& quantity : review.figures) leave_out_intervals(quantity);
-  } else if (depth == ReviewDepth::causes) {
-    review.causes = find_causes(store, campaign);
-  }
+  if (are_independent && depth == ReviewDepth::causes) review.causes = find_causes(store, campaign);
   return review;
 }
 

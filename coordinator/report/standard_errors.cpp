@@ -41,21 +41,15 @@ Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statist
 
 }  // namespace
 
-void leave_out_intervals(StandardErrorStatistics& statistics) {
-  for (StandardErrorStatistic& statistic : statistics.quantities) {
-    statistic.squared_ratio_error.reset();
-    statistic.within.reset();
-  }
-  for (FitStatistic& of : statistics.fit) {
-    of.ratio_error.reset();
-    of.p_value.reset();
-  }
-}
-
-RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema) : fit_(schema) {
+RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema, bool are_draws_independent)
+    : are_draws_independent_(are_draws_independent), fit_tolerance_(schema.fit_tolerance) {
   for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
     if (schema.quantities[i].has_standard_error) indices_.push_back(i);
   }
+  if (schema.fit.empty()) return;
+  sessions_ = schema.fit_parts;
+  sessions_.insert(sessions_.begin(), "all");
+  fit_.resize(sessions_.size());
 }
 
 void RunningStandardErrors::add(const RunResult& result) {
@@ -73,7 +67,19 @@ void RunningStandardErrors::add(const RunResult& result) {
     if (std::abs(error) < normal_95 * sigma) ++sums.num_within;
     if (sigma > 0.0 && is_in_range(error / sigma)) sums.pulls.add(error / sigma);
   }
-  fit_.add(result);
+  add_fit(result);
+}
+
+void RunningStandardErrors::add_fit(const RunResult& result) {
+  for (std::size_t i = 0; i < fit_.size(); ++i) {
+    const double x = result.fit[2 * i], n = result.fit[2 * i + 1];
+    FitSums& sums = fit_[i];
+    sums.x += x;
+    sums.n += n;
+    sums.xx += x * x;
+    sums.xn += x * n;
+    sums.nn += n * n;
+  }
 }
 
 StandardErrorStatistics RunningStandardErrors::statistics() const {
@@ -85,19 +91,42 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
     const auto over_square = [&](double x) {
       return mean_square > 0.0 ? std::optional(x / mean_square) : std::nullopt;
     };
-    statistics.quantities.push_back(
-        {.quantity = indices_[i],
-         .num_runs = num_runs_,
-         .mean = sums.errors / n,
-         .squared_ratio = over_square(squared_error),
-         .squared_ratio_error = over_square(std::sqrt(2.0 * sums.fourth_powers) / n),
-         .num_within = sums.num_within,
-         .within =
-             probability_interval(static_cast<double>(sums.num_within), n, default_confidence),
-         .pulls = sums.pulls.histogram()});
+    StandardErrorStatistic& of = statistics.quantities.emplace_back(
+        StandardErrorStatistic{.quantity = indices_[i],
+                               .num_runs = num_runs_,
+                               .mean = sums.errors / n,
+                               .squared_ratio = over_square(squared_error),
+                               .num_within = sums.num_within,
+                               .pulls = sums.pulls.histogram()});
+    if (!are_draws_independent_) continue;
+    of.squared_ratio_error = over_square(std::sqrt(2.0 * sums.fourth_powers) / n);
+    of.within = probability_interval(static_cast<double>(sums.num_within), n, default_confidence);
   }
-  statistics.fit = fit_.statistics();
+  for (std::size_t i = 0; i < fit_.size() && num_runs_ > 0; ++i) {
+    statistics.fit.push_back(fit_of(sessions_[i], fit_[i]));
+  }
   return statistics;
+}
+
+FitStatistic RunningStandardErrors::fit_of(const std::string& session, const FitSums& sums) const {
+  const auto num_runs = static_cast<double>(num_runs_);
+  FitStatistic of{.session = session,
+                  .chi_squared = sums.x / num_runs,
+                  .degrees_of_freedom = sums.n / num_runs};
+  // With fewer, the fit adapts to all data, and what is left is rounding.
+  constexpr double degrees_min = 1e-6;
+  if (of.degrees_of_freedom < degrees_min) return of;
+  of.ratio = sums.x / sums.n;
+  if (!are_draws_independent_) return of;
+  if (num_runs_ > 1) {
+    // The delta method: residuals x − ratio·n, whose mean is 0.
+    const double scatter = sums.xx - 2.0 * of.ratio * sums.xn + of.ratio * of.ratio * sums.nn;
+    of.ratio_error = std::sqrt(std::max(scatter, 0.0) * num_runs / (num_runs - 1.0)) / sums.n;
+  }
+  const double one_sided = std::min(chi_square_above(sums.x / (1.0 + fit_tolerance_), sums.n),
+                                    chi_square_at_most(sums.x / (1.0 - fit_tolerance_), sums.n));
+  of.p_value = std::min(1.0, 2.0 * static_cast<double>(fit_.size()) * one_sided);
+  return of;
 }
 
 Table standard_error_table(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
@@ -166,53 +195,6 @@ std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
                                          figure_text(100.0 * share_within(statistic)));
   }
   return grid;
-}
-
-RunningFit::RunningFit(const ResultSchema& schema)
-    : sessions_(schema.fit_parts), tolerance_(schema.fit_tolerance) {
-  if (schema.fit.empty()) return;
-  sessions_.insert(sessions_.begin(), "all");
-  sums_.resize(sessions_.size());
-}
-
-void RunningFit::add(const RunResult& result) {
-  num_runs_ += 1.0;
-  for (std::size_t i = 0; i < sums_.size(); ++i) {
-    const double x = result.fit[2 * i], n = result.fit[2 * i + 1];
-    Sums& sums = sums_[i];
-    sums.x += x;
-    sums.n += n;
-    sums.xx += x * x;
-    sums.xn += x * n;
-    sums.nn += n * n;
-  }
-}
-
-FitStatistic RunningFit::statistic_of(const std::string& session, const Sums& sums) const {
-  FitStatistic of{.session = session,
-                  .chi_squared = sums.x / num_runs_,
-                  .degrees_of_freedom = sums.n / num_runs_};
-  // With fewer, the fit adapts to all data, and what is left is rounding.
-  constexpr double degrees_min = 1e-6;
-  if (of.degrees_of_freedom < degrees_min) return of;
-  of.ratio = sums.x / sums.n;
-  if (num_runs_ > 1.0) {
-    // The delta method: residuals x − ratio·n, whose mean is 0.
-    const double scatter = sums.xx - 2.0 * of.ratio * sums.xn + of.ratio * of.ratio * sums.nn;
-    of.ratio_error = std::sqrt(std::max(scatter, 0.0) * num_runs_ / (num_runs_ - 1.0)) / sums.n;
-  }
-  const double one_sided = std::min(chi_square_above(sums.x / (1.0 + tolerance_), sums.n),
-                                    chi_square_at_most(sums.x / (1.0 - tolerance_), sums.n));
-  of.p_value = std::min(1.0, 2.0 * static_cast<double>(sums_.size()) * one_sided);
-  return of;
-}
-
-std::vector<FitStatistic> RunningFit::statistics() const {
-  std::vector<FitStatistic> fit;
-  if (num_runs_ == 0.0) return fit;
-  for (std::size_t i = 0; i < sums_.size(); ++i)
-    fit.push_back(statistic_of(sessions_[i], sums_[i]));
-  return fit;
 }
 
 Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit) {
