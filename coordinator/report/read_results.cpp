@@ -264,7 +264,7 @@ ReadResults read_checked_results(const Store& store, const Campaign& campaign,
   ReadResults results;
   store.read_one_state([&] {
     results = read_results(store, campaign, further);
-    results.digest_check = check_digest(store, results.statistics.num_runs, results.digests);
+    results.is_digest_checked = check_digest(store, results.statistics.num_runs, results.digests);
     check_given_up(store, results);
     check_stop_checks(store, campaign.objectives());
   });
@@ -378,10 +378,9 @@ std::optional<Summary> summary_of_all(const Store& store, std::uint64_t num_resu
 
 }  // namespace
 
-DigestCheck check_digest(const Store& store, std::uint64_t num_results,
-                         const ResultDigests& digests) {
+bool check_digest(const Store& store, std::uint64_t num_results, const ResultDigests& digests) {
   const std::optional<Summary> summary = summary_of_all(store, num_results);
-  if (!summary) return DigestCheck::not_checked;
+  if (!summary) return false;
   const auto require_same = [&](const std::string& now, const std::string& stored,
                                 const char* what) {
     if (now == stored) return;
@@ -391,7 +390,7 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results,
   };
   require_same(digests.results, summary->digests.results, "its");
   require_same(digests.health, summary->digests.health, "the health of its");
-  return DigestCheck::holds;
+  return true;
 }
 
 WalkedResults walk_checked(const Store& store, const std::function<void(const RunResult&)>& visit) {
@@ -405,7 +404,7 @@ WalkedResults walk_checked(const Store& store, const std::function<void(const Ru
     });
     const ResultDigests digests = digest.finish();
     walked.digest = digests.results;
-    walked.check = check_digest(store, walked.num_results, digests);
+    walked.is_digest_checked = check_digest(store, walked.num_results, digests);
   });
   return walked;
 }

@@ -49,27 +49,23 @@ class Digest {
 /// Digest of the results in a campaign database, without that of their health.
 [[nodiscard]] std::string digest_of(const Store& store);
 
-/// What the digest that is stored with a file's statistics says of its results.
-enum class DigestCheck : std::uint8_t {
-  holds,        ///< It is that of the results.
-  not_checked,  ///< It is of fewer results, or there is none yet.
-};
-
 /// Holds the results of a file against the digest that is stored with its statistics.
 ///
 /// @param num_results  All results of the file, in the state of the file that is being read.
 /// @param digests      Theirs.
+/// @return False if they were not checked: the stored one is of fewer results, or there is none
+/// yet.
 /// @throws StoreError `campaign database = x.db (is damaged: ...)` if the digest is of as many
 /// results and another one, if it is of more results, if the counts beside it do not add up, or if
 /// there are statistics and none is there.
-[[nodiscard]] DigestCheck check_digest(const Store& store, std::uint64_t num_results,
-                                       const ResultDigests& digests);
+[[nodiscard]] bool check_digest(const Store& store, std::uint64_t num_results,
+                                const ResultDigests& digests);
 
 /// What one walk over all results of a file tells of them.
 struct WalkedResults {
   std::uint64_t num_results = 0;
   std::string digest;
-  DigestCheck check = DigestCheck::holds;
+  bool is_digest_checked = true;
 };
 
 /// Calls visit(result) for each result of a file, in run order and of one state of the file, and
@@ -154,7 +150,7 @@ struct ReadResults {
   std::vector<RunRange> given_up = {};                   ///< Ascending.
   MissingEstimates missing = {};
   std::vector<LostRuns> losses = {};  ///< Of missing.num_lost, in order of the first of each.
-  DigestCheck digest_check = DigestCheck::not_checked;  ///< See read_checked_results().
+  bool is_digest_checked = false;     ///< See read_checked_results().
 };
 
 /// Sees what read_results() reads.

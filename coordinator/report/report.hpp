@@ -15,8 +15,7 @@ namespace proofmass::coordinator {
 /// characters.
 [[nodiscard]] std::string report_text(const Review& review, Paint paint = Paint::no);
 
-/// Name, seed if it is known, and how many runs ended how; a line says so if the digest could not
-/// be checked.
+/// summary_rows() as lines.
 [[nodiscard]] std::string summary_text(const Review& review);
 
 /// Campaign::note() under its name, as lines of summary_text(); empty if there is none.

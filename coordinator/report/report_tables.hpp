@@ -74,7 +74,11 @@ void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
 /// The lines that the estimates use, and the noise about them. @pre There are spectra.
 [[nodiscard]] Table spectrum_table(const Review& review);
 
-/// What was run: identity, counts, digest.
+/// Name, seed if it is known, digest, and how many runs ended how, each behind its name; what goes
+/// on about the one before has none. A row says so if the digest could not be checked.
+[[nodiscard]] std::vector<Row> summary_rows(const Review& review);
+
+/// What was run: that, warnings, model, build, definition, stop rule and note.
 [[nodiscard]] Table identity_table(const Review& review);
 
 /// Workers, core hours, losses.

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
+#include "coordinator/charts/svg.hpp"
 #include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "core/statistics/distribution.hpp"
 
@@ -166,6 +169,60 @@ std::optional<HeatMap> cause_map(const Review& review) {
 }
 
 bool needs_causes(std::string_view name) { return name == "causes"; }
+
+std::string review_style() {
+  // The inks of the charts are for lines; text needs 4.5:1.
+  constexpr std::string_view light =
+      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;--faint:#566070;"
+      "--warn-ground:#fff3d6;";
+  constexpr std::string_view dark =
+      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;--faint:#a3adbb;"
+      "--warn-ground:#3a2e10;";
+  return fmt::format(
+             ":root{{color-scheme:light dark;{}{}}}\n"
+             "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
+             "@media print{{:root{{{}{}}}}}\n",
+             light_colours(), light, dark_colours(), dark, light_colours(), light) +
+         R"(*{box-sizing:border-box}
+body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
+body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
+a{color:inherit}
+:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
+.skip{position:absolute;left:-99rem}
+.skip:focus{position:static}
+h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
+h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
+p,li{text-wrap:pretty}
+.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
+.scroll{background:linear-gradient(to left,var(--chart-ground) 1rem,transparent) right/2rem 100%,
+linear-gradient(to left,rgb(128 128 128/.4),transparent) right/1rem 100%}
+.scroll{background-repeat:no-repeat;background-attachment:local,scroll}
+table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
+caption{text-align:left;font-weight:600;padding:.3rem 0}
+caption{position:sticky;left:0;max-width:calc(100vw - 2rem)}
+th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
+th,td{border-bottom:1px solid var(--chart-grid)}
+thead th{vertical-align:bottom}
+thead th,thead td{background:var(--heading)}
+th[scope=colgroup]{text-align:center}
+th.words,td.words{text-align:left}
+td{white-space:nowrap}
+td.words{white-space:normal;overflow-wrap:anywhere;min-width:6rem}
+tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
+tbody th{max-width:40vw;overflow-wrap:anywhere}
+.met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
+td strong{white-space:nowrap}
+.note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
+code{font-family:ui-monospace,monospace;font-size:.9em}
+figure{margin:.5rem 0;max-width:100%}
+figure svg{display:block;height:auto;max-width:100%}
+.scroll figure,.scroll svg{max-width:none}
+.flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
+.flow>div{max-width:100%}
+.flow>h3,.flow>p,.flow>ul{flex-basis:100%}
+.flow>div>.note{width:0;min-width:100%}
+)";
+}
 
 namespace {
 

@@ -157,16 +157,15 @@ void complete(ArrivedPart& part, const Ask& ask, const proto::AnswerReply& answe
 /// Says what was fetched, after its results were held against the digest that came with them.
 void print_fetched(const std::filesystem::path& file, OutputFormat format) {
   const WalkedResults walked = walk_checked(Store::open_read_only(file), [](const RunResult&) {});
-  const bool is_checked = walked.check == DigestCheck::holds;
   if (format == OutputFormat::json) {
     return print_json({{"file", file.string()},
                        {"num_results", walked.num_results},
                        {"digest", walked.digest},
-                       {"is_digest_checked", is_checked}});
+                       {"is_digest_checked", walked.is_digest_checked}});
   }
-  print_lines(fmt::format("wrote {}: {} results\nDigest {}\n{}", file.string(), walked.num_results,
-                          walked.digest,
-                          is_checked ? "" : "It was not checked: the campaign is not finished\n"));
+  print_lines(fmt::format(
+      "wrote {}: {} results\nDigest {}\n{}", file.string(), walked.num_results, walked.digest,
+      walked.is_digest_checked ? "" : "It was not checked: the campaign is not finished\n"));
 }
 
 int fetch_database(const FetchOptions& options) {
