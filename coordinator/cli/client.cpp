@@ -203,15 +203,6 @@ namespace {
 
 using proto::CampaignStatus;
 
-std::string time_left(const CampaignStatus& campaign) {
-  const bool is_known = campaign.has_remaining_s() && !is_over(campaign);
-  return is_known ? duration_text(campaign.remaining_s()) : "-";
-}
-
-std::string rate(const CampaignStatus& campaign) {
-  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "-";
-}
-
 void add_further(std::uint64_t count, int num_shown, std::string_view thing,
                  std::vector<Remark>& remarks) {
   const std::string note = further_note(count, num_shown, thing);
@@ -221,16 +212,9 @@ void add_further(std::uint64_t count, int num_shown, std::string_view thing,
 Table campaigns_table(const proto::StatusReply& status) {
   Table table;
   if (status.campaigns().empty()) table.remarks.push_back({"no campaigns"});
-  if (!status.campaigns().empty()) {
-    table.columns = {{"campaign", true, 17}, {"phase", true, 10},     {"prio", false, 5},
-                     {"done", false, 11},    {"runs", false, 11},     {"%", false, 5},
-                     {"runs/s", false, 8},   {"time left", false, 12}};
-  }
+  if (!status.campaigns().empty()) table.columns = campaign_columns();
   for (const CampaignStatus& campaign : status.campaigns()) {
-    table.rows.push_back(
-        {campaign.name(), wire::phase_name(campaign), std::to_string(campaign.priority()),
-         std::to_string(campaign.num_done()), std::to_string(campaign.num_runs()),
-         std::to_string(percent_done(campaign)), rate(campaign), time_left(campaign)});
+    table.rows.push_back(campaign_row(campaign));
     for (Remark note : notes_about(campaign)) {
       note.text = fmt::format("{}: {}", campaign.name(), note.text);
       table.remarks.push_back(std::move(note));
@@ -273,11 +257,6 @@ std::string ago(double seconds) {
 }
 
 }  // namespace
-
-bool is_over(const CampaignStatus& campaign) {
-  return campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED ||
-         campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED;
-}
 
 std::string status_text(const proto::StatusReply& status, const TerminalStyle& style) {
   return service_lines(status, style.line_width_max) +
@@ -327,8 +306,8 @@ std::string campaign_line(const CampaignStatus& campaign) {
       fmt::format("{} {}: {} of {}, {} %", campaign.name(), wire::phase_name(campaign),
                   campaign.num_done(), counted(campaign.num_runs(), "run"), percent_done(campaign));
   if (!is_over(campaign)) {
-    if (campaign.rate_hz() > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
-    if (campaign.has_remaining_s()) text += fmt::format(", {} left", time_left(campaign));
+    if (campaign.rate_hz() > 0.0) text += fmt::format(", {} runs/s", rate_text(campaign));
+    if (campaign.has_remaining_s()) text += fmt::format(", {} left", time_left_text(campaign));
   }
   for (const Remark& note : notes_about(campaign)) text += "; " + note.text;
   return text;

@@ -92,9 +92,6 @@ enum class AnswerText : std::uint8_t {
 
 // What a coordinator replied.
 
-/// True if it is finished or cancelled.
-[[nodiscard]] bool is_over(const proto::CampaignStatus& campaign);
-
 /// Two lines about the coordinator, a row a campaign, and lines about what is out of the ordinary.
 [[nodiscard]] std::string status_text(const proto::StatusReply& status, const TerminalStyle& style);
 

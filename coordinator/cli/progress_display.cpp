@@ -12,18 +12,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-std::string rate_text(double rate_hz) {
-  if (rate_hz <= 0.0) return "";
-  if (rate_hz >= 10.0) return fmt::format("  {:.0f} runs/s", rate_hz);
-  if (rate_hz >= 0.1) return fmt::format("  {:.2f} runs/s", rate_hz);
-  return fmt::format("  {:.2f} runs/min", 60.0 * rate_hz);
-}
-
-std::string left_text(const proto::CampaignStatus& status) {
-  if (!status.has_remaining_s() || status.num_done() >= status.num_runs()) return "";
-  return fmt::format("  {} left", duration_text(status.remaining_s()));
-}
-
 std::string figures(const proto::CampaignStatus& status) {
   if (!status.storage_failure().empty()) {
     return fmt::format("{:3} %  nothing can be stored", percent_done(status));
@@ -31,8 +19,12 @@ std::string figures(const proto::CampaignStatus& status) {
   if (status.num_done() == 0 && status.num_lent() > 0) {
     return fmt::format("{:3} %  computing the first {}", percent_done(status), status.num_lent());
   }
-  return fmt::format("{:3} %{}{}", percent_done(status), rate_text(status.rate_hz()),
-                     left_text(status));
+  std::string text = fmt::format("{:3} %", percent_done(status));
+  if (status.rate_hz() > 0.0) text += fmt::format("  {} runs/s", rate_text(status));
+  if (status.has_remaining_s() && status.num_done() < status.num_runs()) {
+    text += fmt::format("  {} left", time_left_text(status));
+  }
+  return text;
 }
 
 }  // namespace

@@ -22,17 +22,13 @@ namespace {
 using proto::CampaignStatus;
 using wire::markup_text;
 
-Cell campaign_link(const CampaignStatus& campaign) {
-  Cell cell(campaign.name());
-  cell.markup = fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name()),
-                            markup_text(campaign.name()));
-  return cell;
-}
-
-Cell progress_cell(const CampaignStatus& campaign) {
-  Cell cell("");
-  cell.markup = progress_bar(campaign, "progress of " + campaign.name());
-  return cell;
+/// As terminals show it, with a link and a bar.
+Row row_of(const CampaignStatus& campaign) {
+  Row row = campaign_row(campaign);
+  row[0].markup = fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name()),
+                              markup_text(campaign.name()));
+  row[5].markup = progress_bar(campaign, "progress of " + campaign.name());
+  return row;
 }
 
 std::string title_of(const ServiceSnapshot& snapshot) {
@@ -205,21 +201,9 @@ PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& re
   const std::vector<CampaignRecord>& campaigns = snapshot.campaigns;
   const PageOfList list =
       page_of_list(page_number(request, "page"), campaigns.size(), rows_per_page);
-  Table table{.caption = "Campaigns",
-              .columns = {{"campaign", true},
-                          {"phase", true},
-                          {"progress", true},
-                          {"done"},
-                          {"runs"},
-                          {"runs/s"},
-                          {"time left"},
-                          {"priority"}}};
+  Table table{.caption = "Campaigns", .columns = campaign_columns()};
   for (std::size_t i = list.first; i < list.end; ++i) {
-    const CampaignStatus& campaign = campaigns[i].status;
-    table.rows.push_back({campaign_link(campaign), wire::phase_name(campaign),
-                          progress_cell(campaign), grouped(campaign.num_done()),
-                          grouped(campaign.num_runs()), rate_text(campaign),
-                          time_left_text(campaign), std::to_string(campaign.priority())});
+    table.rows.push_back(row_of(campaigns[i].status));
   }
   return {.title = "Campaigns",
           .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +
@@ -311,22 +295,8 @@ std::string progress_bar(const proto::CampaignStatus& campaign, std::string_view
       percent_done(campaign));
 }
 
-std::string rate_text(const proto::CampaignStatus& campaign) {
-  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "–";
-}
-
-std::string time_left_text(const proto::CampaignStatus& campaign) {
-  return campaign.has_remaining_s() ? duration_text(campaign.remaining_s()) : "–";
-}
-
 std::string fact(std::string_view name, std::string_view value) {
   return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name, value);
-}
-
-std::string grouped(std::uint64_t count) {
-  std::string digits = std::to_string(count);
-  for (std::size_t place = digits.size(); place > 3; place -= 3) digits.insert(place - 3, 1, ',');
-  return digits;
 }
 
 std::string notes_list(const std::vector<Remark>& notes) {

@@ -49,15 +49,8 @@ struct PageOfList {
 [[nodiscard]] std::string progress_bar(const proto::CampaignStatus& campaign,
                                        std::string_view name);
 
-/// Runs a second, and the time until all are finished; dashes where they are not known.
-[[nodiscard]] std::string rate_text(const proto::CampaignStatus& campaign);
-[[nodiscard]] std::string time_left_text(const proto::CampaignStatus& campaign);
-
 /// A name with what it has, as a part of a `<dl>`.
 [[nodiscard]] std::string fact(std::string_view name, std::string_view value);
-
-/// `1,234,567`
-[[nodiscard]] std::string grouped(std::uint64_t count);
 
 /// A list of notes; nothing if there are none.
 [[nodiscard]] std::string notes_list(const std::vector<Remark>& notes);

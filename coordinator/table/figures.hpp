@@ -16,6 +16,9 @@ namespace proofmass::coordinator {
 /// A number ≥ 0 that somebody gave, without zeros that say nothing: `7.3`, `2000`.
 [[nodiscard]] std::string given_figure(double value);
 
+/// `1,234,567`
+[[nodiscard]] std::string grouped(std::uint64_t count);
+
 /// `1 run`, `2 runs`.
 [[nodiscard]] std::string counted(std::uint64_t count, std::string_view thing);
 
