@@ -128,23 +128,17 @@ struct ChartGrid {
   std::vector<Chart> charts = {};  ///< Row by row.
 };
 
-/// Something that took a time: a bar of a timeline, as wide as a pixel at least.
+/// Something that took a time, or none: a bar of a timeline, two pixels wide at least.
 struct TimelineBar {
   double begin = 0.0;
   double end = 0.0;
   std::string tooltip = {};  ///< Shown under the pointer.
 };
 
-/// Something that happened: a line across its lane.
-struct TimelineMark {
-  double time = 0.0;
-  std::string tooltip = {};
-};
-
 struct TimelineLane {
   std::string label = {};  ///< Empty: the lane belongs to the one above.
   std::vector<TimelineBar> bars = {};
-  std::vector<TimelineMark> marks = {};
+  std::vector<TimelineBar> marks = {};  ///< In another ink.
 };
 
 /// Lanes over one axis of time, which is linear and gives both of its ends. What is outside of them

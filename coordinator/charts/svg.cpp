@@ -43,14 +43,13 @@ std::string opening(const ChartText& text, SvgUse use, double width, double heig
           ? fmt::format("width=\"{}\"", coordinate(embedded_scale * width))
           : fmt::format("xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\"",
                         coordinate(width), coordinate(height));
-  const std::string_view fill = use == SvgUse::plain ? "#1d2228" : "var(--chart-text,#1d2228)";
   return fmt::format(
       "<svg {} viewBox=\"0 0 {} {}\" role=\"img\" aria-labelledby=\"{}-title {}-description\" "
       "font-family=\"system-ui,'Noto Sans','DejaVu Sans',sans-serif\" font-size=\"{}\" "
-      "fill=\"{}\">\n"
+      "fill=\"var(--chart-text,#1d2228)\">\n"
       "<title id=\"{}-title\">{}</title>\n<desc id=\"{}-description\">{}</desc>\n",
-      size, coordinate(width), coordinate(height), text.id, text.id, coordinate(text_size), fill,
-      text.id, wire::markup_text(text.title), text.id, wire::markup_text(text.description));
+      size, coordinate(width), coordinate(height), text.id, text.id, coordinate(text_size), text.id,
+      wire::markup_text(text.title), text.id, wire::markup_text(text.description));
 }
 
 }  // namespace
@@ -102,7 +101,7 @@ std::string standalone_style() {
 std::string svg_of(const Picture& picture, SvgUse use) {
   check_ids(picture);
   const double width = width_of_picture(picture);
-  SvgWriter body(use);
+  SvgWriter body;
   const double height =
       2.0 * margin +
       std::visit(
@@ -110,14 +109,16 @@ std::string svg_of(const Picture& picture, SvgUse use) {
             return draw_chart(chart, Point{margin, margin}, width - 2.0 * margin, body);
           },
           picture);
-  SvgWriter svg(use);
+  SvgWriter svg;
   svg.raw(opening(text_of(picture), use, width, height));
   if (use == SvgUse::standalone) svg.raw(standalone_style() + "\n");
   if (use != SvgUse::embedded) {
     svg.rectangle({0.0, 0.0, width, height}, svg.colour("--chart-ground"));
   }
   svg.raw(body.markup());
-  return svg.markup() + "</svg>\n";
+  const std::string markup = svg.markup() + "</svg>\n";
+  static const std::regex with_light_colour("var\\(--[a-z-]+,(#[0-9a-f]+)\\)");
+  return use == SvgUse::plain ? std::regex_replace(markup, with_light_colour, "$1") : markup;
 }
 
 namespace {
@@ -171,7 +172,6 @@ double text_width(std::string_view text) {
 std::string SvgWriter::colour(std::string_view property) const {
   const auto found = std::ranges::find(theme_colours(), property, &ThemeColour::property);
   PROOFMASS_EXPECT(found != theme_colours().end());
-  if (use_ == SvgUse::plain) return std::string(found->light);
   return fmt::format("var({},{})", property, found->light);
 }
 

@@ -205,10 +205,12 @@ std::vector<TimelineLane> lanes_of(const RecentAttempts& attempts, double last_s
     return of_worker;
   };
   for (const LostAttempt& lost : attempts.lost) {
+    const double time_s = static_cast<double>(lost.lost_unix_s) - last_s;
     lanes_of_worker(lost.worker_key)
         .front()
         .marks.push_back(
-            {.time = static_cast<double>(lost.lost_unix_s) - last_s,
+            {.begin = time_s,
+             .end = time_s,
              .tooltip = fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)});
   }
   for (const ComputedRuns& computed : attempts.computed) {
