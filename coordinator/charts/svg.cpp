@@ -1,5 +1,3 @@
-#include "coordinator/charts/svg.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <regex>
 #include <string>
 
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/charts/plot.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"

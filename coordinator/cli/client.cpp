@@ -21,7 +21,7 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/store/sha256.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -20,7 +20,6 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"

@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/table/figures.hpp"
 #include "coordinator/table/table.hpp"
 #include "proto/client.pb.h"
 

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/net/server_paths.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review_charts.hpp"

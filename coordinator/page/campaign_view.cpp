@@ -5,11 +5,11 @@
 #include <map>
 #include <utility>
 
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/table/document_table.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 

@@ -9,7 +9,7 @@
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/run_groups.hpp"
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -10,8 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "coordinator/report/summarise.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/order.hpp"

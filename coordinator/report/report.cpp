@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "coordinator/report/json.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/report/summarise.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/model.hpp"

@@ -12,7 +12,7 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/interval.hpp"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/report_tables.hpp"

@@ -6,7 +6,7 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {

@@ -10,7 +10,7 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report_tables.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/statistics/correlation.hpp"

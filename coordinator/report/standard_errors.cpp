@@ -9,7 +9,7 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {

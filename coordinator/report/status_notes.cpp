@@ -7,7 +7,7 @@
 #include <array>
 
 #include "coordinator/report/json.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 

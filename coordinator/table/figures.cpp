@@ -1,9 +1,9 @@
-#include "coordinator/table/figures.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
 

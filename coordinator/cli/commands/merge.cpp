@@ -16,7 +16,7 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"

@@ -7,7 +7,6 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "core/model.hpp"

@@ -9,7 +9,7 @@
 
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"

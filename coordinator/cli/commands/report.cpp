@@ -16,7 +16,6 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"

@@ -7,7 +7,7 @@
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
-#include "coordinator/report/summarise.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
