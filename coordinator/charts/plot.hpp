@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/charts/ticks.hpp"
 
 namespace proofmass::coordinator {
 

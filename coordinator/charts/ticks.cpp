@@ -1,5 +1,3 @@
-#include "coordinator/charts/ticks.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,8 @@
 #include <cmath>
 #include <span>
 #include <string_view>
+
+#include "coordinator/charts/chart.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/net/answers.hpp"

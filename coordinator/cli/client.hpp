@@ -11,9 +11,8 @@
 #include <string_view>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/net/client_connection.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {

@@ -1,5 +1,3 @@
-#include "coordinator/cli/output.hpp"
-
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -11,6 +9,7 @@
 #include <system_error>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/json.hpp"
 #include "core/error.hpp"

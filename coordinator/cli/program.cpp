@@ -22,7 +22,6 @@
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/campaign/definition.hpp"
 #include "core/definition/definition_text.hpp"

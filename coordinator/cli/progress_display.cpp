@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -12,7 +12,6 @@
 
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/status_notes.hpp"
-#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"

@@ -5,10 +5,9 @@
 #include <cstddef>
 #include <utility>
 
-#include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/review.hpp"
-#include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/standard_errors.hpp"
 
 namespace proofmass::coordinator {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "coordinator/report/json.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/run_groups.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/table.hpp"

@@ -13,7 +13,6 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/standard_errors.hpp"
@@ -358,10 +357,6 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
                 .budget = campaign.error_budget(),
                 .why_not_independent = why_not_independent(campaign),
                 .num_contradicting = store.num_contradicting()};
-  if (depth == ReviewDepth::tables) {
-    review.results = read_checked_results(store, campaign);
-    return review;
-  }
   const bool are_independent = review.why_not_independent.empty();
   ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()),
                        are_independent);

@@ -1,5 +1,3 @@
-#include "coordinator/report/report_tables.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/charts/ticks.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/statistics/comparison.hpp"

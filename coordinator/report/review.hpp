@@ -168,7 +168,6 @@ struct Review {
 
 /// What a review has beside the results, each with what comes before it.
 enum class ReviewDepth : std::uint8_t {
-  tables,
   matrix,
   charts,  ///< Also how the campaign was executed.
   causes,

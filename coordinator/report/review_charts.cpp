@@ -1,5 +1,3 @@
-#include "coordinator/report/review_charts.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,9 +6,7 @@
 #include <utility>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {

@@ -8,12 +8,8 @@
 #include <variant>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_charts.hpp"
-#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <regex>
 
-#include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/table.hpp"
 #include "proto/link/machine.hpp"

@@ -9,7 +9,7 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/statistics/distribution.hpp"
 

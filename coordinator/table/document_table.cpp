@@ -1,11 +1,10 @@
-#include "coordinator/table/document_table.hpp"
-
 #include <fmt/format.h>
 
 #include <cctype>
 #include <cstddef>
 #include <string_view>
 
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

@@ -3,10 +3,14 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 
@@ -93,5 +97,66 @@ struct Table {
 
 /// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
 [[nodiscard]] std::string duration_text(double seconds);
+
+using wire::display_width;
+using wire::shortened;
+
+enum class Paint : std::uint8_t { no, yes };
+
+/// What a terminal, or a file in its place, takes.
+struct TerminalStyle {
+  std::size_t line_width_max = std::numeric_limits<std::size_t>::max();
+  Paint paint = Paint::no;
+  bool cuts_remarks = false;  ///< Remarks are cut to the line, else they take what they need.
+  bool wraps_cells = false;   ///< Text that a column has no room for goes on below, else it is cut.
+};
+
+/// Of a text that nobody cuts: lines of at most 80 columns, on a terminal or not.
+[[nodiscard]] TerminalStyle document_style(Paint paint);
+
+/// Number of a tone's colour among the 256 of a terminal, or 0 for the terminal's own. Blue and
+/// orange can be told apart by colour-blind people, and have a contrast of at least 4:1 on black
+/// and on white.
+[[nodiscard]] int colour_of(Tone tone);
+
+/// Visible text between the control sequences of its tone; as it is if nothing is painted.
+[[nodiscard]] std::string in_tone(std::string_view text, Tone tone, Paint paint);
+
+/// The caption, the rows below their titles, the remarks and the notes; notes are broken to lines
+/// of 80 columns. Whatever the texts hold, they are visible.
+[[nodiscard]] std::string terminal_text(const Table& table, const TerminalStyle& style = {});
+
+/// Text filled up with spaces on the right to `width` columns of a terminal.
+[[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
+
+/// Text broken between words, and in longer ones, to lines of at most 80 columns, from the second
+/// one on after `indent` spaces; the first one begins at column `begin`. No end of the last line.
+[[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin);
+
+/// Lines, those of more than 80 columns broken between words. What follows of such a line stands
+/// below what it has behind its label, as in `Note      text`, else two columns further right.
+[[nodiscard]] std::string fitted(std::string_view text);
+
+/// The table as markup, in a region that scrolls by itself where the window is narrow, and its
+/// lines and notes as paragraphs. With an id the caption is shown; without, only screen readers
+/// tell it.
+[[nodiscard]] std::string html_table(const Table& table);
+
+/// Sentences as markup; what stands between backticks is code.
+[[nodiscard]] std::string sentence_markup(std::string_view text);
+
+/// A table as html_table() writes it; empty if it has no rows.
+[[nodiscard]] std::string table_or_nothing(const Table& table);
+
+/// Text in which Markdown finds nothing of its own: what could begin markup has a backslash before
+/// it. An underscore inside a word begins none.
+[[nodiscard]] std::string markdown_text(std::string_view text);
+
+/// The lines that a table of GitHub's Markdown begins with, and one of its rows.
+[[nodiscard]] std::string markdown_heading(std::span<const Column> columns);
+[[nodiscard]] std::string markdown_row(std::span<const Cell> cells);
+
+/// The caption, the table, its lines and notes, and an empty line.
+[[nodiscard]] std::string markdown_table(const Table& table);
 
 }  // namespace proofmass::coordinator

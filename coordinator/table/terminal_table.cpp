@@ -1,5 +1,3 @@
-#include "coordinator/table/terminal_table.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,6 +6,8 @@
 #include <sstream>
 #include <utility>
 #include <vector>
+
+#include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -222,7 +222,7 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     }
     case FileUse::report: {
       const Store store = Store::open_read_only(file);
-      (void)report_text(read_review(store, *stored_campaign(store), ReviewDepth::tables));
+      (void)report_text(read_review(store, *stored_campaign(store), ReviewDepth::matrix));
       return;
     }
     case FileUse::requirement: {

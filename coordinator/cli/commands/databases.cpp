@@ -13,7 +13,6 @@
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
 #include "proto/command_line/option_checks.hpp"

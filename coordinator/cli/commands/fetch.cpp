@@ -15,7 +15,6 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"

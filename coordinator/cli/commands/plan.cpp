@@ -15,7 +15,6 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/table/table.hpp"

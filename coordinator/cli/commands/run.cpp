@@ -20,7 +20,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
-#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/cli/worker_processes.hpp"
@@ -305,13 +305,10 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
 }
 
 void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
-  if (output == RunOutput::tables) {
-    const Review review = read_review(store, campaign, ReviewDepth::tables);
-    write_standard_output(report_text(review, style_of(stdout).paint));
-  }
-  if (output == RunOutput::json) {
-    print_json(report_json(read_review(store, campaign, ReviewDepth::matrix)));
-  }
+  if (output == RunOutput::none) return;
+  const Review review = read_review(store, campaign, ReviewDepth::matrix);
+  if (output == RunOutput::json) return print_json(report_json(review));
+  write_standard_output(report_text(review, style_of(stdout).paint));
 }
 
 /// The runs of `50:100`, which are 50 to 99; empty if the text is none such.

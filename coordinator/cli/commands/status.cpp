@@ -4,7 +4,6 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "core/campaign/name.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -18,7 +18,6 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "core/campaign/name.hpp"

@@ -17,7 +17,6 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/run.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/sha256.hpp"

@@ -1,5 +1,4 @@
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/charts/ticks.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/test.hpp"
 

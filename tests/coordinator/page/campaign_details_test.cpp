@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/report.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"

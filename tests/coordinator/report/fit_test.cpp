@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
 namespace proofmass::coordinator {

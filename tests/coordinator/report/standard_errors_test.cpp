@@ -7,7 +7,7 @@
 
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 

@@ -1,5 +1,5 @@
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/review.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
