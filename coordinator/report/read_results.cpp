@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <concepts>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -282,59 +280,36 @@ void write_statistics(Store& store, const Campaign& campaign, const ReadResults&
 
 namespace {
 
-/// Appends the bytes of numbers.
-class Layout {
- public:
-  explicit Layout(std::vector<unsigned char>& bytes) : bytes_(bytes) { bytes_.clear(); }
+/// Two numbers of 32 bits as one, whose bytes are theirs one after the other.
+std::uint64_t pair_of(std::uint32_t first, std::uint32_t second) {
+  return first | std::uint64_t{second} << 32;
+}
 
-  template <std::unsigned_integral Integer>
-  void put(Integer value) {
-    std::array<unsigned char, sizeof(value)> bytes{};
-    for (std::size_t i = 0; i < sizeof(value); ++i) {
-      bytes[i] = static_cast<unsigned char>(value >> (8 * i));
-    }
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-  }
-
-  // Adding zero takes the sign from a negative zero, which SQLite does not keep.
-  void put(double value) { put(std::bit_cast<std::uint64_t>(value + 0.0)); }
-
-  /// As many as there are; zeros where they mean nothing.
-  void put(const std::vector<double>& values, bool have_meaning, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) put(have_meaning ? values[i] : 0.0);
-  }
-
- private:
-  std::vector<unsigned char>& bytes_;
-};
+/// As many as there are; zeros where they mean nothing.
+void add_numbers(const std::vector<double>& values, bool have_meaning, std::size_t count,
+                 Sha256& hash) {
+  for (std::size_t i = 0; i < count; ++i) hash.add(have_meaning ? values[i] : 0.0);
+}
 
 }  // namespace
 
 Digest::Digest(const ResultSchema& schema) : num_quantities_(schema.quantities.size()) {}
 
 void Digest::add(const RunResult& result) {
-  Layout layout(bytes_);
-  layout.put(result.run.value);
-  layout.put(static_cast<std::uint32_t>(result.status));
-  layout.put(result.num_draws);
-  layout.put(result.num_rounds);
-  layout.put(std::uint32_t{0});
-  layout.put(result.truth, result.has_truth(), num_quantities_);
-  layout.put(result.estimate, result.has_estimate(), num_quantities_);
-  layout.put(result.standard_error, true, result.standard_error.size());
-  layout.put(result.fit, true, result.fit.size());
-  layout.put(result.correlations, true, result.correlations.size());
-  hash_.add(bytes_);
-
+  hash_.add(result.run.value);
+  hash_.add(pair_of(static_cast<std::uint32_t>(result.status), result.num_draws));
+  hash_.add(pair_of(result.num_rounds, 0));
+  add_numbers(result.truth, result.has_truth(), num_quantities_, hash_);
+  add_numbers(result.estimate, result.has_estimate(), num_quantities_, hash_);
+  for (const auto* const values : {&result.standard_error, &result.fit, &result.correlations}) {
+    add_numbers(*values, true, values->size(), hash_);
+  }
   if (result.health.empty()) return;
   has_health_ = true;
-  Layout of_health(bytes_);
-  of_health.put(result.run.value);
-  of_health.put(result.health, true, result.health.size());
+  health_hash_.add(result.run.value);
+  add_numbers(result.health, true, result.health.size(), health_hash_);
   const Loss loss = result.status == RunStatus::lost ? result.loss : Loss{};
-  of_health.put(loss.cause);
-  of_health.put(loss.session);
-  health_hash_.add(bytes_);
+  health_hash_.add(pair_of(loss.cause, loss.session));
 }
 
 ResultDigests Digest::finish() {
