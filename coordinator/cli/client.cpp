@@ -186,13 +186,12 @@ std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer) {
 }
 
 int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
-                 AnswerText text) {
+                 void (*print)(std::string_view)) {
   return with_connection({.connection = connection}, [&](const Ask& ask) {
     const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
     const proto::AnswerReply& answer = reply.answer();
     const std::string bytes = answer_bytes(ask, answer);
-    if (text == AnswerText::lines) print_lines(bytes);
-    if (text == AnswerText::bytes) write_standard_output(bytes);
+    print(bytes);
     flush_standard_output();
     if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
     return static_cast<int>(answer.exit_code());

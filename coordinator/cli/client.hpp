@@ -83,17 +83,14 @@ void read_answer(const Ask& ask, const proto::AnswerReply& answer,
 /// @throws As read_answer() does; Error if it is too large or arrived damaged.
 [[nodiscard]] std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer);
 
-/// How the answer to a question is printed.
-enum class AnswerText : std::uint8_t {
-  lines,  ///< By print_lines().
-  bytes,  ///< Every byte unchanged.
-};
-
 /// Asks a coordinator and prints what its command writes, to standard output and standard error.
+/// @param print  Gets what is for standard output: print_lines(), or write_standard_output() for
+///               every byte unchanged.
 /// @return The exit code of that command.
 /// @throws As reply_of() and with_connection() do; Error if the answer arrived damaged.
 [[nodiscard]] int print_answer(const ClientConnectionConfig& connection,
-                               const proto::RequestEnvelope& question, AnswerText text);
+                               const proto::RequestEnvelope& question,
+                               void (*print)(std::string_view) = print_lines);
 
 // What a coordinator replied.
 

@@ -62,9 +62,7 @@ void print_written(const std::filesystem::path& file, OutputFormat format) {
   print_lines(fmt::format("wrote {}\n", file.string()));
 }
 
-void print_json(const nlohmann::ordered_json& json) {
-  print_lines(dumped(json, JsonLayout::indented));
-}
+void print_json(const nlohmann::ordered_json& json) { print_lines(dumped(json)); }
 
 void write_standard_output(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();

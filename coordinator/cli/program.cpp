@@ -87,8 +87,6 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
     return fail(wire::refusal_of(app, error), exit_wrong_usage);
   } catch (const DefinitionError& error) {
     return fail(error.what(), exit_wrong_usage);
-  } catch (const UsageError& error) {
-    return fail(error.what(), exit_wrong_usage);
   } catch (const ConfigError& error) {
     return fail(error.what(), exit_wrong_usage);
   } catch (const InvalidArgument& error) {

@@ -186,9 +186,10 @@ std::optional<HttpAnswer> answer_to_visitor(const PageSite& site, const PageRequ
   if (path.size() == 1) {
     if (auto file = file_answer(path[0])) return file;
   }
-  std::shared_ptr<const ServiceSnapshot> snapshot = site.board->want(site.now());
-  if (snapshot == nullptr && patience == Patience::left) return std::nullopt;
-  if (snapshot == nullptr) snapshot = site.board->newest();
+  const TimePoint now = site.now();
+  const std::shared_ptr<const ServiceSnapshot> snapshot = site.board->want(now);
+  const bool is_new = snapshot != nullptr && now - snapshot->taken_at <= SnapshotBoard::age_max;
+  if (!is_new && patience == Patience::left) return std::nullopt;
   if (snapshot == nullptr) return plain_answer(503, "the coordinator has not said anything yet");
   return answer_of(site, request, *snapshot);
 }
@@ -212,11 +213,6 @@ std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http, Patience pat
 std::shared_ptr<const ServiceSnapshot> SnapshotBoard::want(TimePoint now) {
   const std::lock_guard lock(mutex_);
   asked_at_ = now;
-  return newest_ != nullptr && now - newest_->taken_at <= age_max ? newest_ : nullptr;
-}
-
-std::shared_ptr<const ServiceSnapshot> SnapshotBoard::newest() const {
-  const std::lock_guard lock(mutex_);
   return newest_;
 }
 

@@ -29,13 +29,10 @@ class SnapshotBoard {
 
   explicit SnapshotBoard(TimePoint now) : turned_at_(now) {}
 
-  /// Asks for snapshots.
-  /// @return The newest one if it is not older than `age_max`; else null: a new one comes with the
-  ///         next turn of the service.
+  /// Asks for snapshots: of one older than `age_max`, a new one comes with the next turn of the
+  /// service.
+  /// @return The newest one, however old it is; null before the first.
   [[nodiscard]] std::shared_ptr<const ServiceSnapshot> want(TimePoint now);
-
-  /// However old it is; null before the first.
-  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> newest() const;
 
   /// To be called in each turn of the service's loop.
   /// @param take  Makes a snapshot; called if one is wanted.

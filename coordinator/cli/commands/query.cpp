@@ -129,7 +129,7 @@ int query_remotely(const QueryOptions& options) {
   asked.set_statement(options.sql == "-" ? read_standard_input() : options.sql);
   const bool is_for_people = options.format == RowFormat::table;
   return print_answer(options.connection, question,
-                      is_for_people ? AnswerText::lines : AnswerText::bytes);
+                      is_for_people ? print_lines : write_standard_output);
 }
 
 [[noreturn]] void end_process(const std::string& error) {

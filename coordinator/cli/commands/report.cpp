@@ -77,7 +77,7 @@ int print_remote_report(const ReportOptions& options) {
     question.mutable_answer()->add_options("--requirement=" + requirement);
   }
   if (options.format == OutputFormat::json) question.mutable_answer()->add_options("--json");
-  return print_answer(options.connection, question, AnswerText::lines);
+  return print_answer(options.connection, question);
 }
 
 int exit_code_of(const Review& review, const std::vector<StatedRequirement>& stated) {
@@ -352,7 +352,7 @@ int print_remote_sensitivity(const SensitivityOptions& options) {
   if (options.parameter) asked.add_options("--parameter=" + *options.parameter);
   if (options.run) asked.add_options(fmt::format("--run={}", *options.run));
   if (options.format == OutputFormat::json) asked.add_options("--json");
-  return print_answer(options.connection, question, AnswerText::lines);
+  return print_answer(options.connection, question);
 }
 
 int print_sensitivity(const SensitivityOptions& options) {

@@ -172,7 +172,7 @@ void WatchDisplay::update(const proto::StatusReply& status) {
       show_lines(status);
       break;
     case WatchMode::json:
-      fmt::print(stream_, "{}", dumped(status_json(status), JsonLayout::one_line));
+      fmt::print(stream_, "{}", dumped(status_json(status), -1));
       break;
   }
   std::fflush(stream_);
