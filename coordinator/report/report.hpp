@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -60,8 +61,16 @@ namespace proofmass::coordinator {
 /// A number in the display unit, and in SI units for programs; a dash if there is none.
 [[nodiscard]] Cell figure_cell(const std::optional<double>& value, double scale = 1.0);
 [[nodiscard]] Cell no_figure();
-/// Adds the cells of the ends of an interval; of none, two without a figure.
-void add_ends(const std::optional<Interval>& interval, double scale, Row& row);
+/// The scale of a share that is shown in percent.
+inline constexpr double percent_scale = 0.01;
+/// Adds a column with its cell in each row of the table, which are there already.
+void add_column(Table& table, Column column,
+                const std::function<Cell(std::size_t row)>& cell_of_row);
+/// Adds the columns of the ends of an interval, in the scale of each row; of none, two without a
+/// figure.
+using IntervalAndScale = std::pair<std::optional<Interval>, double>;
+void add_ends(Table& table, Column from, Column to,
+              const std::function<IntervalAndScale(std::size_t row)>& of_row);
 /// Of |error|: of few values the symmetric interval of a mean may begin below 0, where none can
 /// lie.
 [[nodiscard]] std::optional<Interval> not_negative(std::optional<Interval> interval);

@@ -145,33 +145,34 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
   Table table{.id = "standard-error-table",
               .caption = fmt::format("Standard errors σ of the estimates of {}",
                                      counted(statistics.quantities.front().num_runs, "run")),
-              .columns = {{"parameter", true, 11},
-                          {"unit", true, 9},
-                          {"mean", false, 9},
-                          {"ratio", false, 10, ratio, true}},
+              .rows = std::vector<Row>(statistics.quantities.size()),
               .notes = {"honest ones of normal errors have a ratio of 1, and 95 % of the errors "
                         "within"}};
-  if (have_ratio_errors) table.columns.push_back({"±", false, 9, ratio});
-  table.columns.push_back({"runs", false, have_intervals ? 9U : 18U, within, true});
-  if (have_intervals) {
-    table.columns.insert(table.columns.end(),
-                         {{"from", false, 9, within}, {"to", false, 9, within}});
-    if (have_ratio_errors) {
-      table.notes.back() +=
-          "; ±: its standard deviation; from, to: 95 % interval, which one honest one in twenty "
-          "misses";
-    }
-    if (!have_ratio_errors) table.notes.emplace_back("from, to: 95 % interval from replicates");
+  const std::vector<StandardErrorStatistic>& all = statistics.quantities;
+  const auto quantity = [&](std::size_t i) -> const Quantity& {
+    return schema.quantities[all[i].quantity];
+  };
+  add_column(table, {"parameter", true, 11}, [&](auto i) { return quantity(i).symbol; });
+  add_column(table, {"unit", true, 9}, [&](auto i) { return unit_cell(quantity(i)); });
+  add_column(table, {"mean", false, 9},
+             [&](auto i) { return figure_cell(all[i].mean, quantity(i).display_scale); });
+  add_column(table, {"ratio", false, 10, ratio, true},
+             [&](auto i) { return figure_cell(all[i].squared_ratio); });
+  if (have_ratio_errors) {
+    add_column(table, {"±", false, 9, ratio},
+               [&](auto i) { return figure_cell(all[i].squared_ratio_error); });
   }
-  for (const StandardErrorStatistic& statistic : statistics.quantities) {
-    const Quantity& quantity = schema.quantities[statistic.quantity];
-    Row row{quantity.symbol, unit_cell(quantity),
-            figure_cell(statistic.mean, quantity.display_scale),
-            figure_cell(statistic.squared_ratio)};
-    if (have_ratio_errors) row.push_back(figure_cell(statistic.squared_ratio_error));
-    row.push_back(figure_cell(share_within(statistic), 0.01));
-    if (have_intervals) add_ends(statistic.within, 0.01, row);
-    table.rows.push_back(std::move(row));
+  add_column(table, {"runs", false, have_intervals ? 9U : 18U, within, true},
+             [&](auto i) { return figure_cell(share_within(all[i]), percent_scale); });
+  if (!have_intervals) return table;
+  add_ends(table, {"from", false, 9, within}, {"to", false, 9, within},
+           [&](auto i) { return IntervalAndScale(all[i].within, percent_scale); });
+  if (have_ratio_errors) {
+    table.notes.back() +=
+        "; ±: its standard deviation; from, to: 95 % interval, which one honest one in twenty "
+        "misses";
+  } else {
+    table.notes.emplace_back("from, to: 95 % interval from replicates");
   }
   return table;
 }
@@ -203,32 +204,30 @@ Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit
       std::ranges::any_of(fit, [](const auto& of) { return of.p_value.has_value(); });
   Table table{.id = "fit-table",
               .caption = "Fit of the estimates to the data of each session",
-              .columns = {{"session", true, 16},
-                          {"χ²", false, 9},
-                          {"degrees", false, 9},
-                          {"χ²/degrees", false, 12}},
+              .rows = std::vector<Row>(fit.size()),
               .notes = {"χ²: its mean over the runs; degrees of freedom: what is expected of it"}};
-  if (has_p_values) {
-    table.columns.insert(table.columns.end(), {{"±", false, 9}, {"p", false, 9}, {"", false, 14}});
-    table.notes.push_back("±: standard error of the ratio, from its scatter over the runs");
-    table.notes.push_back(fmt::format(
-        "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
-        "takes it for, to {:.2g} %",
-        fit.size(), 100.0 * schema.fit_tolerance));
-  }
-  for (const FitStatistic& of : fit) {
-    Cell session(of.session);
-    session.document = name_in_symbols(schema, of.session);
-    Row row{std::move(session), figure_cell(of.chi_squared), figure_cell(of.degrees_of_freedom),
-            of.ratio > 0.0 ? figure_cell(of.ratio) : no_figure()};
-    if (has_p_values) {
-      const bool is_by_chance = of.p_value.value_or(1.0) >= 1.0 - default_confidence;
-      row.push_back(figure_cell(of.ratio_error));
-      row.push_back(figure_cell(of.p_value));
-      row.emplace_back(is_by_chance ? "" : "does not fit", Tone::bad);
-    }
-    table.rows.push_back(std::move(row));
-  }
+  add_column(table, {"session", true, 16}, [&](auto i) {
+    Cell session(fit[i].session);
+    session.document = name_in_symbols(schema, fit[i].session);
+    return session;
+  });
+  add_column(table, {"χ²", false, 9}, [&](auto i) { return figure_cell(fit[i].chi_squared); });
+  add_column(table, {"degrees", false, 9},
+             [&](auto i) { return figure_cell(fit[i].degrees_of_freedom); });
+  add_column(table, {"χ²/degrees", false, 12},
+             [&](auto i) { return fit[i].ratio > 0.0 ? figure_cell(fit[i].ratio) : no_figure(); });
+  if (!has_p_values) return table;
+  add_column(table, {"±", false, 9}, [&](auto i) { return figure_cell(fit[i].ratio_error); });
+  add_column(table, {"p", false, 9}, [&](auto i) { return figure_cell(fit[i].p_value); });
+  add_column(table, {"", false, 14}, [&](auto i) {
+    const bool is_by_chance = fit[i].p_value.value_or(1.0) >= 1.0 - default_confidence;
+    return Cell(is_by_chance ? "" : "does not fit", Tone::bad);
+  });
+  table.notes.push_back("±: standard error of the ratio, from its scatter over the runs");
+  table.notes.push_back(fmt::format(
+      "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
+      "takes it for, to {:.2g} %",
+      fit.size(), 100.0 * schema.fit_tolerance));
   return table;
 }
 
