@@ -29,7 +29,7 @@ std::string report_text(const Review& review, Paint paint) {
                      given_up_text(results.given_up, paint) + note_text(review.note) +
                      fitted(wire::visible_lines(warnings_text(review.schema, results.warnings) +
                                                 (review.stop ? review.stop->text : "")));
-  std::vector<Table> tables = accuracy_tables(review);
+  std::vector<Table> tables{accuracy_table(review), interval_table(review), error_table(review)};
   const auto further = std::back_inserter(tables);
   std::ranges::move(standard_error_tables(review.schema, results.standard_errors), further);
   std::ranges::move(group_tables(review), further);

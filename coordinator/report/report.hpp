@@ -91,9 +91,6 @@ void add_ends(Table& table, Column from, Column to,
 /// that are not independent bias, skewness and percentiles without intervals, and the reason.
 [[nodiscard]] Table error_table(const Review& review);
 
-/// The three tables above.
-[[nodiscard]] std::vector<Table> accuracy_tables(const Review& review);
-
 /// The tables whose unit is an instrument or a replicate, of several runs each.
 [[nodiscard]] std::vector<Table> group_tables(const Review& review);
 
@@ -193,8 +190,5 @@ struct NamedPicture {
 
 /// All that have a name: two overviews, and those of the report in its order.
 [[nodiscard]] std::vector<NamedPicture> review_pictures(const Review& review);
-
-/// True if a chart of this name needs Review::causes.
-[[nodiscard]] bool needs_causes(std::string_view name);
 
 }  // namespace proofmass::coordinator

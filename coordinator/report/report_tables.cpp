@@ -339,10 +339,6 @@ Table error_table(const Review& review) {
   return table;
 }
 
-std::vector<Table> accuracy_tables(const Review& review) {
-  return {accuracy_table(review), interval_table(review), error_table(review)};
-}
-
 std::vector<Table> group_tables(const Review& review) {
   const ResultSchema& schema = review.schema;
   const ReadResults& results = review.results;

@@ -164,8 +164,6 @@ std::optional<HeatMap> cause_map(const Review& review) {
   return map;
 }
 
-bool needs_causes(std::string_view name) { return name == "causes"; }
-
 std::string review_style() {
   // The inks of the charts are for lines; text needs 4.5:1.
   constexpr std::string_view light =

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -66,8 +67,8 @@ struct Section {
 
 bool is_shown(const Table& table) { return !table.rows.empty() || !table.notes.empty(); }
 
-void add_tables(std::vector<Table> tables, std::vector<Part>& parts) {
-  for (Table& table : tables) parts.emplace_back(std::move(table));
+std::vector<Part> parts_of(std::vector<Table> tables) {
+  return {std::move_iterator(tables.begin()), std::move_iterator(tables.end())};
 }
 
 std::vector<Part> accuracy_parts(const Review& review) {
@@ -84,23 +85,17 @@ std::vector<Part> accuracy_parts(const Review& review) {
         "good instruments from bad ones; more draws make it steeper.</p>\n",
         name_of(review.interpretation))});
   }
-  add_tables({interval_table(review), error_table(review)}, parts);
+  parts.emplace_back(interval_table(review));
+  parts.emplace_back(error_table(review));
   return parts;
 }
 
 std::vector<Part> standard_error_parts(const Review& review) {
   const StandardErrorStatistics& statistics = review.results.standard_errors;
-  std::vector<Part> parts;
-  add_tables(standard_error_tables(review.schema, statistics), parts);
+  std::vector<Part> parts = parts_of(standard_error_tables(review.schema, statistics));
   if (auto pulls = pull_overview(review.schema, statistics)) {
     parts.emplace_back(NamedPicture{"pulls", *std::move(pulls)});
   }
-  return parts;
-}
-
-std::vector<Part> group_parts(const Review& review) {
-  std::vector<Part> parts;
-  add_tables(group_tables(review), parts);
   return parts;
 }
 
@@ -162,7 +157,10 @@ std::vector<Part> spectrum_parts(const Review& review) {
 std::vector<Part> run_parts(const Review& review) {
   std::vector<Part> parts{identity_table(review)};
   // The runs of an import were computed elsewhere.
-  if (!review.is_imported) add_tables({execution_table(review), host_table(review)}, parts);
+  if (!review.is_imported) {
+    parts.emplace_back(execution_table(review));
+    parts.emplace_back(host_table(review));
+  }
   std::string html = "<h3>How to reproduce it</h3>\n<ul>\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
@@ -177,7 +175,7 @@ std::vector<Section> sections_of(const Review& review) {
   return {{"verification", "Verification matrix", {matrix_table(review)}},
           {"results", "Accuracy", accuracy_parts(review)},
           {"standard-errors-section", "Standard errors", standard_error_parts(review)},
-          {"instruments-section", groups, group_parts(review)},
+          {"instruments-section", groups, parts_of(group_tables(review))},
           {"distributions", "Errors by parameter", error_parts(review)},
           {"budget-section", "Budget", budget_parts(review)},
           {"causes-section", "Causes of the errors", cause_parts(review)},

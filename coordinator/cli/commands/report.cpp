@@ -288,7 +288,7 @@ int plot(const PlotOptions& options) {
   check_plot_arguments(options);
   const Store store = Store::open_read_only(options.database);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-  const bool are_causes_needed = options.is_list || needs_causes(options.chart);
+  const bool are_causes_needed = options.is_list || options.chart == "causes";
   Review review =
       read_review(store, *campaign, are_causes_needed ? ReviewDepth::causes : ReviewDepth::charts);
   if (options.is_list) {
