@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -262,22 +263,14 @@ namespace {
 constexpr double line_height = 19.0;
 
 /// Lines of whole words, as far as words fit; at most three.
-std::vector<std::string> wrapped_lines(std::string_view text, double width) {
+std::vector<std::string> title_lines(std::string_view text, double width) {
   constexpr std::size_t num_lines_max = 3;
   const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
-  std::vector<std::string> lines{""};
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string word(text.substr(begin, end - begin));
-    const std::string longer = lines.back().empty() ? word : lines.back() + " " + word;
-    if (lines.back().empty() || wire::display_width(longer) <= num_columns ||
-        lines.size() == num_lines_max) {
-      lines.back() = longer;
-    } else {
-      lines.push_back(word);
-    }
-    begin = end + 1;
+  std::vector<std::string> lines = lines_of(std::string(text), num_columns, num_columns);
+  for (std::size_t i = num_lines_max; i < lines.size(); ++i) {
+    lines[num_lines_max - 1] += " " + lines[i];
   }
+  lines.resize(std::min(lines.size(), num_lines_max));
   for (std::string& line : lines) line = wire::shortened(line, num_columns);
   return lines;
 }
@@ -320,7 +313,7 @@ bool AxisMap::has(double value) const {
 
 double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
   double height = 0.0;
-  for (const std::string& line : wrapped_lines(title, width)) {
+  for (const std::string& line : title_lines(title, width)) {
     height += line_height;
     writer.text({corner.x, corner.y + height - 4.0}, line, {.is_bold = true});
   }

@@ -86,9 +86,6 @@ struct Step {
 // Ends that lack their tick by a rounding error have it.
 constexpr double tolerance = 1e-9;
 
-double first_multiple(double from, double step) { return std::ceil(from / step - tolerance); }
-double last_multiple(double to, double step) { return std::floor(to / step + tolerance); }
-
 Step step_for(double from, double to, std::size_t num_ticks_max) {
   for (int exponent = decade_of((to - from) / static_cast<double>(num_ticks_max));; ++exponent) {
     for (const double mantissa : mantissas) {
@@ -161,8 +158,8 @@ AxisRange linear_range(const ChartAxis& axis, double from, double to, std::size_
   const double size = step.size();
   if (!has_from) range.from = step.times(std::floor(range.from / size + tolerance));
   if (!has_to) range.to = step.times(std::ceil(range.to / size - tolerance));
-  const double last = last_multiple(range.to, size);
-  for (double count = first_multiple(range.from, size); count <= last; count += 1.0) {
+  const double last = std::floor(range.to / size + tolerance);
+  for (double count = std::ceil(range.from / size - tolerance); count <= last; count += 1.0) {
     const double value = step.times(count);
     range.ticks.push_back({value, tick_label(value, size)});
   }

@@ -28,19 +28,13 @@ std::string figures(const proto::CampaignStatus& status) {
 
 }  // namespace
 
-proto::CampaignStatus out_of(proto::CampaignStatus status, std::uint64_t num_runs) {
-  if (num_runs <= status.num_runs()) return status;
+proto::CampaignStatus out_of(proto::CampaignStatus status, std::uint64_t num_runs,
+                             std::uint64_t num_done_beside) {
   status.set_num_runs(num_runs);
+  status.set_num_done(status.num_done() - num_done_beside);
   if (status.rate_hz() > 0.0) {
     status.set_remaining_s(static_cast<double>(num_runs - status.num_done()) / status.rate_hz());
   }
-  return status;
-}
-
-proto::CampaignStatus of_part(proto::CampaignStatus status, std::uint64_t num_runs,
-                              std::uint64_t num_done_beside) {
-  status.set_num_runs(num_runs);
-  status.set_num_done(status.num_done() - num_done_beside);
   return status;
 }
 
@@ -73,12 +67,10 @@ ProgressDisplay::~ProgressDisplay() {
 void ProgressDisplay::update(const proto::CampaignStatus& status) {
   if (mode_ == DisplayMode::bar) return show_bar(status);
   if (mode_ == DisplayMode::quiet) return;
-  const std::uint64_t tenths = percent_done(status) / 10;
-  const bool has_failed = !status.storage_failure().empty();
-  const bool is_further = !tenths_shown_ || tenths > *tenths_shown_;
-  if (!is_further && has_failed == is_failure_shown_) return;
-  is_failure_shown_ = has_failed;
-  tenths_shown_ = tenths;
+  std::string gist =
+      fmt::format("{} {}", percent_done(status) / 10, status.storage_failure().empty());
+  if (gist == shown_) return;
+  shown_ = std::move(gist);
   wire::say_on(stream_, progress_line(status) + "\n");
 }
 

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,16 +17,11 @@ enum class DisplayMode : std::uint8_t {
   quiet,  ///< Notes only.
 };
 
-/// The progress of a campaign with a stop rule, which asks for more runs at each check, towards the
-/// most that it may take: so it never goes back.
-/// @param num_runs  The most; without a stop rule those of the campaign.
-[[nodiscard]] proto::CampaignStatus out_of(proto::CampaignStatus status, std::uint64_t num_runs);
-
-/// The progress of a part of a campaign.
-/// @param num_runs          Of the part.
-/// @param num_done_beside   Runs that were done already and are not of the part.
-[[nodiscard]] proto::CampaignStatus of_part(proto::CampaignStatus status, std::uint64_t num_runs,
-                                            std::uint64_t num_done_beside);
+/// The progress towards so many runs: the most that a campaign with a stop rule may take, which
+/// asks for more at each check, so that it never goes back; or those of a part of a campaign.
+/// @param num_done_beside  Runs that were done already and are not of the part.
+[[nodiscard]] proto::CampaignStatus out_of(proto::CampaignStatus status, std::uint64_t num_runs,
+                                           std::uint64_t num_done_beside = 0);
 
 /// A line of at most `columns_max` columns: runs done, percent, rate, time left; or that nothing
 /// can be stored. Before the first run is done, how many the workers have.
@@ -57,9 +51,7 @@ class ProgressDisplay {
   DisplayMode mode_;
   std::FILE* stream_;
   bool has_bar_ = false;
-  std::string shown_;
-  std::optional<std::uint64_t> tenths_shown_;
-  bool is_failure_shown_ = false;
+  std::string shown_;  ///< The bar, or what the last line was about.
 };
 
 /// `bar` if the stream takes_escapes(), `lines` otherwise.

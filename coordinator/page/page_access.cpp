@@ -54,12 +54,6 @@ TokenDigest digest_of(std::string_view text, std::string_view purpose) {
   return digest;
 }
 
-std::string hexadecimal(const TokenDigest& digest) {
-  std::string text;
-  for (const unsigned char byte : digest) text += fmt::format("{:02x}", byte);
-  return text;
-}
-
 /// The parts between separators; none of an empty text.
 std::vector<std::string_view> parts_of(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
@@ -131,7 +125,8 @@ PageAccess PageAccess::read(const std::filesystem::path& token_file) {
 }
 
 PageAccess::PageAccess(std::string_view token)
-    : digest_(digest_of(token, "")), cookie_value_(hexadecimal(digest_of(token, cookie_purpose))) {}
+    : digest_(digest_of(token, "")),
+      cookie_value_(fmt::format("{:02x}", fmt::join(digest_of(token, cookie_purpose), ""))) {}
 
 bool PageAccess::is_token(std::string_view text) const {
   const TokenDigest other = digest_of(text, "");

@@ -22,20 +22,7 @@ double probability_to_meet(const RequirementCheck& check, double exceedance_prob
 }
 
 bool is_same(const Tolerance& a, const Tolerance& b) {
-  return !(a.coverage < b.coverage || a.coverage > b.coverage || a.confidence < b.confidence ||
-           a.confidence > b.confidence);
-}
-
-/// The axis ends where nearly every campaign fails, and at what was seen at the farthest.
-double largest_shown(const Review& review, const Tolerance& tolerance) {
-  double end = std::min(4.0 * (1.0 - tolerance.coverage), 1.0);
-  for (const RequirementAnswer& row : review.matrix) {
-    const RequirementCheck& check = row.check;
-    if (!is_same(row.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
-    end = std::max(end, 1.1 * static_cast<double>(check.num_exceedances) /
-                            static_cast<double>(check.num_runs));
-  }
-  return std::min(end, 1.0);
+  return std::pair(a.coverage, a.confidence) == std::pair(b.coverage, b.confidence);
 }
 
 Curve observed_fractions(const Review& review, const Tolerance& tolerance) {
@@ -50,11 +37,19 @@ Curve observed_fractions(const Review& review, const Tolerance& tolerance) {
   return markers;
 }
 
+/// The axis ends where nearly every campaign fails, and at what was seen at the farthest.
+double largest_shown(const Curve& seen, const Tolerance& tolerance) {
+  double end = 4.0 * (1.0 - tolerance.coverage);
+  for (const Point& percents : seen.points) end = std::max(end, 1.1 * percents.x / 100.0);
+  return std::min(end, 1.0);
+}
+
 Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                            std::size_t number) {
   const Tolerance& tolerance = first.requirement.tolerance;
   const RequirementCheck& check = first.check;
-  const double end = largest_shown(review, tolerance);
+  Curve seen = observed_fractions(review, tolerance);
+  const double end = largest_shown(seen, tolerance);
   constexpr int num_points = 120;
   Curve line{.name = fmt::format("{} draws", check.num_runs)};
   for (int i = 0; i <= num_points; ++i) {
@@ -83,7 +78,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
       .layers = {std::move(line),
                  LimitLine{.label = fmt::format("allowed {}", given_percent(allowed)),
                            .value = 100.0 * allowed},
-                 observed_fractions(review, tolerance)}};
+                 std::move(seen)}};
 }
 
 std::string cell_label(double correlation) {

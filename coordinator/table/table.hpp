@@ -129,6 +129,10 @@ struct TerminalStyle {
 /// Text filled up with spaces on the right to `width` columns of a terminal.
 [[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
 
+/// Words in lines of at most `first` columns, and then of `width`; a longer word has its own.
+[[nodiscard]] std::vector<std::string> lines_of(const std::string& text, std::size_t first,
+                                                std::size_t width);
+
 /// Text broken between words, and in longer ones, to lines of at most 80 columns, from the second
 /// one on after `indent` spaces; the first one begins at column `begin`. No end of the last line.
 [[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin);

@@ -220,8 +220,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   const auto show = [&] {
     const proto::CampaignStatus status = service.campaigns().front();
     if (!service.is_done()) storage.update(status);  // Otherwise run_campaign() tells why.
-    display.update(options.part ? of_part(status, part.count, num_finished_beside)
-                                : out_of(status, num_runs));
+    display.update(out_of(status, part.count, num_finished_beside));
   };
   std::unique_ptr<Page> page = begin_page(options, display);
   service.run(stop, [&] {
