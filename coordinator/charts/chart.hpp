@@ -15,8 +15,8 @@ namespace proofmass::coordinator {
 // size of a picture does not depend on the number of runs. Texts may hold anything: they are
 // escaped where they are drawn.
 
-/// Colours by their role. A page or a theme says what they look like, see svg.hpp. Nothing is
-/// told by colour alone: layers also differ by dash, shape or label.
+/// Colours by their role. A page or a theme says what they look like, see theme_colours(). Nothing
+/// is told by colour alone: layers also differ by dash, shape or label.
 enum class Ink : std::uint8_t { first, second, third, fourth, text };
 enum class Dash : std::uint8_t { solid, dashed, dotted };
 enum class Shape : std::uint8_t { triangle, diamond };

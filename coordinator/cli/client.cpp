@@ -16,7 +16,6 @@
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/progress_display.hpp"
 #include "coordinator/net/answers.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"

@@ -243,12 +243,6 @@ bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
   return is_written;
 }
 
-bool has_given_up_runs(const Service& service) {
-  const std::vector<proto::CampaignStatus> campaigns = service.campaigns();
-  return std::any_of(campaigns.begin(), campaigns.end(),
-                     [](const proto::CampaignStatus& one) { return one.num_given_up() > 0; });
-}
-
 /// Serves all campaigns of a directory to the workers that connect.
 /// @return An ExitCode.
 int serve_campaigns(const ServeOptions& options) {
@@ -279,10 +273,11 @@ int serve_campaigns(const ServeOptions& options) {
   page.reset();                     // It may be reading files, too.
   commands.wait(command_wait_max);  // Before the files are closed, which they may be reading.
   const bool is_done = service.is_done();
-  const bool has_given_up = has_given_up_runs(service);
-  const std::size_t num_campaigns = service.campaigns().size();
+  const std::vector<proto::CampaignStatus> campaigns = service.campaigns();
+  const bool has_given_up =
+      std::ranges::any_of(campaigns, [](const auto& one) { return one.num_given_up() > 0; });
   const bool is_written = finish(service.close(), log);
-  log({.kind = "coordinator_ended", .fields = {{"campaigns", num_campaigns}}});
+  log({.kind = "coordinator_ended", .fields = {{"campaigns", campaigns.size()}}});
   if (!is_written || service.has_storage_failed()) return exit_cannot_be_done;
   const bool is_in_order =
       options.service.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;

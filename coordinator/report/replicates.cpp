@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "coordinator/report/json.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/run_groups.hpp"
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/table.hpp"
 

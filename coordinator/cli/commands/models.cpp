@@ -14,7 +14,6 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/run.hpp"
-#include "coordinator/cli/progress_display.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report.hpp"

@@ -1,5 +1,4 @@
-#include "coordinator/cli/progress_display.hpp"
-
+#include "coordinator/cli/local_run.hpp"
 #include "tests/coordinator/cli/display_output.hpp"
 #include "tests/test.hpp"
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/run_groups.hpp"
 #include "coordinator/table/table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
