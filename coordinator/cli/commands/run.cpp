@@ -302,10 +302,11 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
   if (!options.stop.stop_rule.empty()) throw UsageError(range + " (must not be with --until)");
 }
 
-void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
-  if (output == RunOutput::none) return;
+void print_outcome(const Store& store, const Campaign& campaign,
+                   std::optional<OutputFormat> output) {
+  if (!output) return;
   const Review review = read_review(store, campaign, ReviewDepth::matrix);
-  if (output == RunOutput::json) return print_json(report_json(review));
+  if (output == OutputFormat::json) return print_json(report_json(review));
   write_standard_output(report_text(review, style_of(stdout).paint));
 }
 
@@ -408,8 +409,7 @@ void add_run(CLI::App& app, Command& chosen) {
   add_range_option(command, options.part);
   add_run_options(command, options);
   add_page_options(command, options.page);
-  command.add_flag_callback(
-      "--json", [&output = options.output] { output = RunOutput::json; }, "Print JSON");
+  add_json_flag(command, *options.output);
 }
 
 }  // namespace proofmass::coordinator

@@ -16,9 +16,6 @@
 
 namespace proofmass::coordinator {
 
-/// What is printed when a campaign has run.
-enum class RunOutput : std::uint8_t { tables, json, none };
-
 /// How a campaign is run on this machine.
 struct RunOptions {
   std::filesystem::path campaign_file;
@@ -31,7 +28,8 @@ struct RunOptions {
   StopPlan stop;                         ///< Without StopPlan::num_runs_max.
   PageConfig page;
   bool is_quiet = false;
-  RunOutput output = RunOutput::tables;
+  /// Of the tables; empty: they are not printed.
+  std::optional<OutputFormat> output = OutputFormat::text;
 };
 
 /// Declares the options of `run` that say which campaign is run and how, but for FILE, --db,

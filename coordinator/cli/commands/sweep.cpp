@@ -57,7 +57,7 @@ using Sweep = std::vector<SweptCampaign>;
 
 RunOptions run_options_of(const SweepOptions& options, const SweptValues& values) {
   RunOptions run = options.run;
-  run.output = RunOutput::none;
+  run.output.reset();
   run.database =
       directory_of_sweep(options) / sweep_file_name(run.campaign_file.stem().string(), values);
   for (const auto& [key, value] : values) run.overrides.assignments.push_back(key + "=" + value);
