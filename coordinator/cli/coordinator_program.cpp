@@ -213,13 +213,6 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   return config;
 }
 
-void log_start(const Service& service, const Log& log) {
-  log({.kind = "coordinator_started",
-       .fields = {{"bind", service.workers_endpoint()},
-                  {"bind_clients", service.clients_endpoint()},
-                  {"campaigns", service.campaigns().size()}}});
-}
-
 /// Brings the statistics of the campaigns that are still open up to date.
 /// @return False if they could not all be written.
 bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
@@ -260,7 +253,10 @@ int serve_campaigns(const ServeOptions& options) {
   Service service(campaigns_of(options, folder), config, log);
   std::optional<Page> page;
   if (options.page.is_wanted()) page.emplace(options.page, log);
-  log_start(service, log);
+  log({.kind = "coordinator_started",
+       .fields = {{"bind", service.workers_endpoint()},
+                  {"bind_clients", service.clients_endpoint()},
+                  {"campaigns", service.campaigns().size()}}});
   wire::ServiceNotices notices;
   notices.ready();
   service.run(stop, [&] {

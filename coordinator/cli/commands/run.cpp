@@ -375,15 +375,6 @@ int run_campaign(const RunOptions& options) {
   return is_doubtful ? exit_not_met : exit_done;
 }
 
-namespace {
-
-int run_from_start(const RunOptions& options) {
-  end_at_stop_signals();  // Until there is a file.
-  return run_campaign(options);
-}
-
-}  // namespace
-
 void add_run_options(CLI::App& command, RunOptions& options) {
   add_override_options(command, options.overrides);
   add_audit_option(command, options.audit_fraction);
@@ -401,7 +392,10 @@ void add_run_options(CLI::App& command, RunOptions& options) {
 
 void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
-      app, chosen, "run", "Run a campaign, or its missing runs", run_from_start);
+      app, chosen, "run", "Run a campaign, or its missing runs", [](const RunOptions& given) {
+        end_at_stop_signals();  // Until there is a file.
+        return run_campaign(given);
+      });
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_campaign_file(command, options.campaign_file);
   command.add_option("--db", options.database, "Database; by default FILE's stem with .db, here")
