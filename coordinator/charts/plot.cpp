@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -107,206 +108,7 @@ double label_margin(const AxisRange& range) {
   return width + 10.0;
 }
 
-bool is_marked(const Layer& layer) {
-  const auto* const curve = std::get_if<Curve>(&layer);
-  return curve != nullptr && std::holds_alternative<Shape>(curve->look);
-}
-
-void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
-  writer.raw(fmt::format(
-      "<clipPath id=\"{}-clip\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath>\n"
-      "<g clip-path=\"url(#{}-clip)\">\n",
-      chart.text.id, coordinate(area.box.left), coordinate(area.box.top),
-      coordinate(area.box.width), coordinate(area.box.height), chart.text.id));
-  for (const Layer& layer : chart.layers) {
-    if (!is_marked(layer)) draw_layer(layer, area, writer);
-  }
-  writer.raw("</g>\n");
-  // Half of a marker, and its label, may be outside of the axes.
-  for (const Layer& layer : chart.layers) {
-    if (is_marked(layer)) draw_layer(layer, area, writer);
-  }
-}
-
-double draw_head(const Chart& chart, Point corner, double width, SvgWriter& writer) {
-  double height = draw_title(chart.text.title, corner, width, writer);
-  height += draw_legend(legend_of(chart), {corner.x, corner.y + height}, width, writer);
-  if (chart.y.label.empty()) return height + 8.0;
-  writer.text({corner.x, corner.y + height + 13.0}, chart.y.label);
-  return height + 24.0;
-}
-
-}  // namespace
-
-double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& writer) {
-  constexpr double right_margin = 16.0;
-  const Extents extents = extents_of(chart);
-  PlotArea area;
-  area.y = {.scale = chart.y.scale,
-            .range = range_of(chart.y, extents.y, num_ticks_for(chart.plot_height, 35.0))};
-  const double left = label_margin(area.y.range);
-  area.box = {corner.x + left, 0.0, width - left - right_margin, chart.plot_height};
-  area.x = {.scale = chart.x.scale,
-            .range = range_of(chart.x, extents.x, num_ticks_for(area.box.width, 50.0)),
-            .begin = area.box.left,
-            .end = area.box.right()};
-  const std::vector<const LimitLine*> limits = vertical_limits(chart, area.x);
-  area.box.top = corner.y + draw_head(chart, corner, width, writer) +
-                 limit_row_height * static_cast<double>(limits.size());
-  area.y.begin = area.box.bottom();
-  area.y.end = area.box.top;
-  draw_y_axis(area.y, area.box, writer);
-  draw_x_axis(area.x, chart.x, area.box, writer);
-  draw_layers(chart, area, writer);
-  draw_limit_labels(limits, area.x, area.box, writer);
-  if (!extents.has_data) {
-    writer.text({area.box.left + area.box.width / 2.0, area.box.top + area.box.height / 2.0},
-                "no data", {.anchor = Anchor::middle});
-  }
-  return area.box.bottom() + x_axis_height - corner.y;
-}
-
-double draw_chart(const ChartGrid& grid, Point corner, double width, SvgWriter& writer) {
-  constexpr double gap = 14.0;
-  const double cell_width = (width - gap) / 2.0;
-  double top = corner.y + draw_title(grid.text.title, corner, width, writer) + 4.0;
-  double row_height = 0.0;
-  for (std::size_t i = 0; i < grid.charts.size(); ++i) {
-    if (i > 0 && i % 2 == 0) top += std::exchange(row_height, 0.0) + 8.0;
-    const Point place{corner.x + (i % 2 == 0 ? 0.0 : cell_width + gap), top};
-    row_height = std::max(row_height, draw_chart(grid.charts[i], place, cell_width, writer));
-  }
-  return top + row_height - corner.y;
-}
-
-namespace {
-
-constexpr double line_height = 19.0;
-
-/// Lines of whole words, as far as words fit; at most three.
-std::vector<std::string> wrapped_lines(std::string_view text, double width) {
-  constexpr std::size_t num_lines_max = 3;
-  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
-  std::vector<std::string> lines{""};
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string word(text.substr(begin, end - begin));
-    const std::string longer = lines.back().empty() ? word : lines.back() + " " + word;
-    if (lines.back().empty() || wire::display_width(longer) <= num_columns ||
-        lines.size() == num_lines_max) {
-      lines.back() = longer;
-    } else {
-      lines.push_back(word);
-    }
-    begin = end + 1;
-  }
-  for (std::string& line : lines) line = wire::shortened(line, num_columns);
-  return lines;
-}
-
-constexpr double sample_width = 22.0;
-
-void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
-  const double middle = place.y - 4.5;
-  const std::string colour = writer.colour(entry.ink);
-  if (const auto* const shape = std::get_if<Shape>(&entry.look)) {
-    writer.marker({place.x + 8.0, middle}, *shape, entry.ink);
-  } else if (const auto* const dash = std::get_if<Dash>(&entry.look)) {
-    writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
-                {.colour = colour, .width = 2.0, .dash = *dash});
-  } else {
-    writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
-                              std::get<double>(entry.look), {.colour = colour, .width = 1.0});
-  }
-}
-
-/// Labels that would touch the one before them are left out.
-class FreeSpace {
- public:
-  [[nodiscard]] bool take(double from, double to) {
-    if (from < end_) return false;
-    end_ = to;
-    return true;
-  }
-
- private:
-  double end_ = -1e9;
-};
-
-}  // namespace
-
-double AxisMap::at(double value) const {
-  if (scale == Scale::linear) {
-    return begin + (value - range.from) / (range.to - range.from) * (end - begin);
-  }
-  if (!(value > 0.0)) return begin;
-  return begin + std::log(value / range.from) / std::log(range.to / range.from) * (end - begin);
-}
-
-bool AxisMap::contains(double value) const {
-  if (!has(value)) return false;
-  const double place = (at(value) - begin) / (end - begin);
-  return place >= -1e-9 && place <= 1.0 + 1e-9;
-}
-
-bool AxisMap::has(double value) const {
-  return std::isfinite(value) && (scale == Scale::linear || value > 0.0);
-}
-
-double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
-  double height = 0.0;
-  for (const std::string& line : wrapped_lines(title, width)) {
-    height += line_height;
-    writer.text({corner.x, corner.y + height - 4.0}, line, {.is_bold = true});
-  }
-  return height + 3.0;
-}
-
-double draw_legend(std::span<const LegendEntry> entries, Point corner, double width,
-                   SvgWriter& writer) {
-  if (entries.empty()) return 0.0;
-  Point place{corner.x, corner.y + 14.0};
-  for (const LegendEntry& entry : entries) {
-    const double needed = sample_width + 1.06 * text_width(entry.name) + 14.0;
-    if (place.x > corner.x && place.x + needed > corner.x + width) {
-      place = {corner.x, place.y + line_height};
-    }
-    draw_sample(entry, place, writer);
-    writer.text({place.x + sample_width, place.y}, entry.name);
-    place.x += needed;
-  }
-  return place.y - corner.y + 8.0;
-}
-
-void Extent::add(double value) {
-  if (!std::isfinite(value) || (scale == Scale::logarithmic && value <= 0.0)) return;
-  from = std::min(from.value_or(value), value);
-  to = std::max(to.value_or(value), value);
-}
-
-AxisRange range_of(const ChartAxis& axis, const Extent& data, std::size_t num_ticks_max) {
-  const bool is_linear = axis.scale == Scale::linear;
-  const double lower = data.from.value_or(is_linear ? 0.0 : 1.0);
-  const double upper = data.to.value_or(is_linear ? 1.0 : 10.0);
-  return is_linear ? linear_range(axis, lower, upper, num_ticks_max)
-                   : logarithmic_range(axis, lower, upper, num_ticks_max);
-}
-
-void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer) {
-  FreeSpace space;
-  for (const Tick& tick : x.range.ticks) {
-    const double at = x.at(tick.value);
-    writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
-    const double half = text_width(tick.label) / 2.0;
-    if (!space.take(at - half, at + half + 3.0)) continue;
-    writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});
-  }
-  writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
-              {.colour = writer.colour(Ink::text)});
-  writer.text({box.left + box.width / 2.0, box.bottom() + 34.0}, axis.label,
-              {.anchor = Anchor::middle});
-}
-
+/// Grid lines and labels of ticks on the left of the box; the label is not drawn.
 void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
   for (const Tick& tick : y.range.ticks) {
     const double at = y.at(tick.value);
@@ -316,7 +118,11 @@ void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
   writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
 }
 
-namespace {
+struct PlotArea {
+  AxisMap x;
+  AxisMap y;
+  Box box;
+};
 
 std::string place_text(char command, double x, double y) {
   return command + coordinate(x) + " " + coordinate(y);
@@ -379,10 +185,185 @@ void draw(const LimitLine& limit, const PlotArea& area, SvgWriter& writer) {
               {.colour = writer.colour(limit.ink), .width = 2.0, .dash = limit.dash});
 }
 
+bool is_marked(const Layer& layer) {
+  const auto* const curve = std::get_if<Curve>(&layer);
+  return curve != nullptr && std::holds_alternative<Shape>(curve->look);
+}
+
+void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
+  const auto draw_it = [&](const auto& layer) { draw(layer, area, writer); };
+  writer.raw(fmt::format(
+      "<clipPath id=\"{}-clip\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath>\n"
+      "<g clip-path=\"url(#{}-clip)\">\n",
+      chart.text.id, coordinate(area.box.left), coordinate(area.box.top),
+      coordinate(area.box.width), coordinate(area.box.height), chart.text.id));
+  for (const Layer& layer : chart.layers) {
+    if (!is_marked(layer)) std::visit(draw_it, layer);
+  }
+  writer.raw("</g>\n");
+  // Half of a marker, and its label, may be outside of the axes.
+  for (const Layer& layer : chart.layers) {
+    if (is_marked(layer)) std::visit(draw_it, layer);
+  }
+}
+
+double draw_head(const Chart& chart, Point corner, double width, SvgWriter& writer) {
+  double height = draw_title(chart.text.title, corner, width, writer);
+  height += draw_legend(legend_of(chart), {corner.x, corner.y + height}, width, writer);
+  if (chart.y.label.empty()) return height + 8.0;
+  writer.text({corner.x, corner.y + height + 13.0}, chart.y.label);
+  return height + 24.0;
+}
+
 }  // namespace
 
-void draw_layer(const Layer& layer, const PlotArea& area, SvgWriter& writer) {
-  std::visit([&](const auto& shown) { draw(shown, area, writer); }, layer);
+double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& writer) {
+  constexpr double right_margin = 16.0;
+  const Extents extents = extents_of(chart);
+  PlotArea area;
+  area.y = {.scale = chart.y.scale,
+            .range = range_of(chart.y, extents.y, num_ticks_for(chart.plot_height, 35.0))};
+  const double left = label_margin(area.y.range);
+  area.box = {corner.x + left, 0.0, width - left - right_margin, chart.plot_height};
+  area.x = {.scale = chart.x.scale,
+            .range = range_of(chart.x, extents.x, num_ticks_for(area.box.width, 50.0)),
+            .begin = area.box.left,
+            .end = area.box.right()};
+  const std::vector<const LimitLine*> limits = vertical_limits(chart, area.x);
+  area.box.top = corner.y + draw_head(chart, corner, width, writer) +
+                 limit_row_height * static_cast<double>(limits.size());
+  area.y.begin = area.box.bottom();
+  area.y.end = area.box.top;
+  draw_y_axis(area.y, area.box, writer);
+  draw_x_axis(area.x, chart.x, area.box, writer);
+  draw_layers(chart, area, writer);
+  draw_limit_labels(limits, area.x, area.box, writer);
+  if (!extents.has_data) {
+    writer.text({area.box.left + area.box.width / 2.0, area.box.top + area.box.height / 2.0},
+                "no data", {.anchor = Anchor::middle});
+  }
+  return area.box.bottom() + x_axis_height - corner.y;
+}
+
+double draw_chart(const ChartGrid& grid, Point corner, double width, SvgWriter& writer) {
+  constexpr double gap = 14.0;
+  const double cell_width = (width - gap) / 2.0;
+  double top = corner.y + draw_title(grid.text.title, corner, width, writer) + 4.0;
+  double row_height = 0.0;
+  for (std::size_t i = 0; i < grid.charts.size(); ++i) {
+    if (i > 0 && i % 2 == 0) top += std::exchange(row_height, 0.0) + 8.0;
+    const Point place{corner.x + (i % 2 == 0 ? 0.0 : cell_width + gap), top};
+    row_height = std::max(row_height, draw_chart(grid.charts[i], place, cell_width, writer));
+  }
+  return top + row_height - corner.y;
+}
+
+namespace {
+
+constexpr double line_height = 19.0;
+
+/// Lines of whole words, as far as words fit; at most three.
+std::vector<std::string> title_lines(std::string_view text, double width) {
+  constexpr std::size_t num_lines_max = 3;
+  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
+  std::vector<std::string> lines = lines_of(std::string(text), num_columns, num_columns);
+  for (std::size_t i = num_lines_max; i < lines.size(); ++i) {
+    lines[num_lines_max - 1] += " " + lines[i];
+  }
+  lines.resize(std::min(lines.size(), num_lines_max));
+  for (std::string& line : lines) line = wire::shortened(line, num_columns);
+  return lines;
+}
+
+constexpr double sample_width = 22.0;
+
+void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
+  const double middle = place.y - 4.5;
+  const std::string colour = writer.colour(entry.ink);
+  if (const auto* const shape = std::get_if<Shape>(&entry.look)) {
+    writer.marker({place.x + 8.0, middle}, *shape, entry.ink);
+  } else if (const auto* const dash = std::get_if<Dash>(&entry.look)) {
+    writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
+                {.colour = colour, .width = 2.0, .dash = *dash});
+  } else {
+    writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
+                              std::get<double>(entry.look), {.colour = colour, .width = 1.0});
+  }
+}
+
+}  // namespace
+
+double AxisMap::at(double value) const {
+  if (scale == Scale::linear) {
+    return begin + (value - range.from) / (range.to - range.from) * (end - begin);
+  }
+  if (!(value > 0.0)) return begin;
+  return begin + std::log(value / range.from) / std::log(range.to / range.from) * (end - begin);
+}
+
+bool AxisMap::contains(double value) const {
+  if (!has(value)) return false;
+  const double place = (at(value) - begin) / (end - begin);
+  return place >= -1e-9 && place <= 1.0 + 1e-9;
+}
+
+bool AxisMap::has(double value) const {
+  return std::isfinite(value) && (scale == Scale::linear || value > 0.0);
+}
+
+double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
+  double height = 0.0;
+  for (const std::string& line : title_lines(title, width)) {
+    height += line_height;
+    writer.text({corner.x, corner.y + height - 4.0}, line, {.is_bold = true});
+  }
+  return height + 3.0;
+}
+
+double draw_legend(std::span<const LegendEntry> entries, Point corner, double width,
+                   SvgWriter& writer) {
+  if (entries.empty()) return 0.0;
+  Point place{corner.x, corner.y + 14.0};
+  for (const LegendEntry& entry : entries) {
+    const double needed = sample_width + 1.06 * text_width(entry.name) + 14.0;
+    if (place.x > corner.x && place.x + needed > corner.x + width) {
+      place = {corner.x, place.y + line_height};
+    }
+    draw_sample(entry, place, writer);
+    writer.text({place.x + sample_width, place.y}, entry.name);
+    place.x += needed;
+  }
+  return place.y - corner.y + 8.0;
+}
+
+void Extent::add(double value) {
+  if (!std::isfinite(value) || (scale == Scale::logarithmic && value <= 0.0)) return;
+  from = std::min(from.value_or(value), value);
+  to = std::max(to.value_or(value), value);
+}
+
+AxisRange range_of(const ChartAxis& axis, const Extent& data, std::size_t num_ticks_max) {
+  const bool is_linear = axis.scale == Scale::linear;
+  const double lower = data.from.value_or(is_linear ? 0.0 : 1.0);
+  const double upper = data.to.value_or(is_linear ? 1.0 : 10.0);
+  return is_linear ? linear_range(axis, lower, upper, num_ticks_max)
+                   : logarithmic_range(axis, lower, upper, num_ticks_max);
+}
+
+void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer) {
+  double taken_to = -1e9;
+  for (const Tick& tick : x.range.ticks) {
+    const double at = x.at(tick.value);
+    writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
+    const double half = text_width(tick.label) / 2.0;
+    if (at - half < taken_to) continue;  // It would touch the label before it.
+    taken_to = at + half + 3.0;
+    writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});
+  }
+  writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
+              {.colour = writer.colour(Ink::text)});
+  writer.text({box.left + box.width / 2.0, box.bottom() + 34.0}, axis.label,
+              {.anchor = Anchor::middle});
 }
 
 }  // namespace proofmass::coordinator
