@@ -71,9 +71,6 @@ namespace detail {
 /// `message` is empty at first.
 void write_definition(const Definition& definition, proto::Definition& message);
 
-/// @throws Error if there is too much of anything, rows are not whole, or a number is not finite.
-void check_definition(const proto::Definition& message);
-
 /// @pre The message has been checked.
 [[nodiscard]] Definition read_definition(const proto::Definition& message);
 
