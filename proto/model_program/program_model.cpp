@@ -19,7 +19,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -122,15 +121,10 @@ ProgramProcess::~ProgramProcess() {
 
 std::string ProgramProcess::how_it_ended() {
   // It has closed its output, which it does just before it ends unless it means to stay.
-  constexpr int attempts_max = 100;
-  for (int i = 0; i < attempts_max; ++i) {
-    if (const std::optional<int> status = status_if_ended(process_id_)) {
-      process_id_ = 0;
-      return end_text(*status);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return "it closed its output";
+  const std::optional<int> status =
+      status_at_end(process_id_, [num_left = 100]() mutable { return num_left-- > 0; });
+  process_id_ = 0;
+  return status ? end_text(*status) : "it closed its output";
 }
 
 void ProgramProcess::fail(std::string_view reason) const {
