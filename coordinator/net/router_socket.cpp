@@ -47,7 +47,7 @@ RouterSocket::RouterSocket(zmq::context_t& context, std::string_view option,
     : context_(context), option_(option), security_(security) {
   bind(endpoint, listener);
   endpoint_ = socket_->get(zmq::sockopt::last_endpoint);
-  if (security_.domain == wire::Domain::clients) return;
+  if (security_.peers == wire::KeyRole::client) return;
   sending_ = wire::link_faults(wire::LinkFaults::Direction::sending);
   receiving_ = wire::link_faults(wire::LinkFaults::Direction::receiving);
 }

@@ -16,7 +16,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::Domain;
+using wire::KeyRole;
 
 constexpr const char* zap_address = "inproc://zeromq.zap.01";
 constexpr std::string_view zap_version = "1.0";
@@ -153,10 +153,9 @@ std::optional<Authenticator::Handshake> Authenticator::Handshake::from(
 
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
                              Log log)
-    : log_(std::move(log)),
-      refusals_(log_),
-      workers_(directory / wire::authorized_workers_name, Domain::workers),
-      clients_(directory / wire::authorized_clients_name, Domain::clients),
+    : refusals_(log),
+      workers_(directory / list_name(KeyRole::worker), KeyRole::worker, log),
+      clients_(directory / list_name(KeyRole::client), KeyRole::client, log),
       socket_(std::make_unique<zmq::socket_t>(context, zmq::socket_type::rep)) {
   try {
     socket_->bind(zap_address);
@@ -169,17 +168,15 @@ Authenticator::~Authenticator() = default;
 
 void* Authenticator::handle() const { return socket_->handle(); }
 
-void Authenticator::on_event(Domain domain, const wire::SocketEvent& event, TimePoint now) {
+void Authenticator::on_event(KeyRole role, const wire::SocketEvent& event, TimePoint now) {
   if ((event.kind & failed_handshakes) == 0) return;
   refusals_.refused(
-      {.domain = to_text(domain), .address = {}, .public_key = {}, .reason = reason_of(event)},
+      {.domain = domain_of(role), .address = {}, .public_key = {}, .reason = reason_of(event)},
       now);
 }
 
 void Authenticator::serve(TimePoint now) {
-  for (AllowList* const list : {&workers_, &clients_}) {
-    report(*list, list->refresh_if_due(now));
-  }
+  for (AllowList* const list : {&workers_, &clients_}) list->refresh_if_due(now);
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;
@@ -193,19 +190,19 @@ void Authenticator::serve(TimePoint now) {
   }
 }
 
-bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimePoint now) {
-  report(list_of(domain), list_of(domain).refresh_if_due(now));
-  return list_of(domain).owner_of(public_key) != nullptr;
+bool Authenticator::is_allowed(KeyRole role, std::string_view public_key, TimePoint now) {
+  list_of(role).refresh_if_due(now);
+  return list_of(role).owner_of(public_key) != nullptr;
 }
 
 std::optional<Asker> Authenticator::client(std::string_view public_key, TimePoint now) {
-  if (!is_allowed(Domain::clients, public_key, now)) return std::nullopt;
+  if (!is_allowed(KeyRole::client, public_key, now)) return std::nullopt;
   const AllowedKey& owner = *clients_.owner_of(public_key);
   return Asker{.name = owner.name, .rights = owner.rights};
 }
 
-AllowList& Authenticator::list_of(Domain domain) {
-  return domain == Domain::workers ? workers_ : clients_;
+AllowList& Authenticator::list_of(KeyRole role) {
+  return role == KeyRole::worker ? workers_ : clients_;
 }
 
 Authenticator::Answer Authenticator::answer(const Handshake& handshake, TimePoint now) {
@@ -220,17 +217,17 @@ Authenticator::Answer Authenticator::answer(const Handshake& handshake, TimePoin
 }
 
 std::string_view Authenticator::refusal(const Handshake& handshake, TimePoint now) {
-  std::optional<Domain> domain;
-  for (const Domain known : {Domain::workers, Domain::clients}) {
-    if (handshake.domain == to_text(known)) domain = known;
+  std::optional<KeyRole> role;
+  for (const KeyRole known : {KeyRole::worker, KeyRole::client}) {
+    if (handshake.domain == domain_of(known)) role = known;
   }
-  if (!domain) return "no such domain";
+  if (!role) return "no such domain";
   if (handshake.public_key.empty()) return "without a key";
-  report(list_of(*domain), list_of(*domain).refresh(now));
-  if (list_of(*domain).owner_of(handshake.public_key) != nullptr) return {};
-  const Domain other = *domain == Domain::workers ? Domain::clients : Domain::workers;
+  list_of(*role).refresh(now);
+  if (list_of(*role).owner_of(handshake.public_key) != nullptr) return {};
+  const KeyRole other = *role == KeyRole::worker ? KeyRole::client : KeyRole::worker;
   if (list_of(other).owner_of(handshake.public_key) == nullptr) return "unknown key";
-  return other == Domain::workers ? "key of a worker" : "key of a client";
+  return other == KeyRole::worker ? "key of a worker" : "key of a client";
 }
 
 void Authenticator::reply(std::string_view id, const Answer& answer) {
@@ -242,20 +239,6 @@ void Authenticator::reply(std::string_view id, const Answer& answer) {
         zmq::buffer(frames[i]),
         is_last ? zmq::send_flags::dontwait : zmq::send_flags::dontwait | zmq::send_flags::sndmore);
   }
-}
-
-void Authenticator::report(AllowList& list, const std::optional<std::string>& what_is_wrong) const {
-  if (const auto change = list.take_change()) {
-    log_({.severity = Severity::info,
-          .kind = "allow_list_read",
-          .fields = {{"file", list.file().string()},
-                     {"added", change->num_added},
-                     {"removed", change->num_removed}}});
-  }
-  if (!what_is_wrong) return;
-  log_({.severity = Severity::error,
-        .kind = "allow_list_unreadable",
-        .fields = {Field::remark(*what_is_wrong + "; the list before it stands")}});
 }
 
 }  // namespace proofmass::coordinator
