@@ -15,10 +15,6 @@
 namespace proofmass::worker {
 namespace {
 
-Duration times(double factor, Duration duration) {
-  return std::chrono::duration_cast<Duration>(factor * duration);
-}
-
 std::int64_t whole_seconds(Duration duration) {
   return std::chrono::duration_cast<std::chrono::seconds>(duration).count();
 }
@@ -256,6 +252,11 @@ void Conversation::send(proto::Envelope message) {
   send_(std::move(message));
 }
 
+Duration Conversation::with_jitter(Duration delay) const {
+  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
+  return std::chrono::duration_cast<Duration>((1.0 + jitter) * delay);
+}
+
 void Conversation::register_again(TimePoint now) {
   is_registered_ = false;
   hello_delay_ = config_.hello_delay;
@@ -270,8 +271,7 @@ void Conversation::come_again(const proto::Reject& reject, TimePoint now) {
   refused_at_ = now;
   is_registered_ = false;
   is_closed_out_ = reject.reason() == proto::REJECT_REASON_MALFORMED || revocation_;
-  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
-  hello_due_at_ = now + times(1.0 + jitter, refusal_delay_);
+  hello_due_at_ = now + with_jitter(refusal_delay_);
   hello_delay_ = config_.hello_delay;
   refusal_delay_ = std::min(2 * refusal_delay_, config_.refusal_delay_max);
   if (!noted_refusals_.insert(reject.reason()).second) return;
@@ -288,8 +288,7 @@ void Conversation::say_hello(TimePoint now) {
   proto::Envelope envelope;
   *envelope.mutable_hello() = hello_;
   send(std::move(envelope));
-  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
-  hello_due_at_ = now + times(1.0 + jitter, hello_delay_);
+  hello_due_at_ = now + with_jitter(hello_delay_);
   hello_delay_ = std::min(2 * hello_delay_, config_.hello_delay_max);
 }
 

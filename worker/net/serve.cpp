@@ -173,7 +173,6 @@ class Keeping {
       : conversation_(conversation), log_(log) {
     if (!path) return;
     spool_.emplace(*path, model);
-    spooler_.emplace(*spool_);
     if (spool_->num_bytes_dropped() > 0) {
       log_({.severity = wire::Severity::warning,
             .kind = "spool_torn",
@@ -185,13 +184,13 @@ class Keeping {
   }
 
   void on_tick(TimePoint now) {
-    if (!spooler_ || !take_turn(due_at_, now, spool_interval)) return;
-    warn(spooler_->look(conversation_.unacknowledged()));
+    if (!spool_ || !take_turn(due_at_, now, spool_interval)) return;
+    warn(spool_->look(conversation_.unacknowledged()));
   }
 
   void finish() {
-    if (spooler_) {
-      warn(spooler_->finish(conversation_.unacknowledged()));
+    if (spool_) {
+      warn(spool_->finish(conversation_.unacknowledged()));
     } else if (conversation_.num_unacknowledged() > 0) {
       log_(
           {.severity = wire::Severity::warning,
@@ -213,7 +212,6 @@ class Keeping {
   Conversation& conversation_;
   const wire::Log& log_;
   std::optional<Spool> spool_;
-  std::optional<Spooler> spooler_;
   std::optional<std::string> former_reason_;
   TimePoint due_at_ = TimePoint::min();
 };
