@@ -5,9 +5,13 @@
 #include <deque>
 #include <exception>
 #include <functional>
+#include <future>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "proto/wire/client_codec.hpp"
@@ -79,5 +83,17 @@ class Background {
   bool is_ending_ = false;
   std::thread thread_;  ///< Begins when all else is there.
 };
+
+/// Work that may throw, and what is done with its result, a future that is ready.
+template <typename Action, typename Then>
+[[nodiscard]] Background::Work work_of(Action action, Then then) {
+  using Task = std::packaged_task<std::invoke_result_t<Action&>()>;
+  // Shared, as functions that can be copied hold it.
+  const auto task = std::make_shared<Task>(std::move(action));
+  return [task, then = std::move(then)]() -> Background::Finish {
+    (*task)();
+    return [task, then] { then(task->get_future()); };
+  };
+}
 
 }  // namespace proofmass::coordinator
