@@ -8,12 +8,10 @@
 #include <google/protobuf/wire_format_lite.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "core/error.hpp"
-#include "proto/wire/rules.hpp"
 
 namespace proofmass::wire::detail {
 namespace {
@@ -130,13 +128,6 @@ std::string printable(std::string_view text) {
   std::replace_if(
       result.begin(), result.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
   return result;
-}
-
-void require_magnitude(double value, std::string_view field, double most) {
-  if (value >= 0.0 && value <= most) return;
-  const bool is_too_large = value > most && std::isfinite(value);
-  throw ConfigError(field, fmt::format("{}", value),
-                    is_too_large ? fmt::format("must be <= {}", most) : "must be >= 0");
 }
 
 }  // namespace proofmass::wire::detail

@@ -1,16 +1,10 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 
-#include "core/error.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace google::protobuf {
@@ -52,24 +46,16 @@ template <typename Envelope>
 /// parts may come from that peer.
 [[nodiscard]] std::string printable(std::string_view text);
 
-// What rules require of values that a peer sent; they throw ConfigError. Texts are made for a
-// refusal only: a batch of results asks thousands of times.
+// What a field may be: rules.cpp.
 
-inline void require(bool condition, std::string_view field, const std::string& value,
-                    std::string_view rule) {
-  if (!condition) throw ConfigError(field, value, rule);
-}
+/// Whether a message, and those in it, are what a peer may send: numbers and sizes are within their
+/// limits, enumerators are known, names are names, lists have as many entries as others say.
+/// @throws ConfigError reading `field = value (rule)`.
+void check_rules(const google::protobuf::Message& message);
 
-template <typename Number>
-void require_in(Number value, std::type_identity_t<Number> least, std::type_identity_t<Number> most,
-                std::string_view field, std::string_view unit = "") {
-  if (value >= least && value <= most) return;
-  throw ConfigError(field, fmt::format("{}{}", value, unit),
-                    fmt::format("must be in [{}, {}]", least, most));
-}
-
-/// Finite, and in [0, most].
-void require_magnitude(double value, std::string_view field,
-                       double most = std::numeric_limits<double>::max());
+/// Makes each text of a message, and of those in it, one that may be sent: a name a name, what goes
+/// to a terminal no longer than that may be and printable. A number that is not finite or negative
+/// becomes 0. Fields of bytes stay as they are.
+void make_sendable(google::protobuf::Message& message);
 
 }  // namespace proofmass::wire::detail

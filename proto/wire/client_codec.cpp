@@ -7,7 +7,6 @@
 #include "core/error.hpp"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/definition_codec.hpp"
-#include "proto/wire/rules.hpp"
 
 namespace proofmass::wire {
 namespace {

@@ -60,11 +60,11 @@ std::string encode_definition(const Definition& definition) {
   return detail::bytes_of(message, definition_form);
 }
 
-std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) {
+Definition decode_definition(std::string_view bytes) {
   proto::Definition message;
   auto fault = detail::parse(bytes, definition_form, message);
   if (!fault) fault = detail::fault_in(message);
-  if (fault) return *std::move(fault);
+  if (fault) throw Error(fault->text);
   return detail::read_definition(message);
 }
 
@@ -94,16 +94,15 @@ IncomingDefinition::Progress IncomingDefinition::add(const proto::DefinitionPart
   return bytes_.size() == total_size_ ? Progress::complete : Progress::advanced;
 }
 
-std::variant<Definition, DecodeError> IncomingDefinition::take() {
+Definition IncomingDefinition::take() {
   PROOFMASS_EXPECT(bytes_.size() == total_size_);
   const std::string bytes = std::exchange(bytes_, {});
   total_size_ = 0;
   const std::uint64_t expected = std::exchange(checksum_, 0);
   const std::uint64_t found = fnv1a(bytes);
   if (found != expected) {
-    return DecodeError{
-        DecodeFault::invalid,
-        fmt::format("checksum = {:016x} (must be {:016x}, the definition's)", found, expected)};
+    throw Error(
+        fmt::format("checksum = {:016x} (must be {:016x}, the definition's)", found, expected));
   }
   return decode_definition(bytes);
 }

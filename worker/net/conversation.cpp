@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <utility>
-#include <variant>
 
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
@@ -17,17 +16,6 @@ namespace {
 
 std::int64_t whole_seconds(Duration duration) {
   return std::chrono::duration_cast<std::chrono::seconds>(duration).count();
-}
-
-/// The campaign that was received, or why it is none.
-std::variant<std::shared_ptr<const Campaign>, std::string> read_definition(
-    const Execution& execution, std::variant<Definition, wire::DecodeError> taken) {
-  if (auto* const error = std::get_if<wire::DecodeError>(&taken)) return std::move(error->text);
-  try {
-    return execution.read(std::get<Definition>(std::move(taken)));
-  } catch (const Error& error) {
-    return error.what();
-  }
 }
 
 }  // namespace
@@ -369,15 +357,16 @@ void Conversation::request_definitions(TimePoint now) {
 /// coordinator's program. It is asked for again in a while, as the program may be exchanged.
 void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   WantedDefinition& wanted = wanted_.at(campaign);
-  const auto read = read_definition(execution_, wanted.incoming.take());
-  if (const auto* const refusal = std::get_if<std::string>(&read)) {
+  std::shared_ptr<const Campaign> definition;
+  try {
+    definition = execution_.read(wanted.incoming.take());
+  } catch (const Error& error) {
     wanted.request_due_at = now + config_.request_again_after;
     return note({.severity = wire::Severity::error,
                  .kind = "malformed_definition",
                  .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
-                            wire::Field::remark(fmt::format("{:.400}", *refusal))}});
+                            wire::Field::remark(fmt::format("{:.400}", error.what()))}});
   }
-  const auto& definition = std::get<std::shared_ptr<const Campaign>>(read);
   wanted_.erase(campaign);
   if (agrees_on_table(campaign, definition->table_quantities().size())) {
     execution_.define(campaign, definition);

@@ -123,32 +123,21 @@ struct Authenticator::Handshake {
   std::string id;
   std::string domain;
   std::string address;
-  std::string mechanism;
   std::string public_key;  ///< Z85; empty if the peer has none.
 
   /// Nothing if the frames are no such question.
   [[nodiscard]] static std::optional<Handshake> from(const std::vector<std::string>& frames);
 };
 
-struct Authenticator::Answer {
-  std::string_view status;  ///< 200: welcome; 400: not.
-  std::string_view text;
-  std::string user_id;
-};
-
 std::optional<Authenticator::Handshake> Authenticator::Handshake::from(
     const std::vector<std::string>& frames) {
   constexpr std::size_t num_fixed_frames = 6;
   if (frames.size() < num_fixed_frames || frames[0] != zap_version) return std::nullopt;
-  Handshake handshake{.id = frames[1],
-                      .domain = frames[2],
-                      .address = frames[3],
-                      .mechanism = frames[5],
-                      .public_key = {}};
-  if (handshake.mechanism == "CURVE" && frames.size() == num_fixed_frames + 1) {
-    handshake.public_key = z85(frames[num_fixed_frames]);
-  }
-  return handshake;
+  const bool has_key = frames[5] == "CURVE" && frames.size() == num_fixed_frames + 1;
+  return Handshake{.id = frames[1],
+                   .domain = frames[2],
+                   .address = frames[3],
+                   .public_key = has_key ? z85(frames[num_fixed_frames]) : std::string()};
 }
 
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
@@ -180,12 +169,10 @@ void Authenticator::serve(TimePoint now) {
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;
-    const auto handshake = Handshake::from(frames);
-    if (handshake) {
-      reply(handshake->id, answer(*handshake, now));
+    if (const auto handshake = Handshake::from(frames)) {
+      answer(*handshake, now);
     } else {
-      reply(frames.size() > 1 ? frames[1] : "",
-            {.status = "500", .text = "malformed", .user_id = {}});
+      reply(frames.size() > 1 ? frames[1] : "", "500", "malformed", "");
     }
   }
 }
@@ -205,15 +192,15 @@ AllowList& Authenticator::list_of(KeyRole role) {
   return role == KeyRole::worker ? workers_ : clients_;
 }
 
-Authenticator::Answer Authenticator::answer(const Handshake& handshake, TimePoint now) {
+void Authenticator::answer(const Handshake& handshake, TimePoint now) {
   const std::string_view reason = refusal(handshake, now);
-  if (reason.empty()) return {.status = "200", .text = "OK", .user_id = handshake.public_key};
+  if (reason.empty()) return reply(handshake.id, "200", "OK", handshake.public_key);
   refusals_.refused({.domain = handshake.domain,
                      .address = handshake.address,
                      .public_key = handshake.public_key,
                      .reason = reason},
                     now);
-  return {.status = "400", .text = "key not authorized", .user_id = {}};
+  reply(handshake.id, "400", "key not authorized", "");
 }
 
 std::string_view Authenticator::refusal(const Handshake& handshake, TimePoint now) {
@@ -230,9 +217,9 @@ std::string_view Authenticator::refusal(const Handshake& handshake, TimePoint no
   return other == KeyRole::worker ? "key of a worker" : "key of a client";
 }
 
-void Authenticator::reply(std::string_view id, const Answer& answer) {
-  const std::array<std::string_view, 6> frames{zap_version,    id, answer.status, answer.text,
-                                               answer.user_id, ""};
+void Authenticator::reply(std::string_view id, std::string_view status, std::string_view text,
+                          std::string_view user_id) {
+  const std::array<std::string_view, 6> frames{zap_version, id, status, text, user_id, ""};
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const bool is_last = i + 1 == frames.size();
     socket_->send(

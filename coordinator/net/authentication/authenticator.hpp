@@ -97,13 +97,14 @@ class Authenticator {
 
  private:
   struct Handshake;
-  struct Answer;
 
   [[nodiscard]] AllowList& list_of(wire::KeyRole role);
-  [[nodiscard]] Answer answer(const Handshake& handshake, TimePoint now);
+  void answer(const Handshake& handshake, TimePoint now);
   /// Why the peer is refused; empty if it is admitted.
   [[nodiscard]] std::string_view refusal(const Handshake& handshake, TimePoint now);
-  void reply(std::string_view id, const Answer& answer);
+  /// @param status  200: welcome; 400: not.
+  void reply(std::string_view id, std::string_view status, std::string_view text,
+             std::string_view user_id);
 
   RefusalLog refusals_;
   AllowList workers_;
