@@ -253,14 +253,16 @@ void CampaignService::close_ended(CampaignId id) {
   served_.erase(id);
   closed_.emplace(id, std::move(closed));
   const auto close = [this, id, file, epoch = context_.start.epoch] {
-    Store store = writer_.close(id);
-    std::vector<Entry> entries;
-    for (const SessionId session : store.attached_sessions()) {
-      entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
-    }
-    if (!entries.empty()) (void)store.write(entries);
-    store.end_coordinator(epoch);
-    if (const std::optional<std::string> reason = store.rest()) throw Error(*reason);
+    {
+      Store store = writer_.close(id);
+      std::vector<Entry> entries;
+      for (const SessionId session : store.attached_sessions()) {
+        entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
+      }
+      if (!entries.empty()) (void)store.write(entries);
+      store.end_coordinator(epoch);
+      if (const std::optional<std::string> reason = store.rest()) throw Error(*reason);
+    }  // Which may change the file.
     return stamp_of(file);
   };
   context_.background.post_next(work_of(close, [this,
