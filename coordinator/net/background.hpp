@@ -10,7 +10,6 @@
 #include <mutex>
 #include <string>
 #include <thread>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -87,12 +86,13 @@ class Background {
 /// Work that may throw, and what is done with its result, a future that is ready.
 template <typename Action, typename Then>
 [[nodiscard]] Background::Work work_of(Action action, Then then) {
-  using Task = std::packaged_task<std::invoke_result_t<Action&>()>;
   // Shared, as functions that can be copied hold it.
-  const auto task = std::make_shared<Task>(std::move(action));
-  return [task, then = std::move(then)]() -> Background::Finish {
-    (*task)();
-    return [task, then] { then(task->get_future()); };
+  const auto shared = std::make_shared<Action>(std::move(action));
+  return [shared, then = std::move(then)]() -> Background::Finish {
+    auto result = std::async(std::launch::deferred, std::move(*shared));
+    result.wait();  // Here it is done.
+    const auto held = std::make_shared<decltype(result)>(std::move(result));
+    return [held, then] { then(std::move(*held)); };
   };
 }
 
