@@ -1,15 +1,11 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <optional>
 #include <sstream>
-#include <thread>
 
 #include "coordinator/factory/factory.hpp"
 #include "core/campaign/name.hpp"
@@ -177,51 +173,6 @@ std::vector<Allocation> local_workers(const FactoryConfig& config, std::string_v
 constexpr std::chrono::seconds command_wait{60};
 constexpr std::size_t output_size_max = 1 << 20;
 
-/// A file in memory, closed at the end.
-class MemoryFile {
- public:
-  explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
-    if (descriptor() < 0) fail("memory of a command");
-  }
-
-  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
-
-  void write_from_start(std::string_view text) const {
-    if (pwrite(descriptor(), text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
-      fail("input of a command");
-    }
-  }
-
-  [[nodiscard]] std::string text() const {
-    std::string text(output_size_max, '\0');
-    const ssize_t size = pread(descriptor(), text.data(), text.size(), 0);
-    text.resize(size < 0 ? 0 : static_cast<std::size_t>(size));
-    return text;
-  }
-
- private:
-  [[noreturn]] static void fail(std::string_view what) {
-    throw Error(fmt::format("{}: {}", what, std::generic_category().message(errno)));
-  }
-
-  wire::Descriptor descriptor_;
-};
-
-/// @return What waitpid() says of the end; nothing if it does not end in time and is killed.
-std::optional<int> status_at_end(pid_t process_id) {
-  const auto deadline = std::chrono::steady_clock::now() + command_wait;
-  std::optional<int> status;
-  while (!(status = wire::status_if_ended(process_id))) {
-    if (std::chrono::steady_clock::now() > deadline) {
-      kill(process_id, SIGKILL);
-      (void)wire::wait_for_end(process_id);
-      return std::nullopt;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return status;
-}
-
 }  // namespace
 
 const std::vector<BatchSystem>& batch_systems() {
@@ -257,17 +208,22 @@ std::vector<Allocation> allocations_of(const BatchSystem& system, const FactoryC
 
 std::string output_of(const BatchCommand& command) {
   const std::string& program = command.arguments.front();
-  const MemoryFile input("input");
-  const MemoryFile output("output");
-  const MemoryFile errors("errors");
-  input.write_from_start(command.input);
+  const wire::UnnamedFile input(memfd_create("input", MFD_CLOEXEC));
+  const wire::UnnamedFile output(memfd_create("output", MFD_CLOEXEC));
+  const wire::UnnamedFile errors(memfd_create("errors", MFD_CLOEXEC));
+  const ssize_t written = pwrite(input.descriptor(), command.input.data(), command.input.size(), 0);
+  if (written != static_cast<ssize_t>(command.input.size())) {
+    throw Error(fmt::format("{}: no memory for its input", program));
+  }
   const pid_t process_id = wire::start_program(
       {.arguments = command.arguments,
        .descriptors = {input.descriptor(), output.descriptor(), errors.descriptor()}});
-  const std::optional<int> status = status_at_end(process_id);
+  const auto deadline = std::chrono::steady_clock::now() + command_wait;
+  const std::optional<int> status =
+      wire::status_at_end(process_id, [&] { return std::chrono::steady_clock::now() <= deadline; });
   if (!status) throw Error(fmt::format("{}: did not end within a minute", program));
-  if (*status == 0) return output.text();
-  const std::vector<std::string> words = lines_of(errors.text());
+  if (*status == 0) return output.read(0, output_size_max);
+  const std::vector<std::string> words = lines_of(errors.read(0, output_size_max));
   throw Error(fmt::format("{}: {}{}", program, wire::end_text(*status),
                           words.empty() ? "" : ": " + words.back()));
 }

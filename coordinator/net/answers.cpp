@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -15,7 +13,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -33,11 +30,9 @@ namespace proofmass::coordinator {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using wire::Descriptor;
 
 constexpr std::uint64_t memory_size_max = std::uint64_t{4} << 30;  // Of address space, bytes.
 constexpr std::size_t block_size = std::size_t{1} << 20;
-constexpr int look_interval_ms = 100;
 constexpr int niceness = 10;
 constexpr int copy_duration_factor = 30;
 
@@ -120,157 +115,50 @@ void require_space(const Order& order, const std::filesystem::path& database) {
                           space.available, 2 * size));
 }
 
-[[noreturn]] void fail(std::string_view what) {
-  throw Error(fmt::format("answer: {}: {}", what, std::strerror(errno)));
-}
-
-}  // namespace
-
-/// A file without a name: it is gone when its descriptor is closed.
-class UnnamedFile {
- public:
-  explicit UnnamedFile(int descriptor) : descriptor_(descriptor) {}
-
-  /// @throws Error if they cannot be written.
-  void append(std::string_view bytes) const {
-    if (!wire::write_all(descriptor_.number(), bytes)) fail("write");
-  }
-
-  [[nodiscard]] std::uint64_t size() const {  ///< Bytes.
-    struct stat status {};
-    if (fstat(descriptor_.number(), &status) != 0) fail("size");
-    return static_cast<std::uint64_t>(status.st_size);
-  }
-
-  /// At most so many bytes from the offset on; fewer only at the end of the file.
-  /// @throws Error if it cannot be read.
-  [[nodiscard]] std::string read(std::uint64_t offset, std::size_t size_max) const {
-    std::string bytes(size_max, '\0');
-    std::size_t size = 0;
-    while (size < size_max) {
-      const ssize_t num_read = pread(descriptor_.number(), bytes.data() + size, size_max - size,
-                                     static_cast<off_t>(offset + size));
-      if (num_read < 0 && errno == EINTR) continue;
-      if (num_read < 0) fail("read");
-      if (num_read == 0) break;
-      size += static_cast<std::size_t>(num_read);
-    }
-    bytes.resize(size);
-    return bytes;
-  }
-
- private:
-  Descriptor descriptor_;
-};
-
-namespace {
-
 /// @param directory  Is made if it is not there.
-std::unique_ptr<UnnamedFile> make_unnamed_file(const std::filesystem::path& directory) {
+std::unique_ptr<wire::UnnamedFile> make_unnamed_file(const std::filesystem::path& directory) {
   mkdir(directory.c_str(), S_IRWXU);  // If that fails, so does what follows.
   std::string name = (directory / "output-XXXXXX").string();
-  const int descriptor = mkostemp(name.data(), O_CLOEXEC);
-  if (descriptor < 0) fail(directory.string());
+  auto file = std::make_unique<wire::UnnamedFile>(mkostemp(name.data(), O_CLOEXEC));
   unlink(name.c_str());
-  return std::make_unique<UnnamedFile>(descriptor);
+  return file;
 }
 
-void limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) {
+bool limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) {
   const rlimit wanted{.rlim_cur = maximum, .rlim_max = maximum};
-  if (prlimit(process_id, resource, &wanted, nullptr) != 0 && errno != ESRCH) fail("limits");
+  return prlimit(process_id, resource, &wanted, nullptr) == 0 || errno == ESRCH;
 }
 
-/// A pipe: the end to read, and the end to write.
-std::pair<Descriptor, Descriptor> make_pipe() {
-  std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
-  return {Descriptor(ends[0]), Descriptor(ends[1])};
+/// The kernel keeps them if this process ends first.
+bool set_limits(pid_t process_id, const Order& order) {
+  setpriority(PRIO_PROCESS, static_cast<id_t>(process_id), niceness);
+  return limit(process_id, RLIMIT_CORE, 0) &&
+         (!wire::has_address_space_limit || limit(process_id, RLIMIT_AS, memory_size_max)) &&
+         limit(process_id, RLIMIT_CPU, static_cast<std::uint64_t>(std::ceil(seconds_of(order))));
 }
 
-/// A process that answers a question, from its start to its end.
-class AnswerProcess {
- public:
-  /// @param answer  Gets what it writes to standard output.
-  AnswerProcess(const Order& order, const UnnamedFile& answer) : answer_(answer) {
-    const Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
-    process_id_ = wire::start_program(
-        {.arguments = order.arguments,
-         .descriptors = {nothing.number(), output_.second.number(), errors_.second.number()},
-         .environment = wire::environment_without_settings()});
-    output_.second = Descriptor();
-    errors_.second = Descriptor();
-  }
-  ~AnswerProcess() {
-    if (process_id_ == 0) return;
-    kill(process_id_, SIGKILL);
-    (void)wait();
-  }
-  AnswerProcess(const AnswerProcess&) = delete;
-  AnswerProcess& operator=(const AnswerProcess&) = delete;
-
-  /// The kernel keeps them if this process ends first.
-  void set_limits(const Order& order) const {
-    limit(process_id_, RLIMIT_CORE, 0);
-    if (wire::has_address_space_limit) limit(process_id_, RLIMIT_AS, memory_size_max);
-    limit(process_id_, RLIMIT_CPU, static_cast<std::uint64_t>(std::ceil(seconds_of(order))));
-    setpriority(PRIO_PROCESS, static_cast<id_t>(process_id_), niceness);
-  }
-
-  /// Waits for the end. @returns What waitpid() says of it; nothing if it was ended before.
-  /// @throws Error if the answer is too large or cannot be written.
-  std::optional<int> follow(Clock::time_point deadline, const std::atomic<bool>& is_cancelled) {
-    std::array<pollfd, 2> items{pollfd{output_.first.number(), POLLIN, 0},
-                                pollfd{errors_.first.number(), POLLIN, 0}};
-    while (items[0].fd >= 0 || items[1].fd >= 0) {
-      if (is_cancelled || Clock::now() > deadline) return std::nullopt;
-      if (poll(items.data(), items.size(), look_interval_ms) <= 0) continue;
-      for (pollfd& item : items) {
-        if (item.revents == 0) continue;
-        const bool is_output = item.fd == output_.first.number();
-        const std::optional<std::string_view> bytes = read_some(item.fd);
-        if (bytes) is_output ? take_output(*bytes) : take_errors(*bytes);
-        if (!bytes) item.fd = -1;
-      }
-    }
-    return wait();
-  }
-
-  [[nodiscard]] const std::string& error_text() const { return error_text_; }
-
- private:
-  /// Nothing at the end.
-  std::optional<std::string_view> read_some(int descriptor) {
-    const ssize_t size = ::read(descriptor, bytes_.data(), bytes_.size());
-    if (size < 0 && errno == EINTR) return std::string_view();
-    if (size <= 0) return std::nullopt;
-    return std::string_view(bytes_.data(), static_cast<std::size_t>(size));
-  }
-
-  void take_output(std::string_view bytes) {
-    num_written_ += bytes.size();
-    if (num_written_ > Answers::size_max) {
-      throw Error(
-          fmt::format("the answer has more than {} bytes; ask for less, or fetch the database",
-                      Answers::size_max));
-    }
-    answer_.append(bytes);
-  }
-
-  void take_errors(std::string_view bytes) {
-    error_text_.append(bytes);
-    error_text_.resize(std::min(error_text_.size(), wire::reply_text_size_max));
-  }
-
-  int wait() { return wire::wait_for_end(std::exchange(process_id_, 0)); }
-
-  const UnnamedFile& answer_;
-  std::pair<Descriptor, Descriptor> output_ = make_pipe();
-  std::pair<Descriptor, Descriptor> errors_ = make_pipe();
-  pid_t process_id_ = 0;
-  std::uint64_t num_written_ = 0;
-  std::vector<char> bytes_ = std::vector<char>(std::size_t{64} << 10);
-  std::string error_text_;
-};
+/// Answers a question in a process.
+/// @param answer  Gets what it writes to standard output.
+/// @return What waitpid() says of its end; nothing if it was ended before.
+/// @throws Error if the answer is too large.
+std::optional<int> run(const Order& order, const wire::UnnamedFile& answer,
+                       const wire::UnnamedFile& errors, const std::atomic<bool>& is_cancelled) {
+  const wire::Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  const pid_t process_id = wire::start_program(
+      {.arguments = order.arguments,
+       .descriptors = {nothing.number(), answer.descriptor(), errors.descriptor()},
+       .environment = wire::environment_without_settings()});
+  const bool is_limited = set_limits(process_id, order);
+  const Clock::time_point deadline = Clock::now() + order.duration_max;
+  const auto is_too_large = [&] { return answer.size() + errors.size() > Answers::size_max; };
+  const std::optional<int> status = wire::status_at_end(process_id, [&] {
+    return is_limited && !is_cancelled && Clock::now() <= deadline && !is_too_large();
+  });
+  if (!is_limited) throw Error("answer: the process cannot be limited");
+  if (!is_too_large()) return status;
+  throw Error(fmt::format("the answer has more than {} bytes; ask for less, or fetch the database",
+                          Answers::size_max));
+}
 
 /// @throws Error unless the process ended by itself.
 int exit_code_of(const std::optional<int>& status, const Order& order) {
@@ -286,7 +174,7 @@ int exit_code_of(const std::optional<int>& status, const Order& order) {
 }
 
 /// SHA-256 of the first bytes of a file.
-std::string sha256_of(const UnnamedFile& file, std::uint64_t size) {
+std::string sha256_of(const wire::UnnamedFile& file, std::uint64_t size) {
   Sha256 hash;
   for (std::uint64_t offset = 0; offset < size;) {
     const std::string block = file.read(offset, std::min<std::uint64_t>(block_size, size - offset));
@@ -297,7 +185,7 @@ std::string sha256_of(const UnnamedFile& file, std::uint64_t size) {
   return hash.finish();
 }
 
-proto::AnswerReply reply_about(const UnnamedFile& file, const Order& order, int exit_code,
+proto::AnswerReply reply_about(const wire::UnnamedFile& file, const Order& order, int exit_code,
                                const std::string& error_text) {
   const std::uint64_t size = file.size();
   const bool is_known = order.known_size > 0 && order.known_size <= size &&
@@ -374,19 +262,15 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
   const auto is_cancelled = std::make_shared<std::atomic<bool>>(false);
   const auto compute = [order, id, is_cancelled]() -> Computed {
     const CopyRemover remover{order.copy};
-    std::unique_ptr<UnnamedFile> file = make_unnamed_file(order.directory);
-    AnswerProcess process(order, *file);
-    process.set_limits(order);
-    const std::optional<int> status =
-        process.follow(Clock::now() + order.duration_max, *is_cancelled);
-    const int exit_code = exit_code_of(status, order);
-    if (order.copy && exit_code != 0) throw Error(failure_text(process.error_text()));
+    std::unique_ptr<wire::UnnamedFile> file = make_unnamed_file(order.directory);
+    const std::unique_ptr<wire::UnnamedFile> errors = make_unnamed_file(order.directory);
+    const int exit_code = exit_code_of(run(order, *file, *errors, *is_cancelled), order);
+    const std::string error_text = errors->read(0, wire::reply_text_size_max);
+    if (order.copy && exit_code != 0) throw Error(failure_text(error_text));
     if (order.copy) {
-      const int descriptor = open(order.copy->c_str(), O_RDONLY | O_CLOEXEC);
-      if (descriptor < 0) fail(order.copy->string());
-      file = std::make_unique<UnnamedFile>(descriptor);
+      file = std::make_unique<wire::UnnamedFile>(open(order.copy->c_str(), O_RDONLY | O_CLOEXEC));
     }
-    proto::AnswerReply reply = reply_about(*file, order, exit_code, process.error_text());
+    proto::AnswerReply reply = reply_about(*file, order, exit_code, error_text);
     reply.set_answer_id(id);
     return {.file = std::move(file), .reply = std::move(reply)};
   };

@@ -14,10 +14,9 @@
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/service.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
-
-class UnnamedFile;
 
 /// Answers clients' questions about results. Each is answered by the program `proofmass` in a
 /// process of its own, with the command that a user would type on this machine: what a question
@@ -58,7 +57,7 @@ class Answers {
  private:
   /// What came of a question.
   struct Computed {
-    std::unique_ptr<UnnamedFile> file;
+    std::unique_ptr<wire::UnnamedFile> file;
     proto::AnswerReply reply;
   };
   struct Computing {
@@ -69,7 +68,7 @@ class Answers {
   };
   struct Kept {
     std::string owner;
-    std::unique_ptr<UnnamedFile> file;
+    std::unique_ptr<wire::UnnamedFile> file;
     std::uint64_t size = 0;  ///< Bytes.
     TimePoint read_at;
     bool is_read = false;  ///< To its end, by one client at least.

@@ -5,9 +5,12 @@
 #include <deque>
 #include <exception>
 #include <functional>
+#include <future>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "proto/wire/client_codec.hpp"
@@ -79,5 +82,18 @@ class Background {
   bool is_ending_ = false;
   std::thread thread_;  ///< Begins when all else is there.
 };
+
+/// Work that may throw, and what is done with its result, a future that is ready.
+template <typename Action, typename Then>
+[[nodiscard]] Background::Work work_of(Action action, Then then) {
+  // Shared, as functions that can be copied hold it.
+  const auto shared = std::make_shared<Action>(std::move(action));
+  return [shared, then = std::move(then)]() -> Background::Finish {
+    auto result = std::async(std::launch::deferred, std::move(*shared));
+    result.wait();  // Here it is done.
+    const auto held = std::make_shared<decltype(result)>(std::move(result));
+    return [held, then] { then(std::move(*held)); };
+  };
+}
 
 }  // namespace proofmass::coordinator

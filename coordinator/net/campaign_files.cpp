@@ -35,20 +35,6 @@ std::uint64_t reference_digest_of(const ServedCampaign& campaign) {
   return recorded != 0 ? recorded : model.reference_digest(best_instruction_set());
 }
 
-StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
-  const Store& store = campaign.store;
-  StoredCampaign stored{.definition = campaign.definition,
-                        .reference_digest = reference_digest_of(campaign),
-                        .control = store.control(),
-                        .finished = store.finished_runs(),
-                        .elsewhere = campaign.elsewhere,
-                        .compared = store.compared_runs()};
-  if (given_up == GivenUpRuns::retry) return stored;
-  stored.given_up = store.given_up_runs();
-  stored.blamed = store.blamed_runs();
-  return stored;
-}
-
 FileLook failed_look(const std::filesystem::path& file, const std::string& failure) {
   return {.record = {.file = file, .problem = failure}};
 }
@@ -183,9 +169,18 @@ FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const Coordinato
   wire::kill_point(wire::KillPoint::after_open);
   Store& store = campaign.store;
   FileLook look{.record = store.record(),
-                .stored = stored_campaign_of(campaign, given_up),
+                .stored = {.definition = campaign.definition,
+                           .reference_digest = reference_digest_of(campaign),
+                           .control = store.control(),
+                           .finished = store.finished_runs(),
+                           .elsewhere = campaign.elsewhere,
+                           .compared = store.compared_runs()},
                 .plan = store.stop_plan(),
                 .num_failures = store.num_without_estimate()};
+  if (given_up == GivenUpRuns::keep) {
+    look.stored.given_up = store.given_up_runs();
+    look.stored.blamed = store.blamed_runs();
+  }
   look.record.file = campaign.file;
   look.record.status.set_name(campaign.definition->name);
   require_shown(campaign.file, look.record.status);

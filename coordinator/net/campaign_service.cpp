@@ -108,19 +108,16 @@ bool CampaignService::change_held(CampaignId id, std::function<void()> change,
     throw Error(fmt::format("campaign = {} (is being changed by another request; try again)",
                             served.record.status.name()));
   }
-  const auto work = [this, id, change = std::move(change), finish = std::move(finish),
-                     respond = std::move(respond)]() -> Background::Finish {
-    const std::string failure = failure_of(change);
-    return [this, id, failure, finish, respond] {
-      served_.at(id).is_held = false;
-      if (!failure.empty()) return respond(wire::error_reply(failure));
-      respond_or_say_why(respond, [&] {
-        finish();
-        respond(done_reply(id));
-      });
-    };
-  };
-  served.is_held = context_.background.post(work);
+  served.is_held = context_.background.post(
+      work_of(std::move(change), [this, id, finish = std::move(finish),
+                                  respond = std::move(respond)](std::future<void> changed) {
+        served_.at(id).is_held = false;
+        respond_or_say_why(respond, [&] {
+          changed.get();
+          finish();
+          respond(done_reply(id));
+        });
+      }));
   return served.is_held;
 }
 
@@ -158,40 +155,41 @@ CampaignControl CampaignService::control_now(CampaignId id) const {
           .audit_fraction = campaign.audit_fraction};
 }
 
-CampaignControl CampaignService::control_after(CampaignId id, wire::ControlAction action,
+CampaignControl CampaignService::control_after(CampaignId id, proto::ControlAction action,
                                                int priority) const {
   CampaignControl control = control_now(id);
   const Phase phase = state_.campaigns.at(id).phase;
-  if (action == wire::ControlAction::set_priority) control.priority = priority;
-  if (action == wire::ControlAction::pause && phase == Phase::active) control.phase = Phase::paused;
-  if (action == wire::ControlAction::cancel && !has_ended(phase)) control.phase = Phase::cancelled;
-  if (action == wire::ControlAction::resume && phase != Phase::finished)
+  if (action == proto::CONTROL_ACTION_SET_PRIORITY) control.priority = priority;
+  if (action == proto::CONTROL_ACTION_PAUSE && phase == Phase::active)
+    control.phase = Phase::paused;
+  if (action == proto::CONTROL_ACTION_CANCEL && !has_ended(phase)) control.phase = Phase::cancelled;
+  if (action == proto::CONTROL_ACTION_RESUME && phase != Phase::finished)
     control.phase = Phase::active;
   return control;
 }
 
-void CampaignService::control(CampaignId id, wire::ControlAction action,
+void CampaignService::control(CampaignId id, proto::ControlAction action,
                               const CampaignControl& stored) {
   const CampaignState& campaign = state_.campaigns.at(id);
   served_.at(id).written = stored;  // What happened meanwhile is written after it.
   switch (action) {
-    case wire::ControlAction::pause:
+    case proto::CONTROL_ACTION_PAUSE:
       on_pause(state_, id, outbox_);
       break;
-    case wire::ControlAction::resume:
+    case proto::CONTROL_ACTION_RESUME:
       resume(id);
       break;
-    case wire::ControlAction::cancel:
+    case proto::CONTROL_ACTION_CANCEL:
       on_cancel(state_, id, outbox_);
       break;
-    case wire::ControlAction::set_priority:
+    case proto::CONTROL_ACTION_SET_PRIORITY:
       on_control(state_, id, stored.priority, campaign.audit_fraction);
       break;
-    case wire::ControlAction::archive:
-      PROOFMASS_EXPECT(false);  // See archive().
-    case wire::ControlAction::retry:
+    case proto::CONTROL_ACTION_RETRY:
       on_retry(state_, id, context_.now(), outbox_);
       break;
+    default:
+      PROOFMASS_EXPECT(false);  // See archive().
   }
   review();
 }
@@ -312,27 +310,29 @@ void CampaignService::take_summary(CampaignId id, Served& served) {
 
 void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
   served_.at(id).is_held = true;
-  // Shared by the copies that std::function makes.
-  const std::shared_ptr<Campaign> wanted = state_.campaigns.at(id).definition->clone();
+  std::unique_ptr<Campaign> wanted = state_.campaigns.at(id).definition->clone();
   wanted->num_runs = num_runs;
-  context_.background.post_next([this, id, wanted]() -> Background::Finish {
+  auto extend_file = [this, id, wanted = std::move(wanted)] {
     std::shared_ptr<const Campaign> extended;
-    const std::string failure = failure_of([&] {
-      writer_.access(id, [&](Store& store) { extended = files_->extend(store, *wanted); });
-    });
-    return [this, id, extended, failure, num_runs = wanted->num_runs] {
-      Served& served = served_.at(id);
-      served.is_held = false;
-      const bool is_news = failure != std::exchange(served.extension_failure, failure);
-      if (extended != nullptr) return extend(id, extended);
-      served.summary_after = context_.now() + context_.config.writer.retry_after;
-      if (!is_news) return;
-      outbox_.log({.severity = Severity::error,
-                   .kind = "campaign_not_extended",
-                   .fields = {{"runs", num_runs}, Field::reason(failure)}},
-                  id);
-    };
-  });
+    writer_.access(id, [&](Store& store) { extended = files_->extend(store, *wanted); });
+    return extended;
+  };
+  context_.background.post_next(
+      work_of(std::move(extend_file),
+              [this, id, num_runs](std::future<std::shared_ptr<const Campaign>> got) {
+                Served& served = served_.at(id);
+                served.is_held = false;
+                std::shared_ptr<const Campaign> extended;
+                const std::string failure = failure_of([&] { extended = got.get(); });
+                const bool is_news = failure != std::exchange(served.extension_failure, failure);
+                if (extended != nullptr) return extend(id, extended);
+                served.summary_after = context_.now() + context_.config.writer.retry_after;
+                if (!is_news) return;
+                outbox_.log({.severity = Severity::error,
+                             .kind = "campaign_not_extended",
+                             .fields = {{"runs", num_runs}, Field::reason(failure)}},
+                            id);
+              }));
 }
 
 void CampaignService::begin_summary(CampaignId id, Served& served) {

@@ -166,11 +166,11 @@ class CampaignService {
 
   /// What the file of a served campaign is to have after an action.
   /// @param priority  For set_priority.
-  [[nodiscard]] CampaignControl control_after(CampaignId id, wire::ControlAction action,
+  [[nodiscard]] CampaignControl control_after(CampaignId id, proto::ControlAction action,
                                               int priority) const;
   /// Carries out an action.
   /// @param stored  Its control_after(), which is stored by now, for retry after RetriedRuns.
-  void control(CampaignId id, wire::ControlAction action, const CampaignControl& stored);
+  void control(CampaignId id, proto::ControlAction action, const CampaignControl& stored);
   [[nodiscard]] proto::ReplyEnvelope done_reply(CampaignId id) const;
 
   /// Takes a campaign that is finished or cancelled from the list and moves its file to where it is
@@ -244,8 +244,6 @@ class CampaignService {
   /// Takes a campaign from the list of those whose files are closed.
   void unlist(CampaignId id);
   [[nodiscard]] KnownCampaigns known() const;
-  static Findings look(const CampaignDirectory& directory, KnownCampaigns known,
-                       const std::vector<CampaignRecord>& closed, const CoordinatorStart& start);
   void take_findings(Findings findings);
 
   /// All runs of now are there, and its stop rule is still to be checked with them.

@@ -104,36 +104,26 @@ void CampaignService::review_directory() {
   is_looking_ = true;
   std::vector<CampaignRecord> closed;
   for (const auto& [id, campaign] : closed_) closed.push_back(campaign);
-  context_.background.post_next([this, directory, now, start = context_.start, known = known(),
-                                 closed = std::move(closed)]() -> Background::Finish {
-    const auto findings = std::make_shared<Findings>(look(*directory, known, closed, start));
-    return [this, findings, now] {
-      is_looking_ = false;
-      looked_at_ = now;
-      take_findings(std::move(*findings));
-    };
-  });
-}
-
-CampaignService::Findings CampaignService::look(const CampaignDirectory& directory,
-                                                KnownCampaigns known,
-                                                const std::vector<CampaignRecord>& closed,
-                                                const CoordinatorStart& start) {
-  Findings findings;
-  const std::string failure = failure_of([&] {
+  const auto look = [directory, start = context_.start, known = known(),
+                     closed = std::move(closed)]() mutable {
+    Findings findings;
     for (const CampaignRecord& one : closed) {
       if (!one.stamp || stamp_of(one.file) == one.stamp) continue;
       known.remove(one);
       findings.changed.push_back(one);
     }
-    findings.looks = look_at_all(directory, known, start);
-  });
-  // Without a file: that of the directory itself.
-  if (!failure.empty()) {
-    findings = {};
-    findings.looks.emplace_back().record.problem = failure;
-  }
-  return findings;
+    findings.looks = look_at_all(*directory, known, start);
+    return findings;
+  };
+  context_.background.post_next(work_of(look, [this, now](std::future<Findings> found) {
+    is_looking_ = false;
+    looked_at_ = now;
+    Findings findings;
+    const std::string failure = failure_of([&] { findings = found.get(); });
+    // Without a file: that of the directory itself.
+    if (!failure.empty()) findings.looks.emplace_back().record.problem = failure;
+    take_findings(std::move(findings));
+  }));
 }
 
 void CampaignService::take_findings(Findings findings) {
@@ -230,20 +220,24 @@ void CampaignService::review_rest(CampaignId id, Served& served) {
 // Nobody must be reading an old state of the file: then it is closed later.
 void CampaignService::begin_closing(CampaignId id, std::function<void(bool is_closing)> then) {
   served_.at(id).is_held = true;
-  context_.background.post_next([this, id, then = std::move(then)]() -> Background::Finish {
+  const auto fold = [this, id] {
     bool is_folded = false;
-    // The writer says why it cannot write.
-    (void)failure_of([&] { writer_.access(id, [&](Store& store) { is_folded = !store.rest(); }); });
-    return [this, id, is_folded, then] {
-      Served& served = served_.at(id);
-      served.is_held = false;
-      served.closing_at = context_.now();
-      if (!is_folded || !is_settled(id, served) || !has_ended(phase_of(id))) return then(false);
-      const std::string failure = failure_of([&] { close_ended(id); });
-      if (!failure.empty()) say_not_closed(failure);
-      then(failure.empty());
-    };
-  });
+    writer_.access(id, [&](Store& store) { is_folded = !store.rest(); });
+    return is_folded;
+  };
+  context_.background.post_next(
+      work_of(fold, [this, id, then = std::move(then)](std::future<bool> folded) {
+        Served& served = served_.at(id);
+        served.is_held = false;
+        served.closing_at = context_.now();
+        bool is_folded = false;
+        // The writer says why it cannot write.
+        (void)failure_of([&] { is_folded = folded.get(); });
+        if (!is_folded || !is_settled(id, served) || !has_ended(phase_of(id))) return then(false);
+        const std::string failure = failure_of([&] { close_ended(id); });
+        if (!failure.empty()) say_not_closed(failure);
+        then(failure.empty());
+      }));
 }
 
 // The dispatch forgets the campaign first: nothing is written any more when the file is closed.
@@ -258,32 +252,30 @@ void CampaignService::close_ended(CampaignId id) {
   on_ended(state_, id, closed.status.num_runs());
   served_.erase(id);
   closed_.emplace(id, std::move(closed));
-  context_.background.post_next(
-      [this, id, file, epoch = context_.start.epoch]() -> Background::Finish {
-        std::optional<std::string> reason;
-        const std::string failure = failure_of([&] {
-          Store store = writer_.close(id);
-          std::vector<Entry> entries;
-          for (const SessionId session : store.attached_sessions()) {
-            entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
-          }
-          if (!entries.empty()) (void)store.write(entries);
-          store.end_coordinator(epoch);
-          reason = store.rest();
-        });
-        if (!failure.empty()) reason = failure;
-        // The stamp of no file has a file looked at again, which serves one whose log is still
-        // needed.
-        const std::optional<FileStamp> stamp = reason ? FileStamp{} : stamp_of(file);
-        return [this, id, stamp, reason] {
-          const auto found = closed_.find(id);
-          if (found == closed_.end()) return;
-          found->second.stamp = stamp;
-          if (reason) return say_not_closed(*reason);
-          outbox_.log(
-              {.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name()}}});
-        };
-      });
+  const auto close = [this, id, file, epoch = context_.start.epoch] {
+    {
+      Store store = writer_.close(id);
+      std::vector<Entry> entries;
+      for (const SessionId session : store.attached_sessions()) {
+        entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
+      }
+      if (!entries.empty()) (void)store.write(entries);
+      store.end_coordinator(epoch);
+      if (const std::optional<std::string> reason = store.rest()) throw Error(*reason);
+    }  // Which may change the file.
+    return stamp_of(file);
+  };
+  context_.background.post_next(work_of(close, [this,
+                                                id](std::future<std::optional<FileStamp>> stamp) {
+    const auto found = closed_.find(id);
+    if (found == closed_.end()) return;
+    // The stamp of no file has a file looked at again, which serves one whose log is still
+    // needed.
+    found->second.stamp = FileStamp{};
+    const std::string failure = failure_of([&] { found->second.stamp = stamp.get(); });
+    if (!failure.empty()) return say_not_closed(failure);
+    outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name()}}});
+  }));
 }
 
 std::set<CampaignId> CampaignService::abandoned() const {
@@ -322,24 +314,21 @@ void CampaignService::archive(CampaignId id, const Respond& respond) {
 // What closes the file was posted before.
 void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
   const CampaignRecord& campaign = closed_.at(id);
-  context_.background.post_next([this, id, respond, file = campaign.file,
-                                 name = campaign.status.name()]() -> Background::Finish {
-    std::filesystem::path place;
-    const std::string failure = failure_of([&] {
-      // A log that is left behind has results, and nobody could use the name again.
-      if (has_journal(file)) throw Error(not_at_rest(name));
-      place = context_.config.directory->archive(file);
-    });
-    return [this, id, respond, place, failure, name] {
-      if (!failure.empty()) return respond(wire::error_reply(failure));
+  const auto move = [this, file = campaign.file, name = campaign.status.name()] {
+    // A log that is left behind has results, and nobody could use the name again.
+    if (has_journal(file)) throw Error(not_at_rest(name));
+    return context_.config.directory->archive(file);
+  };
+  context_.background.post_next(work_of(move, [this, id, respond, name = campaign.status.name()](
+                                                  std::future<std::filesystem::path> moved) {
+    respond_or_say_why(respond, [&] {
+      const std::string place = moved.get().string();
       // Looking at the directory may have found out before that the file is gone.
       if (closed_.contains(id)) unlist(id);
-      outbox_.log(
-          {.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place.string()}}});
-      respond(wire::done_reply(
-          fmt::format("campaign {}: its database is {} now", name, place.string())));
-    };
-  });
+      outbox_.log({.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place}}});
+      respond(wire::done_reply(fmt::format("campaign {}: its database is {} now", name, place)));
+    });
+  }));
 }
 
 void CampaignService::say_not_closed(std::string_view reason) {

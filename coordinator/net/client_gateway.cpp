@@ -35,17 +35,11 @@ const Model& model_of(const proto::SubmitRequest& submit) {
                                .reference_digest = submit.reference_digest()});
 }
 
-using Decoded = std::variant<Request, wire::DecodeError>;
-
-/// Never throws: memory may be short for what a request would become.
-Decoded decode(std::string_view bytes) {
-  try {
-    auto decoded = wire::decode_request(bytes);
-    if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) return *error;
-    return request_of(std::move(std::get<proto::RequestEnvelope>(decoded)));
-  } catch (const std::exception& error) {
-    return wire::DecodeError{.fault = wire::DecodeFault::invalid, .text = error.what()};
-  }
+/// @throws Error with what is wrong; others, as memory may be short for what a request becomes.
+Request request_in(std::string_view bytes) {
+  auto decoded = wire::decode_request(bytes);
+  if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) throw Error(error->text);
+  return request_of(std::move(std::get<proto::RequestEnvelope>(decoded)));
 }
 
 }  // namespace
@@ -120,32 +114,27 @@ void ClientGateway::receive(const Incoming& message) {
   }
 }
 
+Asker ClientGateway::asker_of(const std::string& key) const {
+  if (std::optional<Asker> asker = callbacks_.asker_of(key)) return *std::move(asker);
+  throw Error(fmt::format("key = {} (is not authorized any more)", key));
+}
+
 void ClientGateway::take(const Incoming& message) {
-  const Waiter unknown{.routing_id = message.from.routing_id, .request = 0};
-  if (!callbacks_.asker_of(message.from.key)) {
-    return send(unknown, wire::error_reply(fmt::format("key = {} (is not authorized any more)",
-                                                       message.from.key)));
-  }
+  (void)asker_of(message.from.key);
   if (message.frames.size() != 1) {
-    return send(unknown, wire::error_reply(fmt::format("request = {} frames (must be one)",
-                                                       message.frames.size())));
+    throw Error(fmt::format("request = {} frames (must be one)", message.frames.size()));
   }
   const std::string_view bytes = message.frames.front();
   if (bytes.size() > wire::request_message_size_max) {
-    return send(unknown,
-                wire::error_reply(fmt::format("request size = {} bytes (must be at most {} in one "
-                                              "message; larger ones travel in parts)",
-                                              bytes.size(), wire::request_message_size_max)));
+    throw Error(fmt::format(
+        "request size = {} bytes (must be at most {} in one message; larger ones travel in parts)",
+        bytes.size(), wire::request_message_size_max));
   }
-  Decoded decoded = decode(bytes);
-  if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
-    return send(unknown, wire::error_reply(error->text));
-  }
-  auto& request = std::get<Request>(decoded);
+  Request request = request_in(bytes);
   const std::uint64_t id = request.message.request_id();
   if (request.message.has_part()) return take_part(message.from, id, request.message.part());
   const auto ticket = begin(message.from, id, bytes);
-  if (ticket) carry_out(*ticket, message.from.key, std::move(request));
+  if (ticket) carry_out(*ticket, message.from.key, [&] { return std::move(request); });
 }
 
 void ClientGateway::take_part(const Address& from, std::uint64_t request,
@@ -164,19 +153,13 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
   const auto begun = begin(from, request, bytes);
   if (!begun) return parts_.release(size);
   const std::uint64_t ticket = *begun;
-  const auto shared = std::make_shared<std::string>(std::move(bytes));
-  const bool is_posted =
-      background_.post([this, ticket, shared, size, key = from.key]() -> Background::Finish {
-        const auto decoded = std::make_shared<Decoded>(decode(*shared));
-        std::string().swap(*shared);
-        return [this, ticket, decoded, size, key] {
-          parts_.release(size);
-          if (const auto* const error = std::get_if<wire::DecodeError>(decoded.get())) {
-            return respond(ticket, wire::error_reply(error->text));
-          }
-          carry_out(ticket, key, std::move(std::get<Request>(*decoded)));
-        };
-      });
+  const bool is_posted = background_.post(work_of(
+      // The bytes are freed once they have been read.
+      [bytes = std::move(bytes)]() mutable { return request_in(std::exchange(bytes, {})); },
+      [this, ticket, size, key = from.key](std::future<Request> read) {
+        parts_.release(size);
+        carry_out(ticket, key, [&] { return read.get(); });
+      }));
   if (is_posted) return;
   parts_.release(size);
   respond(ticket, wire::error_reply(
@@ -184,15 +167,12 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
                                   Background::num_pending_max)));
 }
 
-void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
+void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key,
+                              const std::function<Request()>& take_request) {
   const Respond to_all = [this, ticket](const proto::ReplyEnvelope& reply) {
     respond(ticket, reply);
   };
-  respond_or_say_why(to_all, [&] {
-    const std::optional<Asker> asker = callbacks_.asker_of(key);
-    if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));
-    callbacks_.carry_out(std::move(request), *asker, to_all);
-  });
+  respond_or_say_why(to_all, [&] { callbacks_.carry_out(take_request(), asker_of(key), to_all); });
 }
 
 std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint64_t request,

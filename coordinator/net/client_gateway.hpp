@@ -121,7 +121,11 @@ class ClientGateway {
   void take(const Incoming& message);
   void take_part(const Address& from, std::uint64_t request, const proto::RequestPart& part);
   void take_whole(const Address& from, std::uint64_t request, std::string bytes);
-  void carry_out(std::uint64_t ticket, const std::string& key, Request request);
+  /// @param take_request  May throw the reason why there is none.
+  void carry_out(std::uint64_t ticket, const std::string& key,
+                 const std::function<Request()>& take_request);
+  /// @throws Error if the key is not authorized any more.
+  [[nodiscard]] Asker asker_of(const std::string& key) const;
   /// Lets a waiter join those of a request that is being carried out already.
   /// @return The ticket of a request that is not; nothing otherwise.
   std::optional<std::uint64_t> begin(const Address& from, std::uint64_t request,

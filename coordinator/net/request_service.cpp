@@ -34,18 +34,18 @@ std::set<std::string> quarantined_hosts(const State& state) {
 /// @throws Error if the action can have no effect. A finished campaign can only be archived or
 /// retried, the latter only if runs were given up; a cancelled one must be resumed before it is
 /// retried or gets a priority; one that is neither cannot be archived.
-void require_possible(const proto::CampaignStatus& campaign, wire::ControlAction action) {
+void require_possible(const proto::CampaignStatus& campaign, proto::ControlAction action) {
   const auto refuse = [&](std::string_view why) {
     throw Error(fmt::format("campaign = {} ({})", campaign.name(), why));
   };
-  const bool is_retry = action == wire::ControlAction::retry;
-  const bool needs_resume = is_retry || action == wire::ControlAction::set_priority;
-  if (action == wire::ControlAction::archive) {
+  const bool is_retry = action == proto::CONTROL_ACTION_RETRY;
+  const bool needs_resume = is_retry || action == proto::CONTROL_ACTION_SET_PRIORITY;
+  if (action == proto::CONTROL_ACTION_ARCHIVE) {
     if (!has_ended(wire::phase_of(campaign))) refuse("is not finished; cancel it first");
     return;
   }
   if (campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED && !is_retry) refuse("is finished");
-  if (action == wire::ControlAction::resume && campaign.has_failures_max()) {
+  if (action == proto::CONTROL_ACTION_RESUME && campaign.has_failures_max()) {
     refuse(
         fmt::format("was cancelled as more than {} runs have no estimate; submit its file again "
                     "with a larger --failures",
@@ -140,7 +140,7 @@ void RequestService::refuse_as_not_served(const std::string& campaign) const {
 void RequestService::control(const proto::ControlRequest& request, const Asker& asker,
                              const Respond& respond) {
   const std::string& name = request.campaign();
-  const auto action = static_cast<wire::ControlAction>(request.action());
+  const auto action = request.action();
   const auto campaign = campaigns_.find(name);
   if (!campaign) {
     require_right(asker, Right::submit);
@@ -148,14 +148,14 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
   }
   require_control(asker, name, campaign->status.owner());
   require_possible(campaign->status, action);
-  if (action == wire::ControlAction::archive) {
+  if (action == proto::CONTROL_ACTION_ARCHIVE) {
     if (under_way_.contains(name)) refuse_as_under_way(name);
     return campaigns_.archive(campaign->id, respond);
   }
   if (campaign->is_closed) {
     // One that has not ended is closed as its model is not here, which opening it says.
-    const bool begins = action == wire::ControlAction::resume ||
-                        action == wire::ControlAction::retry ||
+    const bool begins = action == proto::CONTROL_ACTION_RESUME ||
+                        action == proto::CONTROL_ACTION_RETRY ||
                         !has_ended(wire::phase_of(campaign->status));
     return begins ? reopen(*campaign, action, respond)
                   : respond(campaigns_.done_reply(campaign->id));
@@ -168,14 +168,14 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
 }
 
 // Stored before it is done and acknowledged: what cannot be stored changes nothing.
-void RequestService::control_served(CampaignId id, wire::ControlAction action, int priority,
+void RequestService::control_served(CampaignId id, proto::ControlAction action, int priority,
                                     const Respond& respond) {
   const CampaignControl control = campaigns_.control_after(id, action, priority);
   const bool is_begun = campaigns_.change_held(
       id,
       [this, id, action, control] {
         std::vector<Entry> entries;
-        if (action == wire::ControlAction::retry) entries.emplace_back(RetriedRuns{});
+        if (action == proto::CONTROL_ACTION_RETRY) entries.emplace_back(RetriedRuns{});
         entries.emplace_back(control);
         context_.writer.access(id, [&](Store& store) { (void)store.write(entries); });
       },
@@ -335,8 +335,9 @@ RequestService::Holdings RequestService::added_by(
 }
 
 void RequestService::check_limits(const std::string& campaign, const CampaignRecord& entry,
-                                  wire::ControlAction action) const {
-  const bool begins = action == wire::ControlAction::resume || action == wire::ControlAction::retry;
+                                  proto::ControlAction action) const {
+  const bool begins =
+      action == proto::CONTROL_ACTION_RESUME || action == proto::CONTROL_ACTION_RETRY;
   if (!begins || campaigns_.holdings_of(entry.id).num_campaigns > 0) return;
   const Campaign& definition = *context_.state.campaigns.at(entry.id).definition;
   check_limits(campaign, entry.status.owner(),
@@ -384,72 +385,58 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
       [request](Store& store) { write_wishes(store, *request); }, std::move(respond));
 }
 
-void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction action,
-                            Respond respond) {
-  const proto::CampaignStatus& status = campaign.status;
-  if (under_way_.contains(status.name())) refuse_as_under_way(status.name());
-  if (campaign.status.owner().empty()) {
-    return reopen_measured(campaign, action, 0, std::move(respond));
-  }
-  check_limits(status.name(), campaign.status.owner(), {.num_campaigns = 1, .size = 0});
+void RequestService::reopen(const CampaignRecord& campaign, proto::ControlAction action,
+                            const Respond& respond) {
+  const std::string& name = campaign.status.name();
+  const std::string& owner = campaign.status.owner();
+  if (under_way_.contains(name)) refuse_as_under_way(name);
+  check_limits(name, owner, {.num_campaigns = 1, .size = 0});
   // What its definition takes is known when the file is read, which must not change if that is too
   // much: so it is opened twice.
-  const auto work = [this, &directory = *context_.config.directory, campaign, action,
-                     respond]() -> Background::Finish {
-    std::uint64_t size = 0;
-    const std::string failure =
-        failure_of([&] { size = definition_size(*directory.load(campaign.file).definition); });
-    return [this, campaign, action, size, failure, respond] {
-      under_way_.erase(campaign.status.name());
-      if (!failure.empty()) return respond(wire::error_reply(failure));
-      respond_or_say_why(respond, [&] { reopen_measured(campaign, action, size, respond); });
-    };
+  const auto load = [&directory = *context_.config.directory, file = campaign.file] {
+    return directory.load(file);
   };
-  if (!context_.background.post(work)) refuse_as_too_many();
-  under_way_.emplace(status.name(),
-                     UnderWay{.owner = campaign.status.owner(), .added = {.num_campaigns = 1}});
-}
-
-void RequestService::reopen_measured(const CampaignRecord& campaign, wire::ControlAction action,
-                                     std::uint64_t size, Respond respond) {
-  const std::string& name = campaign.status.name();
-  UnderWay under_way{.owner = campaign.status.owner(), .added = {.num_campaigns = 1, .size = size}};
-  check_limits(name, under_way.owner, under_way.added);
-  const CampaignDirectory& directory = *context_.config.directory;
-  serve_opened(
-      name, std::move(under_way),
-      [&directory, file = campaign.file] { return directory.load(file); },
-      [action](Store& store) {
-        if (action == wire::ControlAction::retry) write(store, RetriedRuns{});
-        CampaignControl control = store.control();
-        control.phase = Phase::active;
-        write(store, control);
-      },
-      std::move(respond));
+  const auto measure = [load] { return definition_size(*load().definition); };
+  const auto go_on = [this, name, owner, action, load, respond](std::future<std::uint64_t> size) {
+    under_way_.erase(name);
+    respond_or_say_why(respond, [&] {
+      UnderWay under_way{.owner = owner, .added = {.num_campaigns = 1, .size = size.get()}};
+      check_limits(name, owner, under_way.added);
+      serve_opened(
+          name, std::move(under_way), load,
+          [action](Store& store) {
+            if (action == proto::CONTROL_ACTION_RETRY) write(store, RetriedRuns{});
+            CampaignControl control = store.control();
+            control.phase = Phase::active;
+            write(store, control);
+          },
+          respond);
+    });
+  };
+  if (!context_.background.post(work_of(measure, go_on))) refuse_as_too_many();
+  under_way_.emplace(name, UnderWay{.owner = owner, .added = {.num_campaigns = 1}});
 }
 
 void RequestService::serve_opened(const std::string& name, UnderWay under_way,
                                   std::function<ServedCampaign()> open,
                                   std::function<void(Store&)> activate, Respond respond) {
-  const auto work = [this, name, open = std::move(open), activate = std::move(activate),
-                     respond]() -> Background::Finish {
-    // Copyable, as the function is.
-    const auto look = std::make_shared<FileLook>();
-    std::filesystem::path made;
-    const std::string failure = failure_of([&] {
+  const auto made = std::make_shared<std::filesystem::path>();
+  const auto work = [this, made, open = std::move(open), activate = std::move(activate)] {
+    try {
       ServedCampaign campaign = open();
-      if (campaign.is_new) made = campaign.file;
+      if (campaign.is_new) *made = campaign.file;
       activate(campaign.store);
-      *look = prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
-    });
-    if (!failure.empty() && !made.empty()) remove_made(made);
-    return [this, name, look, made, failure, respond] {
-      under_way_.erase(name);
-      if (!failure.empty()) return respond(wire::error_reply(failure));
-      respond_or_say_why(respond, [&] { respond(serve(std::move(*look), made)); });
-    };
+      return prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
+    } catch (const std::exception&) {
+      if (!made->empty()) remove_made(*made);
+      throw;
+    }
   };
-  if (!context_.background.post(work)) refuse_as_too_many();
+  const auto then = [this, name, made, respond](std::future<FileLook> look) {
+    under_way_.erase(name);
+    respond_or_say_why(respond, [&] { respond(serve(look.get(), *made)); });
+  };
+  if (!context_.background.post(work_of(work, then))) refuse_as_too_many();
   under_way_.emplace(name, std::move(under_way));
 }
 

@@ -57,7 +57,7 @@ class RequestService {
   };
 
   void control(const proto::ControlRequest& request, const Asker& asker, const Respond& respond);
-  void control_served(CampaignId id, wire::ControlAction action, int priority,
+  void control_served(CampaignId id, proto::ControlAction action, int priority,
                       const Respond& respond);
   void defer(std::function<void()> ask_again, const Respond& respond);
   [[nodiscard]] proto::ReplyEnvelope status(const proto::StatusRequest& request) const;
@@ -78,16 +78,14 @@ class RequestService {
                     const Holdings& added) const;
   /// check_limits() for an action on a campaign whose file is open.
   void check_limits(const std::string& campaign, const CampaignRecord& entry,
-                    wire::ControlAction action) const;
+                    proto::ControlAction action) const;
   /// @param closed  The campaign if it has been served; otherwise its file may have to be made.
   void open_file(const Submitted& request, const Asker& asker,
                  const std::optional<CampaignRecord>& closed, UnderWay under_way, Respond respond);
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs, if its owner
   /// may have it unfinished.
   [[noreturn]] void refuse_as_not_served(const std::string& campaign) const;
-  void reopen(const CampaignRecord& campaign, wire::ControlAction action, Respond respond);
-  void reopen_measured(const CampaignRecord& campaign, wire::ControlAction action,
-                       std::uint64_t size, Respond respond);
+  void reopen(const CampaignRecord& campaign, proto::ControlAction action, const Respond& respond);
   void change_served(CampaignId id, const Submitted& request, UnderWay under_way, Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it. If that fails, a file that
   /// was made for it is removed.

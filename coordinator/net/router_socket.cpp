@@ -30,24 +30,13 @@ std::string property_of(zmq::message_t& message, const char* name) {
 
 }  // namespace
 
-struct RouterSocket::Received {
-  Address from;
-  std::vector<zmq::message_t> frames;
-
-  [[nodiscard]] Incoming view() const {
-    Incoming incoming{.from = from, .frames = {}};
-    for (const zmq::message_t& frame : frames) incoming.frames.push_back(frame.to_string_view());
-    return incoming;
-  }
-};
-
 RouterSocket::RouterSocket(zmq::context_t& context, std::string_view option,
                            const std::string& endpoint, const wire::ServerSecurity& security,
                            std::optional<int> listener)
     : context_(context), option_(option), security_(security) {
   bind(endpoint, listener);
   endpoint_ = socket_->get(zmq::sockopt::last_endpoint);
-  if (security_.domain == wire::Domain::clients) return;
+  if (security_.peers == wire::KeyRole::client) return;
   sending_ = wire::link_faults(wire::LinkFaults::Direction::sending);
   receiving_ = wire::link_faults(wire::LinkFaults::Direction::receiving);
 }
@@ -65,14 +54,15 @@ int RouterSocket::receive(int count_max, TimePoint now,
                           const std::function<void(const Incoming&)>& handle) {
   int count = 0;
   for (; count < count_max; ++count) {
-    const std::optional<Received> received = next();
-    if (!received) break;
-    if (!receiving_ || received->frames.size() != 1) {
-      handle(received->view());
+    Incoming incoming;
+    std::vector<zmq::message_t> frames;
+    if (!next(incoming, frames)) break;
+    if (!receiving_ || frames.size() != 1) {
+      handle(incoming);
       continue;
     }
-    addresses_[received->from.routing_id] = received->from;
-    receiving_->pass(received->from.routing_id, received->frames.front().to_string(), now);
+    addresses_[incoming.from.routing_id] = incoming.from;
+    receiving_->pass(incoming.from.routing_id, frames.front().to_string(), now);
   }
   if (receiving_) pass_due(now, handle);
   return count;
@@ -131,23 +121,21 @@ void RouterSocket::wait_for_unbound() {
   }
 }
 
-std::optional<RouterSocket::Received> RouterSocket::next() {
+bool RouterSocket::next(Incoming& incoming, std::vector<zmq::message_t>& frames) {
   const std::lock_guard lock(mutex_);
   zmq::message_t routing_id;
-  if (socket_ == nullptr || !socket_->recv(routing_id, zmq::recv_flags::dontwait)) {
-    return std::nullopt;
-  }
-  Received received;
-  received.from.routing_id = routing_id.to_string();
+  if (socket_ == nullptr || !socket_->recv(routing_id, zmq::recv_flags::dontwait)) return false;
+  incoming.from.routing_id = routing_id.to_string();
   while (socket_->get(zmq::sockopt::rcvmore)) {
     // The parts of a message arrive together.
-    if (received.frames.size() < frames_max) received.frames.emplace_back();
-    (void)socket_->recv(received.frames.back());
+    if (frames.size() < frames_max) frames.emplace_back();
+    (void)socket_->recv(frames.back());
   }
-  if (received.frames.empty()) return received;
-  received.from.key = property_of(received.frames.front(), "User-Id");
-  received.from.host = property_of(received.frames.front(), "Peer-Address");
-  return received;
+  if (frames.empty()) return true;
+  incoming.from.key = property_of(frames.front(), "User-Id");
+  incoming.from.host = property_of(frames.front(), "Peer-Address");
+  for (const zmq::message_t& frame : frames) incoming.frames.push_back(frame.to_string_view());
+  return true;
 }
 
 void RouterSocket::pass_due(TimePoint now, const std::function<void(const Incoming&)>& handle) {

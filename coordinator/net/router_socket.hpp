@@ -16,6 +16,7 @@
 
 namespace zmq {
 class context_t;
+class message_t;
 class socket_t;
 }  // namespace zmq
 
@@ -80,11 +81,11 @@ class RouterSocket {
   [[nodiscard]] bool open();
 
  private:
-  /// A message with the frames that hold its bytes.
-  struct Received;
   void bind(const std::string& endpoint, std::optional<int> listener);
   void wait_for_unbound();
-  [[nodiscard]] std::optional<Received> next();
+  /// @param frames  Hold the bytes of the message.
+  /// @return False if there is none.
+  [[nodiscard]] bool next(Incoming& incoming, std::vector<zmq::message_t>& frames);
   void pass_due(TimePoint now, const std::function<void(const Incoming&)>& handle);
   bool send_now(const std::string& routing_id, const std::string& bytes);
 

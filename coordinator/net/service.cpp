@@ -150,7 +150,7 @@ class Service::Impl final : public Outbox {
                 [this](const std::string& key, TimePoint time) {
                   Authenticator* const authenticator = sockets_.authenticator();
                   return authenticator == nullptr ||
-                         authenticator->is_allowed(wire::Domain::workers, key, time);
+                         authenticator->is_allowed(wire::KeyRole::worker, key, time);
                 }};
   }
 

@@ -34,9 +34,9 @@ constexpr std::chrono::seconds descriptors_pause(5);
 
 std::size_t mebibytes(std::size_t size) { return size >> 20; }
 
-wire::ServerSecurity security_of(const ServiceConfig& config, wire::Domain domain) {
-  if (config.keys) return wire::read_server_security(*config.keys, domain);
-  return {.domain = domain, .keys = std::nullopt};
+wire::ServerSecurity security_of(const ServiceConfig& config, wire::KeyRole peers) {
+  if (config.keys) return wire::read_server_security(*config.keys, peers);
+  return {.peers = peers, .keys = std::nullopt};
 }
 
 void check_endpoints(const ServiceConfig& config) {
@@ -186,11 +186,11 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
   check_endpoints(config);
   if (config.keys) authenticator_ = std::make_unique<Authenticator>(*context_, *config.keys, log_);
   workers_ = std::make_unique<RouterSocket>(*context_, "bind", config.workers_endpoint,
-                                            security_of(config, wire::Domain::workers),
+                                            security_of(config, wire::KeyRole::worker),
                                             config.workers_listener);
   if (config.clients_endpoint) {
     clients_ = std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
-                                              security_of(config, wire::Domain::clients));
+                                              security_of(config, wire::KeyRole::client));
   }
   descriptors_ = shared_out(raise_descriptor_limit(), config.num_descriptors_reserved,
                             lowest_free_descriptor());
@@ -232,11 +232,11 @@ void ServiceSockets::wait(std::chrono::milliseconds duration_max) {
 void ServiceSockets::serve(TimePoint now) {
   (void)wake_.take();
   if (authenticator_ != nullptr) {
-    const auto hand_on_events = [&](wire::Domain domain, RouterSocket& socket) {
-      while (const auto event = socket.take_event()) authenticator_->on_event(domain, *event, now);
+    const auto hand_on_events = [&](wire::KeyRole peers, RouterSocket& socket) {
+      while (const auto event = socket.take_event()) authenticator_->on_event(peers, *event, now);
     };
-    hand_on_events(wire::Domain::workers, *workers_);
-    if (clients_ != nullptr) hand_on_events(wire::Domain::clients, *clients_);
+    hand_on_events(wire::KeyRole::worker, *workers_);
+    if (clients_ != nullptr) hand_on_events(wire::KeyRole::client, *clients_);
     authenticator_->serve(now);
   }
   std::unique_lock lock(mutex_);

@@ -165,9 +165,9 @@ PublicKey read_public_key(const std::filesystem::path& file, KeyRole role) {
   return *public_key;
 }
 
-std::string_view to_text(Domain domain) {
-  return domain == Domain::workers ? "workers" : "clients";
-}
+std::string domain_of(KeyRole role) { return fmt::format("{}s", to_text(role)); }
+
+std::string list_name(KeyRole role) { return "authorized_" + domain_of(role); }
 
 Protection protection_by(const std::optional<std::filesystem::path>& keys, bool is_plain_waived) {
   if (keys) return Protection::keys;
@@ -182,10 +182,10 @@ void check_key_directory(const std::filesystem::path& directory) {
   check_reach("key directory", directory, status, Reach::written_by_owner);
 }
 
-ServerSecurity read_server_security(const std::filesystem::path& directory, Domain domain) {
+ServerSecurity read_server_security(const std::filesystem::path& directory, KeyRole peers) {
   check_key_directory(directory);
   const std::filesystem::path file = key_file(directory, KeyRole::coordinator, "key");
-  return {.domain = domain, .keys = read_key_pair(file, KeyRole::coordinator)};
+  return {.peers = peers, .keys = read_key_pair(file, KeyRole::coordinator)};
 }
 
 ClientSecurity read_client_security(const std::filesystem::path& directory, KeyRole role) {

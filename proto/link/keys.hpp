@@ -76,26 +76,18 @@ void write_key_pair(const std::filesystem::path& directory, std::string_view nam
 /// @throws Error as read_key_pair() does; others may read it, and it may be root's.
 [[nodiscard]] PublicKey read_public_key(const std::filesystem::path& file, KeyRole role);
 
-// What stands in a directory of keys, as `proofmass keygen` makes it.
-
-inline constexpr std::string_view coordinator_key_name = "coordinator";
-inline constexpr std::string_view worker_key_name = "worker";
-inline constexpr std::string_view client_key_name = "client";
-inline constexpr std::string_view authorized_workers_name = "authorized_workers";
-inline constexpr std::string_view authorized_clients_name = "authorized_clients";
-
 // How sockets use keys.
 
-/// The two addresses of a coordinator. Each has its own list of keys: a worker may not submit, a
-/// client may not deliver results.
-enum class Domain : std::uint8_t { workers, clients };
-
-[[nodiscard]] std::string_view to_text(Domain domain);  ///< `workers`, `clients`.
+/// How an address of a coordinator is called, `workers` or `clients`, by who may connect there.
+/// Each has its own list of keys: a worker may not submit, a client may not deliver results.
+[[nodiscard]] std::string domain_of(KeyRole role);
+/// The file of that list in a directory of keys: `authorized_workers`.
+[[nodiscard]] std::string list_name(KeyRole role);
 
 /// How a coordinator's socket proves who it is. With keys, only peers that an Authenticator in the
 /// same context admits to the domain get in; without, everybody who reaches the address.
 struct ServerSecurity {
-  Domain domain = Domain::workers;
+  KeyRole peers = KeyRole::worker;
   std::optional<KeyPair> keys;
 };
 
@@ -124,7 +116,7 @@ void check_key_directory(const std::filesystem::path& directory);
 /// Reads DIRECTORY/coordinator.key.
 /// @throws Error as check_key_directory() and read_key_pair() do.
 [[nodiscard]] ServerSecurity read_server_security(const std::filesystem::path& directory,
-                                                  Domain domain);
+                                                  KeyRole peers);
 
 /// Reads DIRECTORY/worker.key or client.key, and coordinator.pub.
 ///

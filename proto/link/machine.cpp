@@ -203,6 +203,17 @@ std::optional<int> status_if_ended(pid_t child) {
   return ended == child ? status : status_if_unknown;
 }
 
+std::optional<int> status_at_end(pid_t child, const std::function<bool()>& may_go_on) {
+  for (;;) {
+    if (const std::optional<int> status = status_if_ended(child)) return status;
+    if (!may_go_on()) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ::kill(child, SIGKILL);
+  (void)wait_for_end(child);
+  return std::nullopt;
+}
+
 std::string end_text(int status) {
   if (!WIFSIGNALED(status)) return fmt::format("exit code {}", WEXITSTATUS(status));
   const int number = WTERMSIG(status);

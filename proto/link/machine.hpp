@@ -57,6 +57,11 @@ inline constexpr bool has_address_space_limit = true;
 /// not. Does not wait.
 [[nodiscard]] std::optional<int> status_if_ended(pid_t child);
 
+/// Waits until a child process ends. Asks 100 times a second whether it may go on, and kills it
+/// otherwise.
+/// @return As wait_for_end(); nothing if it was killed.
+[[nodiscard]] std::optional<int> status_at_end(pid_t child, const std::function<bool()>& may_go_on);
+
 /// How a process ended, for people: `exit code 1`, `killed by signal 9 (Killed)`.
 /// @param status  From waitpid().
 [[nodiscard]] std::string end_text(int status);

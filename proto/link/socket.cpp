@@ -101,7 +101,7 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
   if (security.keys) {
     socket.set(zmq::sockopt::curve_server, true);
     socket.set(zmq::sockopt::curve_secretkey, security.keys->secret_key.reveal());
-    socket.set(zmq::sockopt::zap_domain, std::string(to_text(security.domain)));
+    socket.set(zmq::sockopt::zap_domain, domain_of(security.peers));
     enforce_domain(socket);
   }
   socket.set(zmq::sockopt::ipv6, may_be_ipv6(endpoint, EndpointUse::bind));

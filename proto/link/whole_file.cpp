@@ -66,7 +66,36 @@ bool is_others_business(const std::filesystem::path& file) {
   return ::stat(file.c_str(), &status) != 0 || (status.st_mode & 077) != 0;
 }
 
+[[noreturn]] void fail(std::string_view what) {
+  throw Error(fmt::format("temporary file: {}: {}", what, std::strerror(errno)));
+}
+
 }  // namespace
+
+UnnamedFile::UnnamedFile(int descriptor) : descriptor_(descriptor) {
+  if (descriptor < 0) fail("open");
+}
+
+std::uint64_t UnnamedFile::size() const {
+  struct stat status {};
+  if (::fstat(descriptor(), &status) != 0) fail("size");
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+std::string UnnamedFile::read(std::uint64_t offset, std::size_t size_max) const {
+  std::string bytes(size_max, '\0');
+  std::size_t size = 0;
+  while (size < size_max) {
+    const ssize_t num_read = ::pread(descriptor(), bytes.data() + size, size_max - size,
+                                     static_cast<off_t>(offset + size));
+    if (num_read < 0 && errno == EINTR) continue;
+    if (num_read < 0) fail("read");
+    if (num_read == 0) break;
+    size += static_cast<std::size_t>(num_read);
+  }
+  bytes.resize(size);
+  return bytes;
+}
 
 DraftFile::DraftFile(std::string_view what, std::filesystem::path path, mode_t mode,
                      std::string_view ending)

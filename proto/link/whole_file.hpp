@@ -35,6 +35,23 @@ class Descriptor {
   int number_;
 };
 
+/// A file without a name, in memory or on a disk: it is gone when its descriptor is closed.
+class UnnamedFile {
+ public:
+  /// @param descriptor  As memfd_create(2) or open(2) return it.
+  /// @throws Error with the reason in errno if it is negative.
+  explicit UnnamedFile(int descriptor);
+
+  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
+  [[nodiscard]] std::uint64_t size() const;  ///< Bytes.
+  /// At most so many bytes from the offset on; fewer only at the end of the file.
+  /// @throws Error if it cannot be read.
+  [[nodiscard]] std::string read(std::uint64_t offset, std::size_t size_max) const;
+
+ private:
+  Descriptor descriptor_;
+};
+
 // Every file that the programs make. None is made or opened through a symbolic link, whoever put it
 // there, and none has more permissions than the umask leaves.
 

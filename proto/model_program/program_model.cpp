@@ -19,7 +19,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -67,24 +66,6 @@ constexpr std::size_t last_errors_size_max = 4096;
 
 }  // namespace
 
-void ErrorOutput::take(std::string_view text) {
-  const std::size_t shown =
-      std::min(text.size(), first_errors_size_max - std::min(first_errors_size_max, size_));
-  say_on(stderr, text.substr(0, shown));
-  size_ += text.size();
-  last_ += text.substr(shown);
-  if (last_.size() > last_errors_size_max) last_.erase(0, last_.size() - last_errors_size_max);
-}
-
-void ErrorOutput::end(std::string_view program) {
-  const std::size_t shown = first_errors_size_max + last_.size();
-  if (size_ > shown) {
-    say(fmt::format("\n{}: {} bytes of its standard error are left out here\n", program,
-                    size_ - shown));
-  }
-  say_on(stderr, last_);
-}
-
 ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
     : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
   auto [questions, its_input] = connected_pair();
@@ -117,20 +98,20 @@ ProgramProcess::~ProgramProcess() {
     (void)wait_for_end(process_id_);
   }
   pass_on_errors();
-  error_output_.end(name_);
+  const std::size_t shown = first_errors_size_max + last_errors_.size();
+  if (errors_size_ > shown) {
+    say(fmt::format("\n{}: {} bytes of its standard error are left out here\n", name_,
+                    errors_size_ - shown));
+  }
+  say_on(stderr, last_errors_);
 }
 
 std::string ProgramProcess::how_it_ended() {
   // It has closed its output, which it does just before it ends unless it means to stay.
-  constexpr int attempts_max = 100;
-  for (int i = 0; i < attempts_max; ++i) {
-    if (const std::optional<int> status = status_if_ended(process_id_)) {
-      process_id_ = 0;
-      return end_text(*status);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return "it closed its output";
+  const std::optional<int> status =
+      status_at_end(process_id_, [num_left = 100]() mutable { return num_left-- > 0; });
+  process_id_ = 0;
+  return status ? end_text(*status) : "it closed its output";
 }
 
 void ProgramProcess::fail(std::string_view reason) const {
@@ -168,8 +149,15 @@ void ProgramProcess::pass_on_errors() {
   std::array<char, 65536> part;  // NOLINT: read() fills it.
   // No more than once what a pipe holds: a program may print without an end.
   const ssize_t size = read(errors_.number(), part.data(), part.size());
-  if (size > 0) error_output_.take({part.data(), static_cast<std::size_t>(size)});
   if (size == 0) errors_ = Descriptor();  // It has closed it.
+  if (size <= 0) return;
+  const std::string_view text(part.data(), static_cast<std::size_t>(size));
+  const std::size_t room = first_errors_size_max - std::min(first_errors_size_max, errors_size_);
+  say_on(stderr, text.substr(0, room));
+  errors_size_ += text.size();
+  last_errors_ += text.substr(std::min(room, text.size()));
+  if (last_errors_.size() <= last_errors_size_max) return;
+  last_errors_.erase(0, last_errors_.size() - last_errors_size_max);
 }
 
 void ProgramProcess::ask(const std::vector<std::string>& questions,

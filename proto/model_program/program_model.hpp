@@ -16,18 +16,6 @@
 
 namespace proofmass::wire {
 
-/// What a program prints as standard error: its first part is passed on as it comes, and its last
-/// part in the end, with the number of bytes that are left out between them.
-class ErrorOutput {
- public:
-  void take(std::string_view text);
-  void end(std::string_view program);
-
- private:
-  std::size_t size_ = 0;  // Of all that was taken.
-  std::string last_;      // Behind the first part.
-};
-
 /// A model program that runs as a child of this process: it reads questions from its standard
 /// input, a line each, and answers each with a line, in their order. What it prints as standard
 /// error becomes that of this process, up to a limit. It does not outlive this process, however
@@ -52,6 +40,8 @@ class ProgramProcess {
  private:
   void write_some(std::string_view& text) const;
   void read_some();
+  /// The first part of what it prints as standard error is passed on as it comes, and the last part
+  /// in the end, with the number of bytes that are left out between them.
   void pass_on_errors();
   void expect_silence() const;
   [[nodiscard]] std::string how_it_ended();
@@ -64,8 +54,9 @@ class ProgramProcess {
   Descriptor answers_;
   Descriptor errors_;
   Descriptor lifeline_;
-  std::string received_;  // Behind the last line that was taken.
-  ErrorOutput error_output_;
+  std::string received_;         // Behind the last line that was taken.
+  std::size_t errors_size_ = 0;  // Of all that it printed as standard error.
+  std::string last_errors_;      // Behind the first part.
 };
 
 /// The model of a program in any language, which is asked what it is and then not kept.

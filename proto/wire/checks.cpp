@@ -8,13 +8,10 @@
 #include <google/protobuf/wire_format_lite.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
-#include "core/campaign/name.hpp"
 #include "core/error.hpp"
-#include "proto/wire/names.hpp"
 
 namespace proofmass::wire::detail {
 namespace {
@@ -72,38 +69,46 @@ void silence_protobuf() {
 
 }  // namespace
 
-std::optional<DecodeError> read(std::string_view bytes, const Form& form,
-                                google::protobuf::Message& message,
-                                const std::function<std::optional<DecodeError>()>& check) {
+std::optional<DecodeError> parse(std::string_view bytes, const Form& form,
+                                 google::protobuf::Message& message) {
   silence_protobuf();
   if (bytes.size() > form.size_max) return too_large(form, bytes.size());
+  const Descriptor& type = *message.GetDescriptor();
   // A field takes two bytes or more, so that a short message cannot have too many.
   const bool is_counted = form.is_always_counted || bytes.size() / 2 > form.fields_max;
-  const bool has_few =
-      !is_counted || has_fields_at_most(bytes, *message.GetDescriptor(), form.fields_max);
-  const bool is_parsed =
-      has_few && message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!is_parsed) {
+  const bool has_few = !is_counted || has_fields_at_most(bytes, type, form.fields_max);
+  if (!has_few || !message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     return DecodeError{DecodeFault::unparsable,
                        fmt::format("{} = {} bytes (must be {} of at most {} fields)", form.name,
                                    bytes.size(), form.kind, form.fields_max)};
   }
-  try {
-    return check();
-  } catch (const Error& error) {
-    return DecodeError{DecodeFault::invalid, printable(error.what())};
-  }
-}
-
-std::optional<DecodeError> fault_of_envelope(const Form& form, std::uint32_t version,
-                                             bool is_empty) {
+  const google::protobuf::Reflection& values = *message.GetReflection();
+  const FieldDescriptor* const field = type.FindFieldByName("protocol_version");
+  if (field == nullptr) return std::nullopt;
+  const std::uint32_t version = values.GetUInt32(message, field);
   if (version != protocol_version) {
     return DecodeError{DecodeFault::wrong_version, fmt::format("protocol_version = {} (must be {})",
                                                                version, protocol_version)};
   }
-  if (!is_empty) return std::nullopt;
+  int count = 0;
+  for (int i = 0; i < type.oneof_decl_count(); ++i) {
+    if (values.HasOneof(message, type.oneof_decl(i))) ++count;
+  }
+  if (count == 1) return std::nullopt;
+  if (count > 1) {
+    return DecodeError{DecodeFault::invalid, fmt::format("{} = two (must be one)", form.name)};
+  }
   return DecodeError{DecodeFault::empty,
                      fmt::format("{} = none (must be of a known kind)", form.name)};
+}
+
+std::optional<DecodeError> fault_in(const google::protobuf::Message& message) {
+  try {
+    check_rules(message);
+    return std::nullopt;
+  } catch (const Error& error) {
+    return DecodeError{DecodeFault::invalid, printable(error.what())};
+  }
 }
 
 DecodeError too_large(const Form& form, std::size_t size) {
@@ -115,48 +120,6 @@ std::string bytes_of(const google::protobuf::Message& message, const Form& form)
   const std::size_t size = message.ByteSizeLong();
   if (size > form.size_max) throw InvalidArgument(too_large(form, size).text);
   return message.SerializeAsString();
-}
-
-void require(bool condition, std::string_view field, const std::string& value,
-             std::string_view rule) {
-  if (!condition) throw ConfigError(field, value, rule);
-}
-
-void require_in(std::uint64_t value, std::uint64_t minimum, std::uint64_t maximum,
-                std::string_view field) {
-  // Texts are made for a refusal only: a batch of results calls this thousands of times.
-  if (value >= minimum && value <= maximum) return;
-  throw ConfigError(field, fmt::format("{}", value),
-                    fmt::format("must be in [{}, {}]", minimum, maximum));
-}
-
-void require_count(int count, std::uint64_t minimum, std::uint64_t maximum,
-                   std::string_view field) {
-  const auto size = static_cast<std::uint64_t>(count);
-  if (size >= minimum && size <= maximum) return;
-  throw ConfigError(field, fmt::format("{} entries", count),
-                    fmt::format("must be in [{}, {}]", minimum, maximum));
-}
-
-void require_name(const std::string& name, std::string_view field) {
-  // The name itself is not repeated: it may hold anything.
-  require(is_name(name), field, fmt::format("{} bytes", name.size()), is_name_rule);
-}
-
-void require_cards(const std::string& cards) {
-  require_in(cards.size(), 0, cards_text_size_max, "size of cards");
-  require(printable(cards) == cards, "cards", printable(cards), "must be printable ASCII");
-}
-
-void require_magnitude(double value, std::string_view field, double maximum) {
-  if (value >= 0.0 && value <= maximum) return;
-  const bool is_too_large = value > maximum && std::isfinite(value);
-  throw ConfigError(field, fmt::format("{}", value),
-                    is_too_large ? fmt::format("must be <= {}", maximum) : "must be >= 0");
-}
-
-void require_id(std::uint64_t id, std::string_view field) {
-  require(id != 0, field, "0", "must not be 0");
 }
 
 std::string printable(std::string_view text) {

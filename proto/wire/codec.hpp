@@ -51,9 +51,6 @@ struct DecodeError {
 [[nodiscard]] inline bool is_of_worker(const proto::Envelope& message) {
   return message.from_worker_case() != proto::Envelope::FROM_WORKER_NOT_SET;
 }
-[[nodiscard]] inline bool is_of_coordinator(const proto::Envelope& message) {
-  return message.from_coordinator_case() != proto::Envelope::FROM_COORDINATOR_NOT_SET;
-}
 
 using Ranges = google::protobuf::RepeatedPtrField<proto::Range>;
 

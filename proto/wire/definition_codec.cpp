@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "core/error.hpp"
@@ -22,23 +20,6 @@ constexpr detail::Form definition_form{.name = "definition",
 
 using Values = google::protobuf::RepeatedField<double>;
 
-void check_finite(const Values& values, std::string_view field) {
-  const auto bad = std::find_if_not(values.begin(), values.end(),
-                                    [](double value) { return std::isfinite(value); });
-  if (bad != values.end()) throw ConfigError(field, fmt::format("{}", *bad), "must be finite");
-}
-
-void check_table(const proto::DataTable& message) {
-  detail::require_in(message.num_columns(), 1, columns_of_a_table_max,
-                     "definition.tables.num_columns");
-  const auto size = static_cast<std::uint64_t>(message.values_size());
-  detail::require(size % message.num_columns() == 0, "definition.tables.values",
-                  fmt::format("{} entries", size),
-                  fmt::format("must be rows of {}", message.num_columns()));
-  detail::require_name(message.key(), "definition.tables.key");
-  check_finite(message.values(), "definition.tables.values");
-}
-
 std::vector<double> vector_of(const Values& values) { return {values.begin(), values.end()}; }
 }  // namespace
 
@@ -55,19 +36,6 @@ void write_definition(const Definition& definition, proto::Definition& message) 
   }
   for (const std::vector<double>& column : definition.table_columns) {
     message.add_table_columns()->mutable_values()->Assign(column.begin(), column.end());
-  }
-}
-
-void check_definition(const proto::Definition& message) {
-  require_in(message.text().size(), 1, definition_text_size_max, "definition.text size");
-  if (!message.model_version().empty()) {
-    require_name(message.model_version(), "definition.model_version");
-  }
-  require_count(message.tables_size(), 0, definition_tables_max, "definition.tables");
-  require_count(message.table_columns_size(), 0, table_columns_max, "definition.table_columns");
-  for (const proto::DataTable& table : message.tables()) check_table(table);
-  for (const proto::TableColumn& column : message.table_columns()) {
-    check_finite(column.values(), "definition.table_columns.values");
   }
 }
 
@@ -92,14 +60,11 @@ std::string encode_definition(const Definition& definition) {
   return detail::bytes_of(message, definition_form);
 }
 
-std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) {
+Definition decode_definition(std::string_view bytes) {
   proto::Definition message;
-  const auto fault =
-      detail::read(bytes, definition_form, message, [&]() -> std::optional<DecodeError> {
-        detail::check_definition(message);
-        return std::nullopt;
-      });
-  if (fault) return *fault;
+  auto fault = detail::parse(bytes, definition_form, message);
+  if (!fault) fault = detail::fault_in(message);
+  if (fault) throw Error(fault->text);
   return detail::read_definition(message);
 }
 
@@ -129,16 +94,15 @@ IncomingDefinition::Progress IncomingDefinition::add(const proto::DefinitionPart
   return bytes_.size() == total_size_ ? Progress::complete : Progress::advanced;
 }
 
-std::variant<Definition, DecodeError> IncomingDefinition::take() {
+Definition IncomingDefinition::take() {
   PROOFMASS_EXPECT(bytes_.size() == total_size_);
   const std::string bytes = std::exchange(bytes_, {});
   total_size_ = 0;
   const std::uint64_t expected = std::exchange(checksum_, 0);
   const std::uint64_t found = fnv1a(bytes);
   if (found != expected) {
-    return DecodeError{
-        DecodeFault::invalid,
-        fmt::format("checksum = {:016x} (must be {:016x}, the definition's)", found, expected)};
+    throw Error(
+        fmt::format("checksum = {:016x} (must be {:016x}, the definition's)", found, expected));
   }
   return decode_definition(bytes);
 }

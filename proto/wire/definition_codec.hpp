@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <variant>
 
 #include "core/campaign/definition.hpp"
 #include "proto/wire/codec.hpp"
@@ -23,7 +22,8 @@ namespace proofmass::wire {
 
 /// Checks all but what the text says: sizes, counts, that rows are whole and numbers finite.
 /// @param bytes  Anything at all.
-[[nodiscard]] std::variant<Definition, DecodeError> decode_definition(std::string_view bytes);
+/// @throws Error if they are none.
+[[nodiscard]] Definition decode_definition(std::string_view bytes);
 
 /// An encoded definition, from which parts are taken. It is made once and shared by
 /// all answers.
@@ -57,8 +57,9 @@ class IncomingDefinition {
   [[nodiscard]] Progress add(const proto::DefinitionPart& part);
   /// What has arrived: the offset of the next part.
   [[nodiscard]] std::uint64_t num_bytes() const { return bytes_.size(); }
-  /// The definition, or why the bytes are none; all parts are dropped. @pre It is complete.
-  [[nodiscard]] std::variant<Definition, DecodeError> take();
+  /// The definition; all parts are dropped. @pre It is complete.
+  /// @throws Error if the bytes are none.
+  [[nodiscard]] Definition take();
 
  private:
   std::uint64_t total_size_ = 0;
@@ -70,9 +71,6 @@ namespace detail {
 
 /// `message` is empty at first.
 void write_definition(const Definition& definition, proto::Definition& message);
-
-/// @throws Error if there is too much of anything, rows are not whole, or a number is not finite.
-void check_definition(const proto::Definition& message);
 
 /// @pre The message has been checked.
 [[nodiscard]] Definition read_definition(const proto::Definition& message);

@@ -27,7 +27,7 @@ std::string name_from(std::string_view text) {
   return name;
 }
 
-std::string_view name_of(ControlAction action) {
+std::string_view name_of(proto::ControlAction action) {
   static constexpr std::array<std::string_view, 6> names{"pause",        "resume", "cancel",
                                                          "set-priority", "retry",  "archive"};
   return name_in(names, action);

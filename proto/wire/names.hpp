@@ -10,22 +10,13 @@
 namespace proofmass::proto {
 class CampaignStatus;
 enum CampaignPhase : int;
+enum ControlAction : int;
 enum FactoryPhase : int;
 }  // namespace proofmass::proto
 
 namespace proofmass::wire {
 
 using proofmass::is_name;
-
-/// What a client does with a campaign. The values are sent: never renumber.
-enum class ControlAction : std::uint8_t {
-  pause = 1,
-  resume = 2,
-  cancel = 3,
-  set_priority = 4,
-  retry = 5,    ///< The runs that were given up are lent again.
-  archive = 6,  ///< It is no longer served; its file moves to `archived`.
-};
 
 /// Whether a campaign's runs are lent. The values are sent: never renumber.
 enum class CampaignPhase : std::uint8_t {
@@ -46,7 +37,7 @@ enum class CampaignPhase : std::uint8_t {
 [[nodiscard]] bool has_failed(const proto::CampaignStatus& campaign);
 
 /// Names of values for people, logs, JSON and the database: `pause`, `active`, `out_of_memory`.
-[[nodiscard]] std::string_view name_of(ControlAction action);
+[[nodiscard]] std::string_view name_of(proto::ControlAction action);
 [[nodiscard]] std::string_view name_of(CampaignPhase phase);
 [[nodiscard]] std::string_view name_of(proto::FactoryPhase phase);
 /// The phase, or `failed` if the campaign is finished and most of its runs were given up.

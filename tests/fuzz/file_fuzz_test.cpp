@@ -129,8 +129,8 @@ TEST_F(MutatedTexts, AreListsOfKeysOrRefused) {
     text += wire::make_key_pair().public_key.text() + " " + name + "\n";
   }
   mutate(text, [](const std::string& changed) {
-    (void)coordinator::parse_allow_list(changed, wire::Domain::workers, "authorized_workers");
-    (void)coordinator::parse_allow_list(changed, wire::Domain::clients, "authorized_clients");
+    (void)coordinator::parse_allow_list(changed, wire::KeyRole::worker, "authorized_workers");
+    (void)coordinator::parse_allow_list(changed, wire::KeyRole::client, "authorized_clients");
   });
 }
 

@@ -188,7 +188,7 @@ class World final : public coordinator::Outbox {
     if (request->has_factory_report()) return take_report(request->factory_report());
     if (!request->has_control()) return;
     control_campaign(request->control().campaign() == "table" ? fuzz_table_campaign : fuzz_campaign,
-                     static_cast<wire::ControlAction>(request->control().action()));
+                     request->control().action());
   }
 
   /// A definition is refused, or that of the campaign that is read from it.
@@ -213,11 +213,11 @@ class World final : public coordinator::Outbox {
         wire::decode_reply(wire::encode(std::move(reply)))));
   }
 
-  void control_campaign(CampaignId id, wire::ControlAction action) {
+  void control_campaign(CampaignId id, proto::ControlAction action) {
     const coordinator::Phase phase = state_.campaigns.at(id).phase;
     if (phase == coordinator::Phase::finished) return;
-    if (action == wire::ControlAction::pause) return on_pause(state_, id, *this);
-    if (action == wire::ControlAction::cancel) return on_cancel(state_, id, *this);
+    if (action == proto::CONTROL_ACTION_PAUSE) return on_pause(state_, id, *this);
+    if (action == proto::CONTROL_ACTION_CANCEL) return on_cancel(state_, id, *this);
     if (phase != coordinator::Phase::active) on_resume(state_, id, now_, *this);
   }
 

@@ -120,7 +120,7 @@ Step to_client(proto::ReplyEnvelope reply) {
           .content = wire::encode(numbered(1, std::move(reply)))};
 }
 
-Step from_client(wire::ControlAction action, const std::string& campaign) {
+Step from_client(proto::ControlAction action, const std::string& campaign) {
   return from_client(control(action, campaign));
 }
 
@@ -166,7 +166,7 @@ std::string workers_that_are_lost() {
 /// another.
 std::string run_that_crashes_workers() {
   std::vector<Step> steps;
-  steps.push_back(from_client(wire::ControlAction::cancel, "table"));
+  steps.push_back(from_client(proto::CONTROL_ACTION_CANCEL, "table"));
   Speaker first(steps, 0, 11);
   first.say_hello("h");
   first.deliver(fuzz_campaign, 1, fuzz_num_runs - 1);
@@ -186,7 +186,7 @@ std::string campaign_that_is_audited() {
   std::vector<Step> steps;
   Speaker first(steps, 0, 11);
   Speaker second(steps, 1, 12);
-  steps.push_back(from_client(wire::ControlAction::cancel, "hardy2013"));
+  steps.push_back(from_client(proto::CONTROL_ACTION_CANCEL, "hardy2013"));
   first.say_hello("h");
   second.say_hello("g");
   for (std::uint64_t run = 0; run < fuzz_num_runs; run += 4) {
@@ -206,14 +206,14 @@ std::string campaign_that_is_controlled() {
   Speaker worker(steps, 0, 11);
   worker.say_hello("h");
   worker.beat(fuzz_campaign, 0, 0);
-  steps.push_back(from_client(wire::ControlAction::pause, "hardy2013"));
+  steps.push_back(from_client(proto::CONTROL_ACTION_PAUSE, "hardy2013"));
   worker.beat(fuzz_campaign, 0, 8);
-  steps.push_back(from_client(wire::ControlAction::resume, "hardy2013"));
+  steps.push_back(from_client(proto::CONTROL_ACTION_RESUME, "hardy2013"));
   steps.push_back(happening(StepKind::store_failure, 0));
   worker.deliver(fuzz_campaign, 0, 2);
   steps.push_back(happening(StepKind::store_failure, 1));
-  steps.push_back(from_client(wire::ControlAction::cancel, "table"));
-  steps.push_back(from_client(wire::ControlAction::resume, "table"));
+  steps.push_back(from_client(proto::CONTROL_ACTION_CANCEL, "table"));
+  steps.push_back(from_client(proto::CONTROL_ACTION_RESUME, "table"));
   return to_bytes(steps);
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <utility>
-#include <variant>
 
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
@@ -15,23 +14,8 @@
 namespace proofmass::worker {
 namespace {
 
-Duration times(double factor, Duration duration) {
-  return std::chrono::duration_cast<Duration>(factor * duration);
-}
-
 std::int64_t whole_seconds(Duration duration) {
   return std::chrono::duration_cast<std::chrono::seconds>(duration).count();
-}
-
-/// The campaign that was received, or why it is none.
-std::variant<std::shared_ptr<const Campaign>, std::string> read_definition(
-    const Execution& execution, std::variant<Definition, wire::DecodeError> taken) {
-  if (auto* const error = std::get_if<wire::DecodeError>(&taken)) return std::move(error->text);
-  try {
-    return execution.read(std::get<Definition>(std::move(taken)));
-  } catch (const Error& error) {
-    return error.what();
-  }
 }
 
 }  // namespace
@@ -256,6 +240,11 @@ void Conversation::send(proto::Envelope message) {
   send_(std::move(message));
 }
 
+Duration Conversation::with_jitter(Duration delay) const {
+  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
+  return std::chrono::duration_cast<Duration>((1.0 + jitter) * delay);
+}
+
 void Conversation::register_again(TimePoint now) {
   is_registered_ = false;
   hello_delay_ = config_.hello_delay;
@@ -270,8 +259,7 @@ void Conversation::come_again(const proto::Reject& reject, TimePoint now) {
   refused_at_ = now;
   is_registered_ = false;
   is_closed_out_ = reject.reason() == proto::REJECT_REASON_MALFORMED || revocation_;
-  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
-  hello_due_at_ = now + times(1.0 + jitter, refusal_delay_);
+  hello_due_at_ = now + with_jitter(refusal_delay_);
   hello_delay_ = config_.hello_delay;
   refusal_delay_ = std::min(2 * refusal_delay_, config_.refusal_delay_max);
   if (!noted_refusals_.insert(reject.reason()).second) return;
@@ -288,8 +276,7 @@ void Conversation::say_hello(TimePoint now) {
   proto::Envelope envelope;
   *envelope.mutable_hello() = hello_;
   send(std::move(envelope));
-  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
-  hello_due_at_ = now + times(1.0 + jitter, hello_delay_);
+  hello_due_at_ = now + with_jitter(hello_delay_);
   hello_delay_ = std::min(2 * hello_delay_, config_.hello_delay_max);
 }
 
@@ -370,15 +357,16 @@ void Conversation::request_definitions(TimePoint now) {
 /// coordinator's program. It is asked for again in a while, as the program may be exchanged.
 void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   WantedDefinition& wanted = wanted_.at(campaign);
-  const auto read = read_definition(execution_, wanted.incoming.take());
-  if (const auto* const refusal = std::get_if<std::string>(&read)) {
+  std::shared_ptr<const Campaign> definition;
+  try {
+    definition = execution_.read(wanted.incoming.take());
+  } catch (const Error& error) {
     wanted.request_due_at = now + config_.request_again_after;
     return note({.severity = wire::Severity::error,
                  .kind = "malformed_definition",
                  .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
-                            wire::Field::remark(fmt::format("{:.400}", *refusal))}});
+                            wire::Field::remark(fmt::format("{:.400}", error.what()))}});
   }
-  const auto& definition = std::get<std::shared_ptr<const Campaign>>(read);
   wanted_.erase(campaign);
   if (agrees_on_table(campaign, definition->table_quantities().size())) {
     execution_.define(campaign, definition);

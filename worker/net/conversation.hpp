@@ -141,6 +141,7 @@ class Conversation {
 
   void send(proto::Envelope message);
   void say_hello(TimePoint now);
+  [[nodiscard]] Duration with_jitter(Duration delay) const;  ///< Up to a quarter more.
   void register_again(TimePoint now);
   void come_again(const proto::Reject& reject, TimePoint now);
   void request(wire::CampaignId campaign, TimePoint now);

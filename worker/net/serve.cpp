@@ -165,59 +165,6 @@ bool take_turn(TimePoint& due_at, TimePoint now, Duration interval) {
   return true;
 }
 
-/// Keeps results that nobody acknowledges in a file, if there is one.
-class Keeping {
- public:
-  Keeping(const std::optional<std::filesystem::path>& path, std::string_view model,
-          Conversation& conversation, const wire::Log& log)
-      : conversation_(conversation), log_(log) {
-    if (!path) return;
-    spool_.emplace(*path, model);
-    spooler_.emplace(*spool_);
-    if (spool_->num_bytes_dropped() > 0) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "spool_torn",
-            .fields = {{"bytes_dropped", spool_->num_bytes_dropped()}}});
-    }
-    if (spool_->former_results().empty()) return;
-    log_({.kind = "spool_read", .fields = {{"results", spool_->former_results().size()}}});
-    conversation_.restore(spool_->former_results());
-  }
-
-  void on_tick(TimePoint now) {
-    if (!spooler_ || !take_turn(due_at_, now, spool_interval)) return;
-    warn(spooler_->look(conversation_.unacknowledged()));
-  }
-
-  void finish() {
-    if (spooler_) {
-      warn(spooler_->finish(conversation_.unacknowledged()));
-    } else if (conversation_.num_unacknowledged() > 0) {
-      log_(
-          {.severity = wire::Severity::warning,
-           .kind = "results_lost",
-           .fields = {{"results", conversation_.num_unacknowledged()}, Field::reason("no spool")}});
-    }
-  }
-
- private:
-  void warn(const std::optional<std::string>& reason) {
-    if (reason && reason != former_reason_) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "spool_failed",
-            .fields = {Field::remark(*reason)}});
-    }
-    former_reason_ = reason;
-  }
-
-  Conversation& conversation_;
-  const wire::Log& log_;
-  std::optional<Spool> spool_;
-  std::optional<Spooler> spooler_;
-  std::optional<std::string> former_reason_;
-  TimePoint due_at_ = TimePoint::min();
-};
-
 std::string status_of(const Conversation& conversation) {
   return fmt::format("{}, {} runs at hand, {} results not acknowledged, {} of them not served now",
                      conversation.is_registered() ? "registered" : "not registered",
@@ -239,8 +186,9 @@ class Service {
         conversation_(
             config.session, config.hello, execution,
             [this](proto::Envelope message) { send(std::move(message)); }, time_now(),
-            config.conversation),
-        keeping_(config.spool, config.hello.model_version(), conversation_, log_) {}
+            config.conversation) {
+    if (config.spool) open_spool(*config.spool, config.hello.model_version());
+  }
 
   Ending run() {
     if (const std::string reason = wire::reason_if_unknown(endpoint_); !reason.empty()) {
@@ -262,11 +210,41 @@ class Service {
       for (const wire::Event& event : conversation_.take_events()) log_(event);
     }
     notices_.stopping();
-    keeping_.finish();
+    keep_results();
     return *conversation_.ending();
   }
 
  private:
+  void open_spool(const std::filesystem::path& path, std::string_view model) {
+    spool_.emplace(path, model);
+    if (spool_->num_bytes_dropped() > 0) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "spool_torn",
+            .fields = {{"bytes_dropped", spool_->num_bytes_dropped()}}});
+    }
+    if (spool_->former_results().empty()) return;
+    log_({.kind = "spool_read", .fields = {{"results", spool_->former_results().size()}}});
+    conversation_.restore(spool_->former_results());
+  }
+
+  /// All that will not stay in memory, at the end.
+  void keep_results() {
+    if (spool_) return note_spool(spool_->finish(conversation_.unacknowledged()));
+    if (conversation_.num_unacknowledged() == 0) return;
+    log_({.severity = wire::Severity::warning,
+          .kind = "results_lost",
+          .fields = {{"results", conversation_.num_unacknowledged()}, Field::reason("no spool")}});
+  }
+
+  void note_spool(const std::optional<std::string>& failure) {
+    if (failure && failure != spool_failure_) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "spool_failed",
+            .fields = {Field::remark(*failure)}});
+    }
+    spool_failure_ = failure;
+  }
+
   void heed_link(TimePoint now) {
     if (link_.take_connected()) {
       log_({.kind = "connected"});
@@ -336,7 +314,9 @@ class Service {
     conversation_.on_tick(now);
     warn_of_silence(conversation_.silence(now));
     if (conversation_.take_reconnection()) link_.reconnect();
-    keeping_.on_tick(now);
+    if (spool_ && take_turn(spool_due_at_, now, spool_interval)) {
+      note_spool(spool_->look(conversation_.unacknowledged()));
+    }
     if (conversation_.is_registered()) notices_.ready();
     if (conversation_.is_leaving()) notices_.stopping();
     notices_.on_tick(now, [this] { return status_of(conversation_); });
@@ -352,7 +332,9 @@ class Service {
   CoordinatorLink link_;
   Duration wait_max_;
   Conversation conversation_;
-  Keeping keeping_;
+  std::optional<Spool> spool_;  ///< Of results that nobody acknowledges.
+  std::optional<std::string> spool_failure_;
+  TimePoint spool_due_at_ = TimePoint::min();
   wire::ServiceNotices notices_;
 };
 

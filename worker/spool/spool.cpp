@@ -116,6 +116,7 @@ void Spool::read_records(std::string_view content) {
     if (!batch) break;
     for (const proto::ComputedRun& run : batch->results()) {
       former_results_.push_back({{batch->campaign()}, {batch->attempt()}, wire::computed_run(run)});
+      spooled_.emplace(wire::CampaignId{batch->campaign()}, RunIndex{run.run()});
     }
     size_ += size_bytes + checksum_bytes + payload->size();
   }
@@ -123,14 +124,6 @@ void Spool::read_records(std::string_view content) {
   if (num_bytes_dropped_ == 0) return;
   if (ftruncate(file_.number(), static_cast<off_t>(size_)) != 0)
     throw Error(message(std::strerror(errno)));
-}
-
-std::optional<std::string> Spool::append(std::span<const wire::LeasedResult> results) {
-  std::string records;
-  wire::ResultBatches batches;
-  for (const wire::LeasedResult& result : results) batches.add(result);
-  for (proto::ResultBatch& batch : batches.take()) records += record_of(std::move(batch));
-  return write(records);
 }
 
 std::optional<std::string> Spool::write(std::string_view bytes) {
@@ -161,36 +154,33 @@ void Spool::clear() {
   if (ftruncate(file_.number(), static_cast<off_t>(header_.size())) == 0) size_ = header_.size();
 }
 
-Spooler::Spooler(Spool& spool) : spool_(spool) {
-  for (const wire::LeasedResult& result : spool.former_results()) spooled_.insert(key_of(result));
-}
-
-Spooler::RunKey Spooler::key_of(const wire::LeasedResult& result) {
-  return {result.campaign, result.computed.result.run};
-}
-
-std::optional<std::string> Spooler::look(const std::vector<wire::LeasedResult>& unacknowledged) {
+std::optional<std::string> Spool::look(const std::vector<wire::LeasedResult>& unacknowledged) {
   if (unacknowledged.empty()) {
-    spool_.clear();
+    clear();
     spooled_.clear();
     seen_.clear();
     return std::nullopt;
   }
-  std::vector<wire::LeasedResult> old;
+  std::set<RunKey> old;
   std::set<RunKey> seen;
+  wire::ResultBatches batches;
   for (const wire::LeasedResult& result : unacknowledged) {
-    const RunKey key = key_of(result);
+    const RunKey key{result.campaign, result.computed.result.run};
     seen.insert(key);
-    if (seen_.contains(key) && !spooled_.contains(key)) old.push_back(result);
+    if (!seen_.contains(key) || spooled_.contains(key)) continue;
+    old.insert(key);
+    batches.add(result);
   }
   seen_ = std::move(seen);
   if (old.empty()) return std::nullopt;
-  if (auto reason = spool_.append(old)) return reason;
-  for (const wire::LeasedResult& result : old) spooled_.insert(key_of(result));
+  std::string records;
+  for (proto::ResultBatch& batch : batches.take()) records += record_of(std::move(batch));
+  if (auto reason = write(records)) return reason;
+  spooled_.merge(old);
   return std::nullopt;
 }
 
-std::optional<std::string> Spooler::finish(const std::vector<wire::LeasedResult>& unacknowledged) {
+std::optional<std::string> Spool::finish(const std::vector<wire::LeasedResult>& unacknowledged) {
   (void)look(unacknowledged);
   return look(unacknowledged);
 }

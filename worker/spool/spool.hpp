@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,7 +16,9 @@
 namespace proofmass::worker {
 
 /// A file of results that no coordinator has acknowledged, for the worker that comes after this
-/// one.
+/// one: those that have waited for their acknowledgement from one look to the next, and all that
+/// are left at the end. So a coordinator that answers costs no writing, and a worker that is killed
+/// while none does loses little.
 ///
 /// It begins with a line that names the model. Then come records: size of the payload (32 bits) and
 /// its checksum (64 bits), little endian, and the payload, an encoded message with results of one
@@ -47,20 +48,27 @@ class Spool {
   /// Bytes at its end that were no records and have been dropped.
   [[nodiscard]] std::uint64_t num_bytes_dropped() const { return num_bytes_dropped_; }
 
-  /// Adds results; they survive the process and the machine. If that is not possible, none is added
-  /// and the reason is returned, as `spool = PATH (reason)`.
-  [[nodiscard]] std::optional<std::string> append(std::span<const wire::LeasedResult> results);
-  /// Everything has been acknowledged.
-  void clear();
+  /// To be called now and then with the results that are not acknowledged. Returns why they could
+  /// not be written, if so, as `spool = PATH (reason)`; they stay in memory, and the next call
+  /// tries again. What is written survives the process and the machine.
+  [[nodiscard]] std::optional<std::string> look(
+      const std::vector<wire::LeasedResult>& unacknowledged);
+  /// Writes all results at the end, when they will not stay in memory; returns why some could not
+  /// be written, if so.
+  [[nodiscard]] std::optional<std::string> finish(
+      const std::vector<wire::LeasedResult>& unacknowledged);
 
   [[nodiscard]] std::uint64_t size() const { return size_; }  ///< Bytes.
   [[nodiscard]] bool is_empty() const { return size_ <= header_.size(); }
 
  private:
+  using RunKey = std::pair<wire::CampaignId, RunIndex>;
+
   [[nodiscard]] std::string message(std::string_view reason) const;
   void lock() const;
   void read();
   void read_records(std::string_view content);
+  void clear();
   /// The reason if it cannot be written; then the file is as before.
   [[nodiscard]] std::optional<std::string> write(std::string_view bytes);
 
@@ -71,31 +79,6 @@ class Spool {
   std::uint64_t size_ = 0;
   std::uint64_t num_bytes_dropped_ = 0;
   std::vector<wire::LeasedResult> former_results_;
-};
-
-/// Decides which results go to the spool: those that have waited for their acknowledgement from one
-/// look to the next, and all that are left at the end. So a coordinator that answers costs no
-/// writing, and a worker that is killed while none does loses little.
-class Spooler {
- public:
-  /// @param spool  Outlives this object.
-  explicit Spooler(Spool& spool);
-
-  /// To be called now and then with the results that are not acknowledged. Returns why they could
-  /// not be written, if so; they stay in memory, and the next call tries again.
-  [[nodiscard]] std::optional<std::string> look(
-      const std::vector<wire::LeasedResult>& unacknowledged);
-  /// Writes all results at the end, when they will not stay in memory; returns why some could not
-  /// be written, if so.
-  [[nodiscard]] std::optional<std::string> finish(
-      const std::vector<wire::LeasedResult>& unacknowledged);
-
- private:
-  using RunKey = std::pair<wire::CampaignId, RunIndex>;
-
-  [[nodiscard]] static RunKey key_of(const wire::LeasedResult& result);
-
-  Spool& spool_;
   std::set<RunKey> spooled_;
   std::set<RunKey> seen_;  ///< At the look before.
 };

@@ -34,10 +34,6 @@ struct KeygenOptions {
   std::optional<std::string> client;  ///< Adds a pair of this name for another client.
 };
 
-std::string_view list_name(KeyRole role) {
-  return role == KeyRole::worker ? wire::authorized_workers_name : wire::authorized_clients_name;
-}
-
 std::string list_head(KeyRole role) {
   const bool is_client = role == KeyRole::client;
   return fmt::format(
@@ -142,8 +138,7 @@ class NewPair {
         list_(directory / list_name(role)),
         text_(read_list(list_)) {
     wire::check_key_directory(directory);
-    const auto domain = role == KeyRole::worker ? wire::Domain::workers : wire::Domain::clients;
-    for (const auto& [key, owner] : parse_allow_list(text_, domain, list_)) {
+    for (const auto& [key, owner] : parse_allow_list(text_, role, list_)) {
       if (owner.name != name) continue;
       throw UsageError(
           fmt::format("--{} = {} (is in {} already)", to_text(role), name, list_.string()));

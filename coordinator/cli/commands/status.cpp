@@ -70,11 +70,11 @@ void add_workers(CLI::App& app, Command& chosen) {
 
 namespace {
 
-using wire::ControlAction;
+using proto::ControlAction;
 
 struct ControlOptions {
   ClientOptions client;
-  ControlAction action = ControlAction::pause;
+  ControlAction action = proto::CONTROL_ACTION_PAUSE;
   std::string campaign;
   int priority = 0;  ///< For set_priority.
 };
@@ -90,7 +90,7 @@ int ask_for(const ClientOptions& client, const proto::RequestEnvelope& request,
 int control_campaign(const ControlOptions& options) {
   proto::RequestEnvelope request;
   proto::ControlRequest& control = *request.mutable_control();
-  control.set_action(static_cast<proto::ControlAction>(options.action));
+  control.set_action(options.action);
   control.set_campaign(checked_campaign_name(options.campaign));
   control.set_priority(options.priority);
   return ask_for(
@@ -104,7 +104,7 @@ void add_action(CLI::App& app, Command& chosen, ControlAction action,
       app, chosen, std::string(wire::name_of(action)), description, control_campaign);
   options.action = action;
   command.add_option("NAME", options.campaign, "Campaign")->required();
-  if (action == ControlAction::set_priority) {
+  if (action == proto::CONTROL_ACTION_SET_PRIORITY) {
     command.add_option("PRIORITY", options.priority, "-100 to 100; higher ones are computed first")
         ->check(wire::in_range(-wire::priority_max, wire::priority_max))
         ->required();
@@ -130,12 +130,16 @@ int release_host(const ReleaseOptions& options) {
 }  // namespace
 
 void add_control(CLI::App& app, Command& chosen) {
-  add_action(app, chosen, ControlAction::pause, "Lend no more runs of a campaign until `resume`");
-  add_action(app, chosen, ControlAction::resume, "Continue a paused or cancelled campaign");
-  add_action(app, chosen, ControlAction::cancel, "Drop a campaign's open runs; results stay");
-  add_action(app, chosen, ControlAction::set_priority, "Compute a campaign earlier or later");
-  add_action(app, chosen, ControlAction::retry, "Compute the given-up runs of a campaign again");
-  add_action(app, chosen, ControlAction::archive,
+  add_action(app, chosen, proto::CONTROL_ACTION_PAUSE,
+             "Lend no more runs of a campaign until `resume`");
+  add_action(app, chosen, proto::CONTROL_ACTION_RESUME, "Continue a paused or cancelled campaign");
+  add_action(app, chosen, proto::CONTROL_ACTION_CANCEL,
+             "Drop a campaign's open runs; results stay");
+  add_action(app, chosen, proto::CONTROL_ACTION_SET_PRIORITY,
+             "Compute a campaign earlier or later");
+  add_action(app, chosen, proto::CONTROL_ACTION_RETRY,
+             "Compute the given-up runs of a campaign again");
+  add_action(app, chosen, proto::CONTROL_ACTION_ARCHIVE,
              "Serve a finished or cancelled campaign no longer");
 }
 

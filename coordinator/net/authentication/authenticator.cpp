@@ -16,7 +16,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::Domain;
+using wire::KeyRole;
 
 constexpr const char* zap_address = "inproc://zeromq.zap.01";
 constexpr std::string_view zap_version = "1.0";
@@ -123,40 +123,28 @@ struct Authenticator::Handshake {
   std::string id;
   std::string domain;
   std::string address;
-  std::string mechanism;
   std::string public_key;  ///< Z85; empty if the peer has none.
 
   /// Nothing if the frames are no such question.
   [[nodiscard]] static std::optional<Handshake> from(const std::vector<std::string>& frames);
 };
 
-struct Authenticator::Answer {
-  std::string_view status;  ///< 200: welcome; 400: not.
-  std::string_view text;
-  std::string user_id;
-};
-
 std::optional<Authenticator::Handshake> Authenticator::Handshake::from(
     const std::vector<std::string>& frames) {
   constexpr std::size_t num_fixed_frames = 6;
   if (frames.size() < num_fixed_frames || frames[0] != zap_version) return std::nullopt;
-  Handshake handshake{.id = frames[1],
-                      .domain = frames[2],
-                      .address = frames[3],
-                      .mechanism = frames[5],
-                      .public_key = {}};
-  if (handshake.mechanism == "CURVE" && frames.size() == num_fixed_frames + 1) {
-    handshake.public_key = z85(frames[num_fixed_frames]);
-  }
-  return handshake;
+  const bool has_key = frames[5] == "CURVE" && frames.size() == num_fixed_frames + 1;
+  return Handshake{.id = frames[1],
+                   .domain = frames[2],
+                   .address = frames[3],
+                   .public_key = has_key ? z85(frames[num_fixed_frames]) : std::string()};
 }
 
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
                              Log log)
-    : log_(std::move(log)),
-      refusals_(log_),
-      workers_(directory / wire::authorized_workers_name, Domain::workers),
-      clients_(directory / wire::authorized_clients_name, Domain::clients),
+    : refusals_(log),
+      workers_(directory / list_name(KeyRole::worker), KeyRole::worker, log),
+      clients_(directory / list_name(KeyRole::client), KeyRole::client, log),
       socket_(std::make_unique<zmq::socket_t>(context, zmq::socket_type::rep)) {
   try {
     socket_->bind(zap_address);
@@ -169,93 +157,75 @@ Authenticator::~Authenticator() = default;
 
 void* Authenticator::handle() const { return socket_->handle(); }
 
-void Authenticator::on_event(Domain domain, const wire::SocketEvent& event, TimePoint now) {
+void Authenticator::on_event(KeyRole role, const wire::SocketEvent& event, TimePoint now) {
   if ((event.kind & failed_handshakes) == 0) return;
   refusals_.refused(
-      {.domain = to_text(domain), .address = {}, .public_key = {}, .reason = reason_of(event)},
+      {.domain = domain_of(role), .address = {}, .public_key = {}, .reason = reason_of(event)},
       now);
 }
 
 void Authenticator::serve(TimePoint now) {
-  for (AllowList* const list : {&workers_, &clients_}) {
-    report(*list, list->refresh_if_due(now));
-  }
+  for (AllowList* const list : {&workers_, &clients_}) list->refresh_if_due(now);
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;
-    const auto handshake = Handshake::from(frames);
-    if (handshake) {
-      reply(handshake->id, answer(*handshake, now));
+    if (const auto handshake = Handshake::from(frames)) {
+      answer(*handshake, now);
     } else {
-      reply(frames.size() > 1 ? frames[1] : "",
-            {.status = "500", .text = "malformed", .user_id = {}});
+      reply(frames.size() > 1 ? frames[1] : "", "500", "malformed", "");
     }
   }
 }
 
-bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimePoint now) {
-  report(list_of(domain), list_of(domain).refresh_if_due(now));
-  return list_of(domain).owner_of(public_key) != nullptr;
+bool Authenticator::is_allowed(KeyRole role, std::string_view public_key, TimePoint now) {
+  list_of(role).refresh_if_due(now);
+  return list_of(role).owner_of(public_key) != nullptr;
 }
 
 std::optional<Asker> Authenticator::client(std::string_view public_key, TimePoint now) {
-  if (!is_allowed(Domain::clients, public_key, now)) return std::nullopt;
+  if (!is_allowed(KeyRole::client, public_key, now)) return std::nullopt;
   const AllowedKey& owner = *clients_.owner_of(public_key);
   return Asker{.name = owner.name, .rights = owner.rights};
 }
 
-AllowList& Authenticator::list_of(Domain domain) {
-  return domain == Domain::workers ? workers_ : clients_;
+AllowList& Authenticator::list_of(KeyRole role) {
+  return role == KeyRole::worker ? workers_ : clients_;
 }
 
-Authenticator::Answer Authenticator::answer(const Handshake& handshake, TimePoint now) {
+void Authenticator::answer(const Handshake& handshake, TimePoint now) {
   const std::string_view reason = refusal(handshake, now);
-  if (reason.empty()) return {.status = "200", .text = "OK", .user_id = handshake.public_key};
+  if (reason.empty()) return reply(handshake.id, "200", "OK", handshake.public_key);
   refusals_.refused({.domain = handshake.domain,
                      .address = handshake.address,
                      .public_key = handshake.public_key,
                      .reason = reason},
                     now);
-  return {.status = "400", .text = "key not authorized", .user_id = {}};
+  reply(handshake.id, "400", "key not authorized", "");
 }
 
 std::string_view Authenticator::refusal(const Handshake& handshake, TimePoint now) {
-  std::optional<Domain> domain;
-  for (const Domain known : {Domain::workers, Domain::clients}) {
-    if (handshake.domain == to_text(known)) domain = known;
+  std::optional<KeyRole> role;
+  for (const KeyRole known : {KeyRole::worker, KeyRole::client}) {
+    if (handshake.domain == domain_of(known)) role = known;
   }
-  if (!domain) return "no such domain";
+  if (!role) return "no such domain";
   if (handshake.public_key.empty()) return "without a key";
-  report(list_of(*domain), list_of(*domain).refresh(now));
-  if (list_of(*domain).owner_of(handshake.public_key) != nullptr) return {};
-  const Domain other = *domain == Domain::workers ? Domain::clients : Domain::workers;
+  list_of(*role).refresh(now);
+  if (list_of(*role).owner_of(handshake.public_key) != nullptr) return {};
+  const KeyRole other = *role == KeyRole::worker ? KeyRole::client : KeyRole::worker;
   if (list_of(other).owner_of(handshake.public_key) == nullptr) return "unknown key";
-  return other == Domain::workers ? "key of a worker" : "key of a client";
+  return other == KeyRole::worker ? "key of a worker" : "key of a client";
 }
 
-void Authenticator::reply(std::string_view id, const Answer& answer) {
-  const std::array<std::string_view, 6> frames{zap_version,    id, answer.status, answer.text,
-                                               answer.user_id, ""};
+void Authenticator::reply(std::string_view id, std::string_view status, std::string_view text,
+                          std::string_view user_id) {
+  const std::array<std::string_view, 6> frames{zap_version, id, status, text, user_id, ""};
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const bool is_last = i + 1 == frames.size();
     socket_->send(
         zmq::buffer(frames[i]),
         is_last ? zmq::send_flags::dontwait : zmq::send_flags::dontwait | zmq::send_flags::sndmore);
   }
-}
-
-void Authenticator::report(AllowList& list, const std::optional<std::string>& what_is_wrong) const {
-  if (const auto change = list.take_change()) {
-    log_({.severity = Severity::info,
-          .kind = "allow_list_read",
-          .fields = {{"file", list.file().string()},
-                     {"added", change->num_added},
-                     {"removed", change->num_removed}}});
-  }
-  if (!what_is_wrong) return;
-  log_({.severity = Severity::error,
-        .kind = "allow_list_unreadable",
-        .fields = {Field::remark(*what_is_wrong + "; the list before it stands")}});
 }
 
 }  // namespace proofmass::coordinator

@@ -81,7 +81,7 @@ class Authenticator {
   /// What happened to the socket of a domain: logs a peer whose handshake ended before it showed a
   /// key, one that uses none, that trusts another coordinator's key, or that speaks another
   /// protocol. ZeroMQ does not report its address.
-  void on_event(wire::Domain domain, const wire::SocketEvent& event, TimePoint now);
+  void on_event(wire::KeyRole role, const wire::SocketEvent& event, TimePoint now);
 
   /// Answers all handshakes that wait, and reads the lists again that changed, once a second at
   /// most. To be called several times a second, also while nobody connects or speaks: a key is
@@ -90,23 +90,22 @@ class Authenticator {
 
   /// True if the key is on the domain's list, which is read again when it changed, once a second at
   /// most. To be asked at every message: a revoked key keeps its connection otherwise.
-  [[nodiscard]] bool is_allowed(wire::Domain domain, std::string_view public_key, TimePoint now);
+  [[nodiscard]] bool is_allowed(wire::KeyRole role, std::string_view public_key, TimePoint now);
 
   /// Name and rights of a client's key, as is_allowed(); nothing if it is not on the list.
   [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now);
 
  private:
   struct Handshake;
-  struct Answer;
 
-  [[nodiscard]] AllowList& list_of(wire::Domain domain);
-  [[nodiscard]] Answer answer(const Handshake& handshake, TimePoint now);
+  [[nodiscard]] AllowList& list_of(wire::KeyRole role);
+  void answer(const Handshake& handshake, TimePoint now);
   /// Why the peer is refused; empty if it is admitted.
   [[nodiscard]] std::string_view refusal(const Handshake& handshake, TimePoint now);
-  void reply(std::string_view id, const Answer& answer);
-  void report(AllowList& list, const std::optional<std::string>& what_is_wrong) const;
+  /// @param status  200: welcome; 400: not.
+  void reply(std::string_view id, std::string_view status, std::string_view text,
+             std::string_view user_id);
 
-  Log log_;
   RefusalLog refusals_;
   AllowList workers_;
   AllowList clients_;

@@ -46,7 +46,7 @@ std::string_view take_word(std::string_view& line) {
 
 /// Adds what one line says.
 /// @return Which rule it breaks; empty if none.
-std::string_view read_line(std::string_view line, wire::Domain domain, AllowedKeys& keys) {
+std::string_view read_line(std::string_view line, wire::KeyRole role, AllowedKeys& keys) {
   const std::string_view key = take_word(line);
   if (key.empty() || key.front() == '#') return {};
   const std::string_view name = take_word(line);
@@ -55,7 +55,7 @@ std::string_view read_line(std::string_view line, wire::Domain domain, AllowedKe
     return "must have a name of [A-Za-z0-9._-], a letter or digit first, after the key";
   const std::string_view rights_text = take_word(line);
   std::optional<Rights> rights;
-  if (domain == wire::Domain::clients) {
+  if (role == wire::KeyRole::client) {
     rights = rights_text.empty() ? usual_rights : parse_rights(rights_text);
     if (!rights) return "must have rights of observe,submit,control after the name";
   } else if (!rights_text.empty()) {
@@ -68,10 +68,10 @@ std::string_view read_line(std::string_view line, wire::Domain domain, AllowedKe
   return {};
 }
 
-AllowedKeys read_allow_list(const std::filesystem::path& file, wire::Domain domain) {
+AllowedKeys read_allow_list(const std::filesystem::path& file, wire::KeyRole role) {
   const std::string text =
       wire::read_within_reach("allow-list", file, wire::Reach::written_by_owner, file_size_max);
-  return parse_allow_list(text, domain, file);
+  return parse_allow_list(text, role, file);
 }
 
 std::size_t num_only_in(const AllowedKeys& keys, const AllowedKeys& others) {
@@ -110,13 +110,13 @@ void require_control(const Asker& asker, std::string_view campaign, std::string_
                           campaign, owner, asker.name));
 }
 
-AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
+AllowedKeys parse_allow_list(std::string_view text, wire::KeyRole role,
                              const std::filesystem::path& file) {
   AllowedKeys keys;
   text = wire::without_byte_order_mark(text);
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view rule = read_line(text.substr(0, end), domain, keys);
+    const std::string_view rule = read_line(text.substr(0, end), role, keys);
     if (!rule.empty()) {
       throw Error(fmt::format("{} line = {} ({})", file.string(), number, rule));
     }
@@ -125,10 +125,10 @@ AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
   return keys;
 }
 
-AllowList::AllowList(std::filesystem::path file, wire::Domain domain)
-    : file_(std::move(file)), domain_(domain) {
+AllowList::AllowList(std::filesystem::path file, wire::KeyRole role, wire::Log log)
+    : file_(std::move(file)), role_(role), log_(std::move(log)) {
   const Stamp stamp = stamp_of(file_);
-  keys_ = read_allow_list(file_, domain_);
+  keys_ = read_allow_list(file_, role_);
   if (is_settled(stamp)) stamp_ = stamp;
 }
 
@@ -145,32 +145,33 @@ void AllowList::take(AllowedKeys keys, TimePoint now) {
   stamp_.reset();  // Looked at again, though it may not change.
 }
 
-std::optional<std::string> AllowList::refresh(TimePoint now) {
+void AllowList::refresh(TimePoint now) {
   // Taken before the file is read: a change in between is seen the next time.
   const Stamp stamp = stamp_of(file_);
-  if (stamp == stamp_) return std::nullopt;
+  if (stamp == stamp_) return;
   stamp_ = is_settled(stamp) ? std::optional(stamp) : std::nullopt;
   try {
     if (stamp.error == 0 && stamp.size == 0) refuse(file_, "is empty");
     const AllowedKeys former = keys_;
-    take(read_allow_list(file_, domain_), now);
-    if (keys_ != former || !reported_.empty()) {
-      change_ = {.num_added = num_only_in(keys_, former),
-                 .num_removed = num_only_in(former, keys_)};
-    }
-    reported_.clear();
-    return std::nullopt;
+    take(read_allow_list(file_, role_), now);
+    const bool was_unreadable = !std::exchange(reported_, {}).empty();
+    if (keys_ == former && !was_unreadable) return;
+    log_({.kind = "allow_list_read",
+          .fields = {{"file", file_.string()},
+                     {"added", num_only_in(keys_, former)},
+                     {"removed", num_only_in(former, keys_)}}});
   } catch (const Error& error) {
-    if (reported_ == error.what()) return std::nullopt;
-    reported_ = error.what();
-    return reported_;
+    if (std::exchange(reported_, error.what()) == error.what()) return;
+    log_({.severity = wire::Severity::error,
+          .kind = "allow_list_unreadable",
+          .fields = {wire::Field::remark(reported_ + "; the list before it stands")}});
   }
 }
 
-std::optional<std::string> AllowList::refresh_if_due(TimePoint now) {
-  if (looked_at_ && now - *looked_at_ < look_interval) return std::nullopt;
+void AllowList::refresh_if_due(TimePoint now) {
+  if (looked_at_ && now - *looked_at_ < look_interval) return;
   looked_at_ = now;
-  return refresh(now);
+  refresh(now);
 }
 
 const AllowedKey* AllowList::owner_of(std::string_view public_key) const {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "proto/link/keys.hpp"
+#include "proto/text/event.hpp"
 
 namespace proofmass::coordinator {
 
@@ -67,11 +68,11 @@ using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
 /// The keys in the text of an allow-list. Each has a line `KEY NAME`, or `KEY NAME RIGHTS` for a
 /// client. Empty lines and lines that begin with `#` are ignored.
 ///
-/// @param domain  Whose list it is.
-/// @param file    For messages.
+/// @param role  Whose list it is.
+/// @param file  For messages.
 /// @throws Error reading `FILE line = NUMBER (rule)`. What the line says is not repeated, because
 ///         somebody may have put a secret there.
-[[nodiscard]] AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
+[[nodiscard]] AllowedKeys parse_allow_list(std::string_view text, wire::KeyRole role,
                                            const std::filesystem::path& file);
 
 /// The keys that may connect to one address of the coordinator, from a file that may change at any
@@ -81,29 +82,18 @@ class AllowList {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
+  /// @param log  Told if keys, or what they may do, changed, or if the file can be read after it
+  ///             could not; and what is wrong with it, once.
   /// @throws Error if the file cannot be read, can be written by others than its owner, or holds
   ///         anything but keys and names.
-  AllowList(std::filesystem::path file, wire::Domain domain);
+  AllowList(std::filesystem::path file, wire::KeyRole role, wire::Log log);
 
   /// Reads the file again if it changed. A file that is wrong, gone or without any content leaves
   /// the list as it was.
-  /// @return What is wrong, once.
-  [[nodiscard]] std::optional<std::string> refresh(TimePoint now);
+  void refresh(TimePoint now);
 
   /// As refresh(), but at most once a second.
-  [[nodiscard]] std::optional<std::string> refresh_if_due(TimePoint now);
-
-  /// How the list was last read again.
-  struct Change {
-    std::size_t num_added = 0;
-    std::size_t num_removed = 0;
-  };
-
-  /// The change since the last call: if keys, or what they may do, changed, or if the file can be
-  /// read after it could not.
-  [[nodiscard]] std::optional<Change> take_change() { return std::exchange(change_, {}); }
-
-  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+  void refresh_if_due(TimePoint now);
 
   /// The key's owner; null if the key is not on the list.
   [[nodiscard]] const AllowedKey* owner_of(std::string_view public_key) const;
@@ -123,10 +113,10 @@ class AllowList {
   void take(AllowedKeys keys, TimePoint now);
 
   std::filesystem::path file_;
-  wire::Domain domain_;
+  wire::KeyRole role_;
+  wire::Log log_;
   std::optional<Stamp> stamp_;  ///< None if the file must be read again in any case.
   std::string reported_;
-  std::optional<Change> change_;
   std::optional<TimePoint> looked_at_;
   AllowedKeys keys_;
   /// Without the keys that the last look did not find any more, and the time of that look.

@@ -280,7 +280,7 @@ TEST(DefinitionCache, LeavesOutTheColumns) {
       cache.part({1}, 0, std::make_shared<const MicroscopeCampaign>(campaign));
   wire::IncomingDefinition incoming;
   ASSERT_EQ(incoming.add(part), wire::IncomingDefinition::Progress::complete);
-  const auto taken = std::get<Definition>(incoming.take());
+  const Definition taken = incoming.take();
   EXPECT_TRUE(taken.table_columns.empty());
   EXPECT_EQ(taken, definition_of(campaign, TableColumns::left_out));
 }

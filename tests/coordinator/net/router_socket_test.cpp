@@ -102,7 +102,7 @@ TEST_F(RouterSocketTest, SaysThatItsAddressCannotBeHadNow) {
 
 TEST_F(RouterSocketTest, TellsOfFailedHandshakesAlsoWhenItWasBoundAgain) {
   RouterSocket router(context, "bind", "tcp://127.0.0.1:*",
-                      {.domain = wire::Domain::workers, .keys = wire::make_key_pair()});
+                      {.peers = wire::KeyRole::worker, .keys = wire::make_key_pair()});
   router.close();
   ASSERT_TRUE(router.open());
   zmq::socket_t plain = wire::make_dealer(peers_context, {});

@@ -12,11 +12,11 @@
 namespace proofmass::coordinator {
 namespace {
 
+using proto::ControlAction;
 using test::PlayingClient;
 using test::PlayingWorker;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
-using wire::ControlAction;
 
 class ServiceClients : public test::ServiceTest {
  protected:
@@ -65,10 +65,10 @@ TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
     (void)campaign.store.write({&given_up, 1});
   }
   start_with({test::campaign_of("a", 1)});
-  EXPECT_EQ(client->error(test::control(ControlAction::set_priority, "a", 1)),
+  EXPECT_EQ(client->error(test::control(proto::CONTROL_ACTION_SET_PRIORITY, "a", 1)),
             "campaign = a (is finished)");
-  EXPECT_EQ(control(ControlAction::retry), "campaign a: active, 1 runs, 0 of them done");
-  EXPECT_EQ(client->error(test::control(ControlAction::retry, "a")),
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RETRY), "campaign a: active, 1 runs, 0 of them done");
+  EXPECT_EQ(client->error(test::control(proto::CONTROL_ACTION_RETRY, "a")),
             "campaign = a (has no run that was given up)");
   EXPECT_EQ(client->status().campaigns(0).num_given_up(), 0U);
   end(StopRequest::now);
@@ -77,8 +77,9 @@ TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
 
 TEST_F(ServiceClients, ResumeACancelledCampaignBeforeAnythingElse) {
   start_with({test::campaign_of("a", 1)});
-  (void)control(ControlAction::cancel);
-  for (const ControlAction action : {ControlAction::retry, ControlAction::set_priority}) {
+  (void)control(proto::CONTROL_ACTION_CANCEL);
+  for (const ControlAction action :
+       {proto::CONTROL_ACTION_RETRY, proto::CONTROL_ACTION_SET_PRIORITY}) {
     EXPECT_EQ(client->error(test::control(action, "a", 1)),
               "campaign = a (is cancelled; resume it first)");
   }
@@ -100,7 +101,7 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
   const proto::RunLease lease = worker.borrow(1);
-  (void)control(ControlAction::pause);
+  (void)control(proto::CONTROL_ACTION_PAUSE);
   worker.deliver(lease, RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
             "too_many_failures without_estimate=1 failures_max=0 campaign=a");

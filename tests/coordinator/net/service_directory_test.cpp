@@ -124,7 +124,7 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   }
   EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_FINISHED);
   EXPECT_EQ(client->status().campaigns(0).num_done(), 1U);
-  EXPECT_EQ(client->error(test::control(wire::ControlAction::pause, "a")),
+  EXPECT_EQ(client->error(test::control(proto::CONTROL_ACTION_PAUSE, "a")),
             "campaign = a (is finished)");
   EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
             "campaign a: active, 3 runs, 1 of them done");
@@ -252,9 +252,9 @@ TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
   }
   start_service();
   EXPECT_EQ(folder.num_loads(), 0);
-  EXPECT_EQ(client->done(test::control(wire::ControlAction::cancel, "a")),
+  EXPECT_EQ(client->done(test::control(proto::CONTROL_ACTION_CANCEL, "a")),
             "campaign a: cancelled, 2 runs, 0 of them done");
-  EXPECT_EQ(client->done(test::control(wire::ControlAction::resume, "a")),
+  EXPECT_EQ(client->done(test::control(proto::CONTROL_ACTION_RESUME, "a")),
             "campaign a: active, 2 runs, 0 of them done");
   EXPECT_EQ(client->status().campaigns(0).priority(), 4);
   PlayingWorker worker(endpoint.address());
@@ -271,7 +271,7 @@ TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
   }
   start_service();
   EXPECT_EQ(folder.num_loads(), 0);
-  EXPECT_EQ(client->done(test::control(wire::ControlAction::retry, "a")),
+  EXPECT_EQ(client->done(test::control(proto::CONTROL_ACTION_RETRY, "a")),
             "campaign a: active, 1 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
   EXPECT_EQ(worker.borrow(1).first_run(), 0U);
@@ -291,7 +291,7 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   ASSERT_EQ(sqlite3_open_v2(file.c_str(), &reader, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
   const char* const read = "BEGIN; SELECT * FROM campaign";
   ASSERT_EQ(sqlite3_exec(reader, read, nullptr, nullptr, nullptr), SQLITE_OK);
-  const proto::RequestEnvelope archive = test::control(wire::ControlAction::archive, "a");
+  const proto::RequestEnvelope archive = test::control(proto::CONTROL_ACTION_ARCHIVE, "a");
   EXPECT_EQ(client->error(archive),
             "campaign = a (its database is being read or changed; try again)");
   EXPECT_TRUE(fs::exists(file));

@@ -13,7 +13,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::ControlAction;
+using proto::ControlAction;
 
 /// A campaign with a table of so many values.
 MicroscopeCampaign with_table(const std::string& name, std::size_t num_runs) {
@@ -28,11 +28,9 @@ class ServiceLimits : public test::ServiceTest {
  protected:
   ServiceLimits() : keys(directory / "keys") {
     std::filesystem::create_directory(keys);
-    wire::write_key_pair(keys, wire::coordinator_key_name, wire::KeyRole::coordinator,
-                         coordinator_keys);
-    std::ofstream(keys / wire::authorized_workers_name);
-    std::ofstream(keys / wire::authorized_clients_name)
-        << client_keys.public_key.text() << " anna\n";
+    wire::write_key_pair(keys, "coordinator", wire::KeyRole::coordinator, coordinator_keys);
+    std::ofstream(keys / "authorized_workers");
+    std::ofstream(keys / "authorized_clients") << client_keys.public_key.text() << " anna\n";
     config.workers_endpoint = "tcp://127.0.0.1:*";
     config.clients_endpoint = "tcp://127.0.0.1:*";
     config.keys = keys;
@@ -86,23 +84,23 @@ TEST_F(ServiceLimits, HoldForCancelledCampaignsThatAreResumed) {
   start_with({});
   EXPECT_THAT(submit("a"), StartsWith("campaign a: active"));
   EXPECT_EQ(submit("b"), too_many);
-  EXPECT_THAT(control(ControlAction::cancel, "a"), StartsWith("campaign a: cancelled"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "a"), StartsWith("campaign a: cancelled"));
   EXPECT_THAT(submit("b"), StartsWith("campaign b: active"));
-  EXPECT_EQ(control(ControlAction::resume, "a"), too_many);
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RESUME, "a"), too_many);
   EXPECT_EQ(submit("a"), too_many);
-  EXPECT_THAT(control(ControlAction::pause, "b"), StartsWith("campaign b: paused"));
-  EXPECT_THAT(control(ControlAction::resume, "b"), StartsWith("campaign b: active"));
-  EXPECT_THAT(control(ControlAction::cancel, "b"), StartsWith("campaign b: cancelled"));
-  EXPECT_THAT(control(ControlAction::resume, "a"), StartsWith("campaign a: active"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_PAUSE, "b"), StartsWith("campaign b: paused"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_RESUME, "b"), StartsWith("campaign b: active"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "b"), StartsWith("campaign b: cancelled"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_RESUME, "a"), StartsWith("campaign a: active"));
 }
 
 TEST_F(ServiceLimits, HoldForRunsThatAreRetried) {
   make_given_up_file("a");
   start_with({test::campaign_of("a", 2)});
   EXPECT_THAT(submit("b"), StartsWith("campaign b: active"));
-  EXPECT_EQ(control(ControlAction::retry, "a"), too_many);
-  EXPECT_THAT(control(ControlAction::cancel, "b"), StartsWith("campaign b: cancelled"));
-  EXPECT_THAT(control(ControlAction::retry, "a"), StartsWith("campaign a: active"));
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RETRY, "a"), too_many);
+  EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "b"), StartsWith("campaign b: cancelled"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_RETRY, "a"), StartsWith("campaign a: active"));
 }
 
 TEST_F(ServiceLimits, HoldForMoreRunsOfAFinishedCampaign) {
@@ -111,7 +109,7 @@ TEST_F(ServiceLimits, HoldForMoreRunsOfAFinishedCampaign) {
   EXPECT_THAT(submit("b"), StartsWith("campaign b: active"));
   EXPECT_EQ(submit("a", 3), too_many);
   EXPECT_THAT(submit("a", 2), StartsWith("campaign a: failed"));  // Nothing begins again.
-  EXPECT_THAT(control(ControlAction::cancel, "b"), StartsWith("campaign b: cancelled"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "b"), StartsWith("campaign b: cancelled"));
   EXPECT_THAT(submit("a", 3), StartsWith("campaign a: active"));
 }
 
@@ -134,11 +132,11 @@ TEST_F(ServiceLimits, HoldForClosedCampaigns) {
   make_cancelled_file("b");
   start_with({});
   EXPECT_THAT(submit("c"), StartsWith("campaign c: active"));
-  EXPECT_EQ(control(ControlAction::retry, "a"), too_many);
-  EXPECT_EQ(control(ControlAction::resume, "b"), too_many);
-  EXPECT_THAT(control(ControlAction::cancel, "c"), StartsWith("campaign c: cancelled"));
-  EXPECT_THAT(control(ControlAction::resume, "b"), StartsWith("campaign b: active"));
-  EXPECT_EQ(control(ControlAction::retry, "a"), too_many);
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RETRY, "a"), too_many);
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RESUME, "b"), too_many);
+  EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "c"), StartsWith("campaign c: cancelled"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_RESUME, "b"), StartsWith("campaign b: active"));
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RETRY, "a"), too_many);
 }
 
 TEST_F(ServiceLimits, HoldForTheDefinitionsOfClosedCampaigns) {
@@ -149,14 +147,14 @@ TEST_F(ServiceLimits, HoldForTheDefinitionsOfClosedCampaigns) {
   make_cancelled_file("b");
   start_with({});
   EXPECT_THAT(submit("c"), StartsWith("campaign c: active"));
-  EXPECT_EQ(control(ControlAction::resume, "b"),
+  EXPECT_EQ(control(proto::CONTROL_ACTION_RESUME, "b"),
             fmt::format("error: definitions size = {} bytes (must be at most {} of the unfinished "
                         "campaigns of the key anna; cancel one, or wait)",
                         2 * size, 2 * size - 1));
   EXPECT_EQ(Store::open_read_only(directory / "b.db").control().phase,
             wire::CampaignPhase::cancelled);
-  EXPECT_THAT(control(ControlAction::cancel, "c"), StartsWith("campaign c: cancelled"));
-  EXPECT_THAT(control(ControlAction::resume, "b"), StartsWith("campaign b: active"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "c"), StartsWith("campaign c: cancelled"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_RESUME, "b"), StartsWith("campaign b: active"));
 }
 
 }  // namespace

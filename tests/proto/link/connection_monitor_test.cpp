@@ -109,7 +109,7 @@ TEST(ConnectionMonitor, TellsAPeerWithKeysThatTheCoordinatorUsesNone) {
 TEST(ConnectionMonitor, SaysEachReasonOnce) {
   zmq::context_t context;
   const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
-                                           {.domain = Domain::workers, .keys = make_key_pair()});
+                                           {.peers = KeyRole::worker, .keys = make_key_pair()});
   Peer peer(endpoint_of(router), {});
   std::multiset<std::string> reasons;
   int num_turns = 0;
@@ -243,11 +243,11 @@ constexpr std::int64_t mebibyte = 1 << 20;
 
 TEST(Router, LimitsTheSizeOfAMessage) {
   zmq::context_t context;
-  const auto router = [&](Domain domain) {
-    return make_router(context, "bind", "tcp://127.0.0.1:*", {.domain = domain, .keys = {}});
+  const auto router = [&](KeyRole domain) {
+    return make_router(context, "bind", "tcp://127.0.0.1:*", {.peers = domain, .keys = {}});
   };
-  EXPECT_EQ(router(Domain::workers).get(zmq::sockopt::maxmsgsize), mebibyte);
-  EXPECT_EQ(router(Domain::clients).get(zmq::sockopt::maxmsgsize), mebibyte);
+  EXPECT_EQ(router(KeyRole::worker).get(zmq::sockopt::maxmsgsize), mebibyte);
+  EXPECT_EQ(router(KeyRole::client).get(zmq::sockopt::maxmsgsize), mebibyte);
   EXPECT_EQ(make_dealer(context, {}).get(zmq::sockopt::maxmsgsize), 4 * mebibyte);
 }
 
@@ -303,8 +303,8 @@ TEST(Router, WithKeysAndWithoutAuthenticatorAdmitsNobody) {
   zmq::context_t context;
   zmq::context_t other_context;
   const KeyPair server = make_key_pair();
-  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
-                                           {.domain = Domain::workers, .keys = server});
+  const zmq::socket_t router =
+      make_router(context, "bind", "tcp://127.0.0.1:*", {.peers = KeyRole::worker, .keys = server});
   const ClientSecurity security{.identity = CurveIdentity{.role = KeyRole::worker,
                                                           .keys = make_key_pair(),
                                                           .coordinator = server.public_key}};

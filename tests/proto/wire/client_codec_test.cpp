@@ -222,11 +222,11 @@ TEST(Request, OfTooManyBytesIsNotMade) {
 }
 
 TEST(ClientNames, AreThoseOfTheEnumerators) {
-  EXPECT_EQ(name_of(ControlAction::pause), "pause");
-  EXPECT_EQ(name_of(ControlAction::resume), "resume");
-  EXPECT_EQ(name_of(ControlAction::cancel), "cancel");
-  EXPECT_EQ(name_of(ControlAction::set_priority), "set-priority");
-  EXPECT_EQ(name_of(ControlAction::retry), "retry");
+  EXPECT_EQ(name_of(proto::CONTROL_ACTION_PAUSE), "pause");
+  EXPECT_EQ(name_of(proto::CONTROL_ACTION_RESUME), "resume");
+  EXPECT_EQ(name_of(proto::CONTROL_ACTION_CANCEL), "cancel");
+  EXPECT_EQ(name_of(proto::CONTROL_ACTION_SET_PRIORITY), "set-priority");
+  EXPECT_EQ(name_of(proto::CONTROL_ACTION_RETRY), "retry");
   EXPECT_EQ(name_of(CampaignPhase::active), "active");
   EXPECT_EQ(name_of(CampaignPhase::paused), "paused");
   EXPECT_EQ(name_of(CampaignPhase::finished), "finished");

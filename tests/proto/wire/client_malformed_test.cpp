@@ -57,7 +57,7 @@ std::string refusal_of_submit(const std::function<void(proto::SubmitRequest&)>& 
 }
 
 std::string refusal_of_control(const std::function<void(proto::ControlRequest&)>& change) {
-  return refusal(test::control(ControlAction::pause, "a"),
+  return refusal(test::control(proto::CONTROL_ACTION_PAUSE, "a"),
                  [&](auto& envelope) { change(*envelope.mutable_control()); });
 }
 

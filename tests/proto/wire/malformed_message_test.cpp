@@ -211,7 +211,7 @@ TEST(MalformedNotServed, HasRangesOfRuns) {
                     [](auto& not_served) {
                       for (int i = 0; i < 4096; ++i) not_served.add_ranges()->set_count(1);
                     }),
-            "ranges = 4097 entries (must be in [1, 4096])");
+            "ranges = 4097 entries (must be in [0, 4096])");
 }
 
 TEST(MalformedCampaignNumber, IsNotZero) {

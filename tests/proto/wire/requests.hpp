@@ -31,11 +31,11 @@ inline proto::RequestEnvelope submission(const Definition& definition, const Wis
   return request;
 }
 
-inline proto::RequestEnvelope control(wire::ControlAction action, const std::string& campaign,
+inline proto::RequestEnvelope control(proto::ControlAction action, const std::string& campaign,
                                       int priority = 0) {
   proto::RequestEnvelope request;
   proto::ControlRequest& content = *request.mutable_control();
-  content.set_action(static_cast<proto::ControlAction>(action));
+  content.set_action(action);
   content.set_campaign(campaign);
   content.set_priority(priority);
   return request;

@@ -35,7 +35,7 @@ class SpoolTest : public testing::Test {
     return runs_of(Spool(path, "model").former_results());
   }
   void store(const std::vector<wire::LeasedResult>& results) const {
-    ASSERT_EQ(Spool(path, "model").append(results), std::nullopt);
+    ASSERT_EQ(Spool(path, "model").finish(results), std::nullopt);
   }
   std::string content() const {
     std::ostringstream text;
@@ -94,9 +94,9 @@ TEST_F(SpoolTest, LeavesNoFileBehindIfItHoldsNothing) {
   EXPECT_FALSE(std::filesystem::exists(path));
   {
     Spool spool(path, "model");
-    EXPECT_EQ(spool.append(std::vector{result(1)}), std::nullopt);
+    EXPECT_EQ(spool.finish({result(1)}), std::nullopt);
     EXPECT_FALSE(spool.is_empty());
-    spool.clear();
+    EXPECT_EQ(spool.look({}), std::nullopt);
     EXPECT_TRUE(spool.is_empty());
     EXPECT_EQ(std::filesystem::file_size(path), spool.size());
   }
@@ -166,9 +166,9 @@ TEST_F(SpoolTest, RefusesAFileThatIsTooLarge) {
 
 TEST_F(SpoolTest, StaysWithinItsSize) {
   Spool spool(path, "model", 400);
-  ASSERT_EQ(spool.append(std::vector{result(1)}), std::nullopt);
+  ASSERT_EQ(spool.finish({result(1)}), std::nullopt);
   const std::uint64_t size = spool.size();
-  EXPECT_EQ(spool.append(std::vector{result(2), result(3)}),
+  EXPECT_EQ(spool.finish({result(2), result(3)}),
             "spool = " + path.string() + " (full: must be at most 400 bytes)");
   EXPECT_EQ(spool.size(), size);
 }
@@ -196,14 +196,13 @@ class DiskLimit {
 // The second record is written in part, and taken back.
 TEST_F(SpoolTest, IsAsBeforeIfTheDiskIsFull) {
   Spool spool(path, "model");
-  ASSERT_EQ(spool.append(std::vector{result(1)}), std::nullopt);
+  ASSERT_EQ(spool.finish({result(1)}), std::nullopt);
   {
     const DiskLimit limit(spool.size() + 20);
-    EXPECT_EQ(spool.append(std::vector{result(2)}),
-              "spool = " + path.string() + " (File too large)");
+    EXPECT_EQ(spool.finish({result(2)}), "spool = " + path.string() + " (File too large)");
   }
   EXPECT_EQ(std::filesystem::file_size(path), spool.size());
-  EXPECT_EQ(spool.append(std::vector{result(3)}), std::nullopt);
+  EXPECT_EQ(spool.finish({result(3)}), std::nullopt);
 }
 
 TEST_F(SpoolTest, SaysThatItCannotBeMadeOnAFullDisk) {
@@ -220,11 +219,10 @@ std::vector<wire::LeasedResult> results(const std::vector<std::uint64_t>& runs) 
   return kept;
 }
 
-class SpoolerTest : public testing::Test {
+class SpoolLookTest : public testing::Test {
  protected:
   /// The runs whose results the next worker would deliver.
   std::vector<std::uint64_t> stored() {
-    spooler.reset();
     spool.reset();
     std::vector<std::uint64_t> runs;
     const Spool next(path, "m");
@@ -233,64 +231,58 @@ class SpoolerTest : public testing::Test {
     }
     return runs;
   }
-  void open() {
-    spool.emplace(path, "m");
-    spooler.emplace(*spool);
-  }
+  void open() { spool.emplace(path, "m"); }
 
   test::ScratchDirectory directory;
   std::filesystem::path path = directory / "spool";
   std::optional<Spool> spool;
-  std::optional<Spooler> spooler;
 };
 
-TEST_F(SpoolerTest, WritesWhatHasWaitedFromOneLookToTheNext) {
+TEST_F(SpoolLookTest, WritesWhatHasWaitedFromOneLookToTheNext) {
   open();
-  EXPECT_EQ(spooler->look(results({1, 2})), std::nullopt);
+  EXPECT_EQ(spool->look(results({1, 2})), std::nullopt);
   EXPECT_TRUE(spool->is_empty());
-  EXPECT_EQ(spooler->look(results({2, 3})), std::nullopt);
+  EXPECT_EQ(spool->look(results({2, 3})), std::nullopt);
   EXPECT_EQ(stored(), std::vector<std::uint64_t>{2});
 }
 
-TEST_F(SpoolerTest, WritesEachResultOnce) {
+TEST_F(SpoolLookTest, WritesEachResultOnce) {
   open();
-  for (int i = 0; i < 4; ++i) EXPECT_EQ(spooler->look(results({1, 2})), std::nullopt);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(spool->look(results({1, 2})), std::nullopt);
   EXPECT_EQ(stored(), (std::vector<std::uint64_t>{1, 2}));
 }
 
-TEST_F(SpoolerTest, EmptiesTheFileOnceAllIsAcknowledged) {
+TEST_F(SpoolLookTest, EmptiesTheFileOnceAllIsAcknowledged) {
   open();
-  for (int i = 0; i < 2; ++i) EXPECT_EQ(spooler->look(results({1, 2})), std::nullopt);
-  EXPECT_EQ(spooler->look({}), std::nullopt);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(spool->look(results({1, 2})), std::nullopt);
+  EXPECT_EQ(spool->look({}), std::nullopt);
   EXPECT_TRUE(spool->is_empty());
-  for (int i = 0; i < 2; ++i) EXPECT_EQ(spooler->look(results({1})), std::nullopt);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(spool->look(results({1})), std::nullopt);
   EXPECT_EQ(stored(), std::vector<std::uint64_t>{1});
 }
 
-TEST_F(SpoolerTest, WritesAllThatIsLeftAtTheEnd) {
+TEST_F(SpoolLookTest, WritesAllThatIsLeftAtTheEnd) {
   open();
-  EXPECT_EQ(spooler->look(results({1})), std::nullopt);
-  EXPECT_EQ(spooler->finish(results({1, 2})), std::nullopt);
+  EXPECT_EQ(spool->look(results({1})), std::nullopt);
+  EXPECT_EQ(spool->finish(results({1, 2})), std::nullopt);
   EXPECT_EQ(stored(), (std::vector<std::uint64_t>{1, 2}));
 }
 
-TEST_F(SpoolerTest, DoesNotWriteWhatItWasHandedAgain) {
+TEST_F(SpoolLookTest, DoesNotWriteWhatItWasHandedAgain) {
   open();
-  EXPECT_EQ(spooler->finish(results({1, 2})), std::nullopt);
-  spooler.reset();
+  EXPECT_EQ(spool->finish(results({1, 2})), std::nullopt);
   spool.reset();
   open();
-  EXPECT_EQ(spooler->finish(results({1, 2, 3})), std::nullopt);
+  EXPECT_EQ(spool->finish(results({1, 2, 3})), std::nullopt);
   EXPECT_EQ(stored(), (std::vector<std::uint64_t>{1, 2, 3}));
 }
 
-TEST_F(SpoolerTest, TriesAgainWhatItCouldNotWrite) {
+TEST_F(SpoolLookTest, TriesAgainWhatItCouldNotWrite) {
   spool.emplace(path, "m", 60);
-  spooler.emplace(*spool);
   const std::string expected = "spool = " + path.string() + " (full: must be at most 60 bytes)";
-  EXPECT_EQ(spooler->look(results({1})), std::nullopt);
-  EXPECT_EQ(spooler->look(results({1})), expected);
-  EXPECT_EQ(spooler->finish(results({1})), expected);
+  EXPECT_EQ(spool->look(results({1})), std::nullopt);
+  EXPECT_EQ(spool->look(results({1})), expected);
+  EXPECT_EQ(spool->finish(results({1})), expected);
 }
 
 }  // namespace

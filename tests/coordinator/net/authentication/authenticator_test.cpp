@@ -13,7 +13,6 @@ namespace proofmass::coordinator {
 namespace {
 
 using wire::ClientSecurity;
-using wire::Domain;
 using wire::KeyPair;
 using wire::KeyRole;
 using Clock = std::chrono::steady_clock;
@@ -36,9 +35,9 @@ class AuthenticatorTest : public ::testing::Test {
     write_lists(worker_.public_key.text() + " worker\n", client_.public_key.text() + " client\n");
     authenticator_ = std::make_unique<Authenticator>(
         context_, directory_.path(), [this](Event event) { events_.push_back(std::move(event)); });
-    for (const Domain domain : {Domain::workers, Domain::clients}) {
+    for (const KeyRole domain : {KeyRole::worker, KeyRole::client}) {
       routers_.emplace(domain, wire::make_router(context_, "bind", "tcp://127.0.0.1:*",
-                                                 {.domain = domain, .keys = coordinator_}));
+                                                 {.peers = domain, .keys = coordinator_}));
       events_of_routers_.emplace(
           domain, std::make_unique<wire::SocketEvents>(context_, routers_.at(domain).handle(),
                                                        failed_handshakes));
@@ -52,7 +51,7 @@ class AuthenticatorTest : public ::testing::Test {
                            wire::IfThere::replace);
   }
 
-  [[nodiscard]] std::string endpoint(Domain domain) const {
+  [[nodiscard]] std::string endpoint(KeyRole domain) const {
     return routers_.at(domain).get(zmq::sockopt::last_endpoint);
   }
 
@@ -68,8 +67,8 @@ class AuthenticatorTest : public ::testing::Test {
       if (Clock::now() > deadline) return false;
       std::vector<zmq::pollitem_t> items{{authenticator_->handle(), 0, ZMQ_POLLIN, 0},
                                          {peer.monitor.handle(), 0, ZMQ_POLLIN, 0},
-                                         {routers_.at(Domain::workers).handle(), 0, ZMQ_POLLIN, 0},
-                                         {routers_.at(Domain::clients).handle(), 0, ZMQ_POLLIN, 0}};
+                                         {routers_.at(KeyRole::worker).handle(), 0, ZMQ_POLLIN, 0},
+                                         {routers_.at(KeyRole::client).handle(), 0, ZMQ_POLLIN, 0}};
       zmq::poll(items, std::chrono::milliseconds(20));
       for (const auto& [domain, events] : events_of_routers_) {
         while (const auto event = events->take()) authenticator_->on_event(domain, *event, now_);
@@ -91,7 +90,7 @@ class AuthenticatorTest : public ::testing::Test {
   }
 
   // Takes the next message at a door and says whose it is; empty if none comes.
-  std::string user_of_next(Peer& peer, Domain domain) {
+  std::string user_of_next(Peer& peer, KeyRole domain) {
     zmq::message_t id;
     zmq::message_t frame;
     zmq::socket_t& router = routers_.at(domain);
@@ -115,8 +114,8 @@ class AuthenticatorTest : public ::testing::Test {
   Clock::time_point now_{};
   zmq::context_t context_;
   std::unique_ptr<Authenticator> authenticator_;
-  std::map<Domain, zmq::socket_t> routers_;
-  std::map<Domain, std::unique_ptr<wire::SocketEvents>> events_of_routers_;
+  std::map<KeyRole, zmq::socket_t> routers_;
+  std::map<KeyRole, std::unique_ptr<wire::SocketEvents>> events_of_routers_;
 };
 
 std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const std::string& role) {
@@ -125,8 +124,8 @@ std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const 
 }
 
 TEST_F(AuthenticatorTest, AdmitsListedKeysAndNamesThemWithEachMessage) {
-  for (const auto& [domain, role, keys] : {std::tuple{Domain::workers, KeyRole::worker, worker_},
-                                           {Domain::clients, KeyRole::client, client_}}) {
+  for (const auto& [domain, role, keys] : {std::tuple{KeyRole::worker, KeyRole::worker, worker_},
+                                           {KeyRole::client, KeyRole::client, client_}}) {
     Peer peer(endpoint(domain), identity(role, keys));
     ASSERT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
     peer.dealer.send(zmq::str_buffer("hello"), zmq::send_flags::dontwait);
@@ -138,7 +137,7 @@ TEST_F(AuthenticatorTest, AdmitsListedKeysAndNamesThemWithEachMessage) {
 }
 
 TEST_F(AuthenticatorTest, AdmitsAKeyThatIsListedLater) {
-  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, stranger_));
+  Peer peer(endpoint(KeyRole::worker), identity(KeyRole::worker, stranger_));
   ASSERT_NE(refusal(peer), "connected");
   write_lists(stranger_.public_key.text() + " late\n", "");
   now_ += std::chrono::seconds(1);
@@ -146,23 +145,23 @@ TEST_F(AuthenticatorTest, AdmitsAKeyThatIsListedLater) {
 }
 
 TEST_F(AuthenticatorTest, RevokedKeyMaySpeakNoMoreThoughItsConnectionStands) {
-  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, worker_));
+  Peer peer(endpoint(KeyRole::worker), identity(KeyRole::worker, worker_));
   ASSERT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
   const std::string key = worker_.public_key.text();
-  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, key, now_));
-  EXPECT_FALSE(authenticator_->is_allowed(Domain::clients, key, now_));
+  EXPECT_TRUE(authenticator_->is_allowed(KeyRole::worker, key, now_));
+  EXPECT_FALSE(authenticator_->is_allowed(KeyRole::client, key, now_));
 
   write_lists("#" + key + " worker\n", "");
   now_ += std::chrono::seconds(1);
-  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, key, now_)) << "one look is not enough";
+  EXPECT_TRUE(authenticator_->is_allowed(KeyRole::worker, key, now_)) << "one look is not enough";
   now_ += std::chrono::seconds(1);
 
-  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, key, now_));
+  EXPECT_FALSE(authenticator_->is_allowed(KeyRole::worker, key, now_));
   peer.dealer.send(zmq::str_buffer("still here"), zmq::send_flags::dontwait);
-  EXPECT_EQ(user_of_next(peer, Domain::workers), key);
+  EXPECT_EQ(user_of_next(peer, KeyRole::worker), key);
 
-  Peer again(endpoint(Domain::workers), identity(KeyRole::worker, worker_));
-  EXPECT_EQ(refusal(again), key_refusal(worker_, endpoint(Domain::workers), "worker"));
+  Peer again(endpoint(KeyRole::worker), identity(KeyRole::worker, worker_));
+  EXPECT_EQ(refusal(again), key_refusal(worker_, endpoint(KeyRole::worker), "worker"));
 }
 
 // The first message of a client may be the only one that a coordinator gets in an hour.
@@ -174,16 +173,16 @@ TEST_F(AuthenticatorTest, RevokesKeysWhileNobodyConnectsOrSpeaks) {
     authenticator_->serve(now_);
   }
   EXPECT_FALSE(authenticator_->client(key, now_));
-  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, worker_.public_key.text(), now_));
+  EXPECT_FALSE(authenticator_->is_allowed(KeyRole::worker, worker_.public_key.text(), now_));
 }
 
 TEST_F(AuthenticatorTest, MessageWithoutAUserIsNotAllowed) {
-  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, "", now_));
+  EXPECT_FALSE(authenticator_->is_allowed(KeyRole::worker, "", now_));
 }
 
 TEST_F(AuthenticatorTest, ListThatCannotBeReadIsLoggedAndTheOldOneStands) {
   write_lists("nonsense\n", "");
-  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, worker_.public_key.text(), now_));
+  EXPECT_TRUE(authenticator_->is_allowed(KeyRole::worker, worker_.public_key.text(), now_));
   ASSERT_EQ(events_.size(), 1u);
   EXPECT_EQ(events_[0].kind, "allow_list_unreadable");
   EXPECT_EQ(events_[0].severity, Severity::error);
