@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <concepts>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -283,61 +281,33 @@ void write_statistics(Store& store, const Campaign& campaign, const ReadResults&
                          results.warnings.first);
 }
 
-namespace {
-
-/// Appends the bytes of numbers.
-class Layout {
- public:
-  explicit Layout(std::vector<unsigned char>& bytes) : bytes_(bytes) { bytes_.clear(); }
-
-  template <std::unsigned_integral Integer>
-  void put(Integer value) {
-    std::array<unsigned char, sizeof(value)> bytes{};
-    for (std::size_t i = 0; i < sizeof(value); ++i) {
-      bytes[i] = static_cast<unsigned char>(value >> (8 * i));
-    }
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-  }
-
-  // Adding zero takes the sign from a negative zero, which SQLite does not keep.
-  void put(double value) { put(std::bit_cast<std::uint64_t>(value + 0.0)); }
-
-  /// As many as there are; zeros where they mean nothing.
-  void put(const std::vector<double>& values, bool have_meaning, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) put(have_meaning ? values[i] : 0.0);
-  }
-
- private:
-  std::vector<unsigned char>& bytes_;
-};
-
-}  // namespace
-
 Digest::Digest(const ResultSchema& schema) : num_quantities_(schema.quantities.size()) {}
 
 void Digest::add(const RunResult& result) {
-  Layout layout(bytes_);
-  layout.put(result.run.value);
-  layout.put(static_cast<std::uint32_t>(result.status));
-  layout.put(result.num_draws);
-  layout.put(result.num_rounds);
-  layout.put(std::uint32_t{0});
-  layout.put(result.truth, result.has_truth(), num_quantities_);
-  layout.put(result.estimate, result.has_estimate(), num_quantities_);
-  layout.put(result.standard_error, true, result.standard_error.size());
-  layout.put(result.fit, true, result.fit.size());
-  layout.put(result.correlations, true, result.correlations.size());
-  hash_.add(bytes_);
+  const auto add_all = [](const std::vector<double>& values, Sha256& hash) {
+    for (const double value : values) hash.add(value);
+  };
+  const auto add_if = [&](bool has_meaning, const std::vector<double>& values) {
+    for (std::size_t i = 0; i < num_quantities_; ++i) hash_.add(has_meaning ? values[i] : 0.0);
+  };
+  hash_.add(result.run.value);
+  hash_.add(static_cast<std::uint32_t>(result.status));
+  hash_.add(result.num_draws);
+  hash_.add(result.num_rounds);
+  hash_.add(std::uint32_t{0});
+  add_if(result.has_truth(), result.truth);
+  add_if(result.has_estimate(), result.estimate);
+  add_all(result.standard_error, hash_);
+  add_all(result.fit, hash_);
+  add_all(result.correlations, hash_);
 
   if (result.health.empty()) return;
   has_health_ = true;
-  Layout of_health(bytes_);
-  of_health.put(result.run.value);
-  of_health.put(result.health, true, result.health.size());
+  health_hash_.add(result.run.value);
+  add_all(result.health, health_hash_);
   const Loss loss = result.status == RunStatus::lost ? result.loss : Loss{};
-  of_health.put(loss.cause);
-  of_health.put(loss.session);
-  health_hash_.add(bytes_);
+  health_hash_.add(loss.cause);
+  health_hash_.add(loss.session);
 }
 
 ResultDigests Digest::finish() {

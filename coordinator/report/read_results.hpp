@@ -42,7 +42,6 @@ class Digest {
   std::size_t num_quantities_;
   Sha256 hash_;
   Sha256 health_hash_;
-  std::vector<unsigned char> bytes_;  // Of one result: kept from one to the next.
   bool has_health_ = false;
 };
 
