@@ -130,7 +130,7 @@ class Columns {
 void write_results(const Hdf5File& file, const Store& store, const IsStopped& is_stopped,
                    DrawColumns draws) {
   const bool has_draws = draws == DrawColumns::included;
-  Columns columns(file, store.schema(), has_draws ? stored_campaign_unchecked(store) : nullptr);
+  Columns columns(file, store.schema(), has_draws ? store.campaign() : nullptr);
   const WalkedResults walked =
       walk_results(store, is_stopped, [&](const RunResult& result) { columns.add(result); });
   columns.flush();

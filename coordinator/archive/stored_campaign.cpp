@@ -12,7 +12,6 @@
 #include <system_error>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
@@ -53,20 +52,8 @@ std::shared_ptr<const Campaign> stored_campaign(const Store& store) {
   std::shared_ptr<const Campaign> campaign;
   store.read_one_state([&] {
     check_definition_digest(store);
-    campaign = stored_campaign_unchecked(store);
+    campaign = store.campaign();
   });
-  return campaign;
-}
-
-std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store) {
-  std::shared_ptr<const Campaign> campaign =
-      store.model().campaign_of({.text = store.definition(),
-                                 .tables = store.data_tables(),
-                                 .table_columns = store.table_columns()},
-                                TableColumns::included, "stored definition");
-  require_identity(*campaign, {.name = store.name(),
-                               .seed = fmt::to_string(store.seed()),
-                               .num_runs = fmt::to_string(store.num_runs())});
   return campaign;
 }
 

@@ -25,9 +25,6 @@ namespace proofmass::coordinator {
 /// be read or is not the one that was stored, see check_definition_digest().
 [[nodiscard]] std::shared_ptr<const Campaign> stored_campaign(const Store& store);
 
-/// The campaign of a definition that may have been changed, for callers that look for changes.
-[[nodiscard]] std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store);
-
 /// The campaigns of some files, and of the files *.db of some directories (not of those below), by
 /// name within each. Files of other kinds are left out of directories; campaign databases that are
 /// damaged, older or newer than this program, or may not be read, are listed with their problem.

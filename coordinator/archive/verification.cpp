@@ -94,7 +94,7 @@ class Verification {
   }
 
   Check check_definition() {
-    campaign_ = stored_campaign_unchecked(*store_);
+    campaign_ = store_->campaign();
     std::vector<std::string> details = store_->parameter_differences(*campaign_);
     const std::string stored = store_->table_digest();
     const std::string computed = store_->computed_table_digest();

@@ -148,11 +148,9 @@ class Store {
   [[nodiscard]] std::string table_digest() const;
   /// The digest of what the tables hold now; it differs if a number in them has changed.
   [[nodiscard]] std::string computed_table_digest() const;
-  /// The data that all runs share.
-  [[nodiscard]] std::vector<DataTable> data_tables() const;
-
-  /// Values of `table` quantities for each run, as in Campaign::table_columns.
-  [[nodiscard]] std::vector<std::vector<double>> table_columns() const;
+  /// The campaign of the definition, which may have been changed: see stored_campaign().
+  /// @throws DefinitionError if it is none, or another one's.
+  [[nodiscard]] std::shared_ptr<const Campaign> campaign() const;
 
   /// Raises the number of runs; takes the table values of the new ones.
   /// @pre It is the campaign of the file: the caller has compared them.

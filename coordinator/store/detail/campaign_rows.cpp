@@ -18,6 +18,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -87,22 +88,6 @@ void insert_budget_coefficients(Database& database, const Campaign& campaign) {
       if (value != 0.0) insert.run(term.info.name, quantities[j].name, value, level);
     }
   }
-}
-
-/// Values of one drawn quantity, run by run; empty if the file has none.
-std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
-  Statement select = database.prepare(
-      "SELECT value, run_index FROM dispersion_value WHERE quantity = ? ORDER BY 2");
-  select.bind_all(drawn_name);
-  std::vector<double> values;
-  while (select.step()) {
-    if (select.count(1) != values.size()) {
-      database.refuse_as_damaged(fmt::format("dispersion_value of {}: run {} follows {} values",
-                                             drawn_name, select.count(1), values.size()));
-    }
-    values.push_back(select.real(0));
-  }
-  return values;
 }
 
 }  // namespace
@@ -209,30 +194,49 @@ void replace_stop_check(const Database& database, std::uint64_t num_runs,
 
 namespace proofmass::coordinator {
 
-std::vector<DataTable> Store::data_tables() const {
-  std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model().tables()) {
-    DataTable table{.key = std::string(schema.key),
-                    .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
-    detail::Statement select = impl_->database.prepare(fmt::format(
-        "SELECT {} FROM {} ORDER BY position", fmt::join(schema.columns, ", "), schema.table));
-    while (select.step()) {
-      for (int column = 0; column < select.num_columns(); ++column) {
-        table.values.push_back(select.real(column));
-      }
-    }
-    if (!table.values.empty()) tables.push_back(std::move(table));
-  }
-  return tables;
+std::shared_ptr<const Campaign> Store::campaign() const {
+  const detail::Statement row =
+      impl_->database.first_row("SELECT definition, name, seed, num_runs FROM campaign");
+  return wire::recorded_campaign(model(),
+                                 {.definition = row.text(0),
+                                  .name = row.text(1),
+                                  .seed = row.text(2),
+                                  .num_runs = row.text(3)},
+                                 "main", [this](const std::string& sql) {
+                                   std::vector<double> numbers;
+                                   detail::Statement of = impl_->database.prepare(sql);
+                                   while (of.step()) {
+                                     for (int i = 0; i < of.num_columns(); ++i) {
+                                       numbers.push_back(of.real(i));
+                                     }
+                                   }
+                                   return numbers;
+                                 });
 }
 
-std::vector<std::vector<double>> Store::table_columns() const {
-  std::vector<std::vector<double>> columns;
-  for (const DrawnQuantity& quantity : model().drawn()) {
-    columns.push_back(detail::read_dispersion_values(impl_->database, quantity.name));
-    if (columns.back().empty()) columns.pop_back();
-  }
-  return columns;
+std::optional<std::uint64_t> Store::num_runs_fixed() const {
+  return impl_->database.first_row("SELECT num_runs_fixed FROM campaign").optional_count(0);
+}
+
+StopPlan Store::stop_plan() const {
+  const detail::Statement select =
+      impl_->database.first_row("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
+  return {.stop_rule = select.text(0),
+          .num_runs_max = select.optional_count(1),
+          .failures_max = select.optional_count(2)};
+}
+
+void Store::set_stop_plan(const StopPlan& plan) {
+  impl_->commit([&](detail::Database& database) {
+    database
+        .prepare(
+            "UPDATE campaign SET stop_rule = ?1, num_runs_max = ?2, failures_max = ?3,"
+            " phase = iif(phase = 'finished' AND ?1 <> ''"
+            " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
+        .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
+    detail::fix_num_runs(database);
+    detail::write_table_digest(database, model());
+  });
 }
 
 void Store::extend(const Campaign& campaign, std::string_view definition) {
