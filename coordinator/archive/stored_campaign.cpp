@@ -28,7 +28,22 @@ bool is_file(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
+/// True if it has the mark, or is a file that this user may not read.
+bool may_be_campaign(const std::filesystem::path& file) {
+  return has_campaign_mark(file) ||
+         (is_file(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) != 0);
+}
+
 }  // namespace
+
+void require_campaign_file(const std::filesystem::path& file) {
+  const auto refuse = [&](std::string_view what) {
+    throw ArchiveError(fmt::format("campaign database = {} ({})", file.string(), what));
+  };
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) refuse("does not exist");
+  if (!may_be_campaign(file)) refuse("is not a Proofmass campaign");
+}
 
 // The header of an SQLite database: its name, and at byte 68 the application_id, big-endian.
 bool has_campaign_mark(const std::filesystem::path& file) {
@@ -41,11 +56,6 @@ bool has_campaign_mark(const std::filesystem::path& file) {
   if (!stream.read(header.data(), header.size())) return false;
   const std::string_view bytes(header.data(), header.size());
   return bytes.starts_with(format) && bytes.substr(application_at) == application;
-}
-
-bool may_be_campaign(const std::filesystem::path& file) {
-  return has_campaign_mark(file) ||
-         (is_file(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) != 0);
 }
 
 std::shared_ptr<const Campaign> stored_campaign(const Store& store) {
@@ -69,10 +79,6 @@ CampaignRecord listed(const std::filesystem::path& file) {
   } catch (const StoreError& error) {
     return {.file = file, .problem = error.what()};
   }
-}
-
-[[noreturn]] void refuse(const std::filesystem::path& place, std::string_view what) {
-  throw ArchiveError(fmt::format("campaign database = {} ({})", place.string(), what));
 }
 
 std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path& directory) {
@@ -114,8 +120,7 @@ std::vector<CampaignRecord> list_campaigns(std::span<const std::filesystem::path
       for (const auto& file : campaign_files_in(place)) campaigns.push_back(listed(file));
       continue;
     }
-    if (!std::filesystem::exists(place, ignored)) refuse(place, "does not exist");
-    if (!may_be_campaign(place)) refuse(place, "is not a Proofmass campaign");
+    require_campaign_file(place);
     campaigns.push_back(listed(place));
   }
   return campaigns;

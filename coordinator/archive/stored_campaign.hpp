@@ -17,8 +17,8 @@ namespace proofmass::coordinator {
 /// it cannot be read or is a directory, pipe or device. Opens no database.
 [[nodiscard]] bool has_campaign_mark(const std::filesystem::path& file);
 
-/// True if it has the mark, or is a file that this user may not read.
-[[nodiscard]] bool may_be_campaign(const std::filesystem::path& file);
+/// @throws ArchiveError unless the file is there and has the mark, or this user may not read it.
+void require_campaign_file(const std::filesystem::path& file);
 
 /// The campaign that a campaign database holds.
 /// @throws DefinitionError if its definition is not one or another one's, StoreError if it cannot

@@ -333,12 +333,9 @@ std::optional<Summary> summary_of_all(const Store& store, std::uint64_t num_resu
     if (store.has_statistics()) store.refuse_as_damaged("its statistics are there without summary");
     return std::nullopt;
   }
-  const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
-                                    summary->num_not_finite + summary->num_no_draw +
-                                    summary->num_lost;
-  if (summary->num_finished != num_counted) {
+  if (summary->num_finished != summary->num_counted) {
     store.refuse_as_damaged(fmt::format("summary.num_finished is {} and its kinds are {}",
-                                        summary->num_finished, num_counted));
+                                        summary->num_finished, summary->num_counted));
   }
   if (num_results < summary->num_finished) {
     store.refuse_as_damaged(fmt::format("it has {} results, and its statistics are of {}",

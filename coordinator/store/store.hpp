@@ -270,11 +270,13 @@ class Store {
   /// definition, a line each: `parameter.unit of gain = m (must be 1)`. Numbers are equal if
   /// their bits are.
   [[nodiscard]] std::vector<std::string> parameter_differences(const Campaign& campaign) const;
-  /// What `statistic`, `budget_entry` and `run_warning` have other than write_statistics() would
-  /// store, a line each; only the first in a file that was made before there were the others.
+  /// What `summary`, `statistic`, `budget_entry` and `run_warning` have other than
+  /// write_statistics() would store, a line each; only the first two in a file that was made before
+  /// there were the others.
+  /// @param summary  As it is stored; its digests and the runs that are given up are not compared.
   [[nodiscard]] std::vector<std::string> statistic_differences(
       const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget,
-      std::span<const RunWarning> warnings) const;
+      std::span<const RunWarning> warnings, const std::optional<Summary>& summary) const;
   /// What rows of `stop_check` have other than these; there may be more of them.
   [[nodiscard]] std::vector<std::string> stop_check_differences(
       std::span<const StopCheckRow> expected) const;

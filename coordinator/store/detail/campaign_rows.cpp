@@ -53,26 +53,28 @@ void insert_data_tables(Database& database, const Campaign& campaign) {
   }
 }
 
-/// Name of each quantity with values in a table, in the order of the campaign's columns.
-std::vector<std::string_view> table_quantity_names(const Campaign& campaign) {
-  std::vector<std::string_view> names;
-  for (const std::size_t quantity : campaign.table_quantities()) {
-    names.push_back(campaign.model().drawn()[quantity].name);
-  }
-  return names;
-}
-
 // Only runs of the campaign are stored: files may well hold values for more.
 void insert_dispersion_values(Database& database, const Campaign& campaign,
                               std::uint64_t first_run) {
   Statement insert = database.prepare("INSERT INTO dispersion_value VALUES (?, ?, ?)");
-  const std::vector<std::string_view> names = table_quantity_names(campaign);
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  const std::vector<std::size_t> quantities = campaign.table_quantities();
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
     const std::vector<double>& values = campaign.table_columns[i];
+    const std::string_view name = campaign.model().drawn()[quantities[i]].name;
     for (std::uint64_t run = first_run; run < campaign.num_runs; ++run) {
-      insert.run(names[i], run, values[run]);
+      insert.run(name, run, values[run]);
     }
   }
+}
+
+/// While there is no result, nobody can have looked at one: the runs that are asked for now are
+/// fixed, unless a stop rule decides about their number.
+void fix_num_runs(const Database& database) {
+  database
+      .prepare(
+          "UPDATE campaign SET num_runs_fixed = iif(stop_rule = '', num_runs, NULL)"
+          " WHERE NOT EXISTS (SELECT 1 FROM delivery)")
+      .run();
 }
 
 void insert_budget_coefficients(Database& database, const Campaign& campaign) {
@@ -166,28 +168,6 @@ CampaignControl read_control(const Database& database) {
 void write_control(const Database& database, const CampaignControl& control) {
   database.prepare("UPDATE campaign SET phase = ?, priority = ?, audit_fraction = ?")
       .run(wire::name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
-}
-
-std::optional<std::uint64_t> read_num_runs_fixed(const Database& database) {
-  return database.first_row("SELECT num_runs_fixed FROM campaign").optional_count(0);
-}
-
-void fix_num_runs(const Database& database) {
-  database
-      .prepare(
-          "UPDATE campaign SET num_runs_fixed = iif(stop_rule = '', num_runs, NULL)"
-          " WHERE NOT EXISTS (SELECT 1 FROM delivery)")
-      .run();
-}
-
-void replace_stop_check(const Database& database, std::uint64_t num_runs,
-                        std::string_view statistic, const StopCheck& check) {
-  database
-      .prepare(
-          "INSERT OR REPLACE INTO stop_check (statistic, num_runs, estimate, lower, upper,"
-          " relative_half_width, is_reached) VALUES (?, ?, ?, ?, ?, ?, ?)")
-      .run(statistic, num_runs, check.estimate, check.interval, check.relative_half_width,
-           std::int64_t{check.is_reached});
 }
 
 }  // namespace proofmass::coordinator::detail

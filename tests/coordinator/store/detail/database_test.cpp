@@ -110,9 +110,9 @@ TEST_F(DatabaseTest, IsAFileWhateverItsName) {
 
 TEST_F(DatabaseDeathTest, RefusesANumberThatSqliteCannotHold) {
   Statement select = database_.prepare("SELECT ?");
-  EXPECT_THROW(select.bind(1, std::numeric_limits<double>::quiet_NaN()), StoreError);
-  EXPECT_THROW(select.bind(1, std::numeric_limits<double>::infinity()), StoreError);
-  EXPECT_THROW(select.bind(1, std::uint64_t{1} << 63), StoreError);
+  EXPECT_THROW(select.bind_all(std::numeric_limits<double>::quiet_NaN()), StoreError);
+  EXPECT_THROW(select.bind_all(std::numeric_limits<double>::infinity()), StoreError);
+  EXPECT_THROW(select.bind_all(std::uint64_t{1} << 63), StoreError);
 }
 
 using SchemaTest = test::StoreTest;
