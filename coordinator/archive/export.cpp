@@ -130,7 +130,7 @@ class Columns {
 void write_results(const Hdf5File& file, const Store& store, const IsStopped& is_stopped,
                    DrawColumns draws) {
   const bool has_draws = draws == DrawColumns::included;
-  Columns columns(file, store.schema(), has_draws ? stored_campaign_unchecked(store) : nullptr);
+  Columns columns(file, store.schema(), has_draws ? store.campaign() : nullptr);
   const WalkedResults walked =
       walk_results(store, is_stopped, [&](const RunResult& result) { columns.add(result); });
   columns.flush();
@@ -153,14 +153,19 @@ void export_hdf5(const Store& store, const std::filesystem::path& file, const Is
   draft.publish(wire::IfThere::replace);
 }
 
-WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
-                           const std::function<void(const RunResult&)>& visit) {
-  constexpr std::uint64_t visits_between_questions = 1024;
-  std::uint64_t num_visits = 0;
-  return walk_checked(store, [&](const RunResult& result) {
+std::function<void(const RunResult&)> stoppable(const IsStopped& is_stopped,
+                                                std::function<void(const RunResult&)> visit) {
+  return [&is_stopped, visit = std::move(visit),
+          num_visits = std::uint64_t{0}](const RunResult& result) mutable {
+    constexpr std::uint64_t visits_between_questions = 1024;
     if (num_visits++ % visits_between_questions == 0 && is_stopped()) throw Interrupted();
     visit(result);
-  });
+  };
+}
+
+WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
+                           const std::function<void(const RunResult&)>& visit) {
+  return walk_checked(store, stoppable(is_stopped, visit));
 }
 
 void export_sqlite(const Store& store, const std::filesystem::path& file,

@@ -38,8 +38,11 @@ void export_hdf5(const Store& store, const std::filesystem::path& file, const Is
 void export_sqlite(const Store& store, const std::filesystem::path& file,
                    const IsStopped& is_stopped);
 
-/// walk_checked() with an end.
-/// @throws Interrupted soon after `is_stopped` says so.
+/// A visitor of results that throws Interrupted soon after `is_stopped` says so.
+[[nodiscard]] std::function<void(const RunResult&)> stoppable(
+    const IsStopped& is_stopped, std::function<void(const RunResult&)> visit);
+
+/// walk_checked() with a stoppable visitor.
 WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
                            const std::function<void(const RunResult&)>& visit);
 

@@ -145,20 +145,21 @@ std::string difference_of(const Campaign& campaign, const ResultSchema& schema,
 
 }  // namespace
 
-ChosenRuns::ChosenRuns(std::span<const RunRange> runs, double fraction)
-    : runs_(runs), num_runs_(num_runs_in(runs)), count_(0) {
-  if (num_runs_ == 0) return;
-  const double wanted = std::ceil(fraction * static_cast<double>(num_runs_));
-  count_ = std::clamp(static_cast<std::uint64_t>(wanted), std::uint64_t{1}, num_runs_);
-}
-
-RunIndex ChosenRuns::next(std::uint64_t i) {
-  const std::uint64_t place = (2 * i + 1) * num_runs_ / (2 * count_);
-  while (place - num_before_ >= runs_.front().count) {
-    num_before_ += runs_.front().count;
-    runs_ = runs_.subspan(1);
+std::vector<RunIndex> chosen_runs(std::span<const RunRange> runs, double fraction) {
+  const std::uint64_t num_runs = num_runs_in(runs);
+  if (num_runs == 0) return {};
+  const auto wanted =
+      static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(num_runs)));
+  std::vector<RunIndex> chosen(std::clamp(wanted, std::uint64_t{1}, num_runs));
+  std::uint64_t num_before = 0;  // Runs in the ranges before the first one.
+  for (std::uint64_t i = 0; i < chosen.size(); ++i) {
+    const std::uint64_t place = (2 * i + 1) * num_runs / (2 * chosen.size());
+    for (; place - num_before >= runs.front().count; runs = runs.subspan(1)) {
+      num_before += runs.front().count;
+    }
+    chosen[i] = {runs.front().first.value + (place - num_before)};
   }
-  return RunIndex{runs_.front().first.value + (place - num_before_)};
+  return chosen;
 }
 
 std::vector<ResultDifference> differences_of(const RunResult& stored, const RunResult& computed,

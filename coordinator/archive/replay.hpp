@@ -20,22 +20,9 @@ namespace proofmass::coordinator {
 
 /// The runs that are simulated again for a fraction of all: spread evenly, at least one, always the
 /// same ones.
-class ChosenRuns {
- public:
-  /// @param runs      Ascending; they outlive this.
-  /// @param fraction  In [0, 1].
-  ChosenRuns(std::span<const RunRange> runs, double fraction);
-
-  [[nodiscard]] std::uint64_t size() const { return count_; }
-  /// @param i  Below size(), and not below that of the call before.
-  [[nodiscard]] RunIndex next(std::uint64_t i);
-
- private:
-  std::span<const RunRange> runs_;
-  std::uint64_t num_runs_;
-  std::uint64_t count_;
-  std::uint64_t num_before_ = 0;  ///< Runs in the ranges before `runs_`.
-};
+/// @param runs      Ascending.
+/// @param fraction  In [0, 1].
+[[nodiscard]] std::vector<RunIndex> chosen_runs(std::span<const RunRange> runs, double fraction);
 
 /// What differs between a stored result and the one that its run has.
 struct ResultDifference {

@@ -12,7 +12,6 @@
 #include <system_error>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
@@ -29,7 +28,22 @@ bool is_file(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
+/// True if it has the mark, or is a file that this user may not read.
+bool may_be_campaign(const std::filesystem::path& file) {
+  return has_campaign_mark(file) ||
+         (is_file(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) != 0);
+}
+
 }  // namespace
+
+void require_campaign_file(const std::filesystem::path& file) {
+  const auto refuse = [&](std::string_view what) {
+    throw ArchiveError(fmt::format("campaign database = {} ({})", file.string(), what));
+  };
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) refuse("does not exist");
+  if (!may_be_campaign(file)) refuse("is not a Proofmass campaign");
+}
 
 // The header of an SQLite database: its name, and at byte 68 the application_id, big-endian.
 bool has_campaign_mark(const std::filesystem::path& file) {
@@ -44,29 +58,12 @@ bool has_campaign_mark(const std::filesystem::path& file) {
   return bytes.starts_with(format) && bytes.substr(application_at) == application;
 }
 
-bool may_be_campaign(const std::filesystem::path& file) {
-  return has_campaign_mark(file) ||
-         (is_file(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) != 0);
-}
-
 std::shared_ptr<const Campaign> stored_campaign(const Store& store) {
   std::shared_ptr<const Campaign> campaign;
   store.read_one_state([&] {
     check_definition_digest(store);
-    campaign = stored_campaign_unchecked(store);
+    campaign = store.campaign();
   });
-  return campaign;
-}
-
-std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store) {
-  std::shared_ptr<const Campaign> campaign =
-      store.model().campaign_of({.text = store.definition(),
-                                 .tables = store.data_tables(),
-                                 .table_columns = store.table_columns()},
-                                TableColumns::included, "stored definition");
-  require_identity(*campaign, {.name = store.name(),
-                               .seed = fmt::to_string(store.seed()),
-                               .num_runs = fmt::to_string(store.num_runs())});
   return campaign;
 }
 
@@ -82,10 +79,6 @@ CampaignRecord listed(const std::filesystem::path& file) {
   } catch (const StoreError& error) {
     return {.file = file, .problem = error.what()};
   }
-}
-
-[[noreturn]] void refuse(const std::filesystem::path& place, std::string_view what) {
-  throw ArchiveError(fmt::format("campaign database = {} ({})", place.string(), what));
 }
 
 std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path& directory) {
@@ -127,8 +120,7 @@ std::vector<CampaignRecord> list_campaigns(std::span<const std::filesystem::path
       for (const auto& file : campaign_files_in(place)) campaigns.push_back(listed(file));
       continue;
     }
-    if (!std::filesystem::exists(place, ignored)) refuse(place, "does not exist");
-    if (!may_be_campaign(place)) refuse(place, "is not a Proofmass campaign");
+    require_campaign_file(place);
     campaigns.push_back(listed(place));
   }
   return campaigns;

@@ -17,16 +17,13 @@ namespace proofmass::coordinator {
 /// it cannot be read or is a directory, pipe or device. Opens no database.
 [[nodiscard]] bool has_campaign_mark(const std::filesystem::path& file);
 
-/// True if it has the mark, or is a file that this user may not read.
-[[nodiscard]] bool may_be_campaign(const std::filesystem::path& file);
+/// @throws ArchiveError unless the file is there and has the mark, or this user may not read it.
+void require_campaign_file(const std::filesystem::path& file);
 
 /// The campaign that a campaign database holds.
 /// @throws DefinitionError if its definition is not one or another one's, StoreError if it cannot
 /// be read or is not the one that was stored, see check_definition_digest().
 [[nodiscard]] std::shared_ptr<const Campaign> stored_campaign(const Store& store);
-
-/// The campaign of a definition that may have been changed, for callers that look for changes.
-[[nodiscard]] std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store);
 
 /// The campaigns of some files, and of the files *.db of some directories (not of those below), by
 /// name within each. Files of other kinds are left out of directories; campaign databases that are

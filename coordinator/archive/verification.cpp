@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/archive/export.hpp"
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/read_results.hpp"
@@ -24,6 +25,31 @@
 
 namespace proofmass::coordinator {
 namespace {
+
+constexpr std::string_view unfit = "not what follows from definition and results";
+
+/// What one pass over all results of a campaign database finds. Runs are ranges: memory does not
+/// grow with them unless every other one is missing.
+struct ResultScan {
+  std::vector<RunRange> runs;  ///< Finished ones, ascending.
+  ResultDigests digests;       ///< Of their results.
+  std::uint64_t num_violations = 0;
+  std::vector<std::string>
+      violations;  ///< details_named_max at most: `run 3: num_draws = 0 (rule)`.
+
+  void violate(RunIndex run, const std::string& what) {
+    if (num_violations++ >= details_named_max) return;
+    violations.push_back(fmt::format("run {}: {}", run.value, what));
+  }
+
+  /// Reports each of these runs that is not one of those; both ascending.
+  void violate_missing(std::span<const RunRange> those, std::span<const RunRange> these,
+                       const std::string& what) {
+    std::vector<RunIndex> missing;
+    std::ranges::set_difference(indices_of(these), indices_of(those), std::back_inserter(missing));
+    for (const RunIndex run : missing) violate(run, what);
+  }
+};
 
 /// The checks of one file, each made once, in order.
 class Verification {
@@ -51,11 +77,9 @@ class Verification {
   void run_result_checks() {
     make("results", [this] { return check_results(); });
     make_of_results("digest", [this] { return check_digest(); });
-    make_of_results("statistics",
-                    [this] { return check_stored_statistics(*store_, *campaign_, *scan_); });
-    make_of_results("stop_checks",
-                    [this] { return check_stored_stop_checks(*store_, *campaign_, *scan_); });
-    make("audit", [this] { return check_contradictions(*store_); });
+    make_of_results("statistics", [this] { return check_statistics(); });
+    make_of_results("stop_checks", [this] { return check_stop_checks(); });
+    make("audit", [this] { return check_contradictions(); });
     make("draws", [this] { return check_draws(); });
   }
 
@@ -93,7 +117,7 @@ class Verification {
   }
 
   Check check_definition() {
-    campaign_ = stored_campaign_unchecked(*store_);
+    campaign_ = store_->campaign();
     std::vector<std::string> details = store_->parameter_differences(*campaign_);
     const std::string stored = store_->table_digest();
     const std::string computed = store_->computed_table_digest();
@@ -125,13 +149,44 @@ class Verification {
 
   Check check_results() {
     if (!campaign_) return Check::not_checked("the definition cannot be read");
-    scan_ = scan_results(*store_, *campaign_, is_stopped_);
+    scan_ = scan_results();
     const std::string counts =
         fmt::format("{} of {} runs", num_runs_in(scan_->runs), store_->num_runs());
     if (scan_->num_violations == 0) return Check::holds(counts + ": each number obeys its rule");
     return Check::fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
                                     scan_->num_violations == 1 ? "rule is" : "rules are"),
                         scan_->violations, scan_->num_violations - scan_->violations.size());
+  }
+
+  /// Reads all results and holds them against the rules of their status, and against the list of
+  /// those who delivered them.
+  [[nodiscard]] ResultScan scan_results() const {
+    ResultScan scan;
+    const ResultSchema& schema = store_->schema();
+    const std::vector<ValueColumn> columns = value_columns(schema);
+    const std::int64_t num_rounds_max = campaign_->num_rounds_max();
+    Digest digest(schema);
+    store_->for_each_result(stoppable(is_stopped_, [&](const RunResult& result) {
+      for (const std::string& broken :
+           broken_count_rules(result, schema.num_draws_max, num_rounds_max)) {
+        scan.violate(result.run, broken);
+      }
+      for (const ValueColumn& column : columns) {
+        if (column.kind == ValueKind::error) continue;  // Follow from the others.
+        const std::optional<double> value = column.value_in(result);
+        if (!value || is_in_range(*value)) continue;
+        scan.violate(result.run, fmt::format("{} = {} (must be in [{}, {}])", column.name, *value,
+                                             -magnitude_max, magnitude_max));
+      }
+      digest.add(result);
+      append(scan.runs, result.run);
+    }));
+    scan.digests = digest.finish();
+    const std::vector<RunRange> delivered = store_->finished_runs();
+    if (delivered == scan.runs) return scan;
+    scan.violate_missing(scan.runs, delivered, "has a delivery and no result");
+    scan.violate_missing(delivered, scan.runs, "has a result and no delivery");
+    return scan;
   }
 
   // A coordinator stores the digest when it ends; until then there are newer results.
@@ -167,6 +222,70 @@ class Verification {
     return check;
   }
 
+  /// Holds `statistic`, `budget_entry`, `run_warning` and `summary` against the results that the
+  /// summary is of. A coordinator brings them up to date when a campaign ends or is stopped: in
+  /// between they are of fewer results, and only what does not depend on results is checked.
+  [[nodiscard]] Check check_statistics() const {
+    const std::optional<Summary> summary = store_->summary();
+    const bool is_current = summary && summary->num_finished == num_runs_in(scan_->runs) &&
+                            summary->digests == scan_->digests && scan_->num_violations == 0;
+    if (summary && !is_current) {
+      if (summary->num_counted != summary->num_finished) {
+        return Check::fails(
+            std::string(unfit),
+            {fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
+                         summary->num_finished, summary->num_counted)});
+      }
+      return Check::not_checked("they are not of the results that are in the file");
+    }
+    // Without a summary nothing was ever stored but the budget before estimation.
+    const ReadResults results = summary ? read_results(*store_, *campaign_) : ReadResults();
+    std::vector<std::string> lines = store_->statistic_differences(
+        results.statistics, campaign_->error_budget(), results.warnings.first, summary);
+    // A run is given up after the summary without another result, and remains so until it has one:
+    // of as many results it cannot have been more.
+    if (summary && summary->num_given_up > results.missing.num_given_up) {
+      lines.push_back(fmt::format("summary.num_given_up = {} (must be at most {})",
+                                  summary->num_given_up, results.missing.num_given_up));
+    }
+    if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
+    if (!summary) {
+      return Check::not_checked("none are stored: a coordinator has the file, or was killed");
+    }
+    return Check::holds(
+        fmt::format("of {} runs: every number and every budget", results.statistics.num_runs));
+  }
+
+  [[nodiscard]] Check check_stop_checks() const {
+    if (scan_->num_violations > 0) return Check::not_checked("a result breaks its rule");
+    std::vector<std::string> lines = stop_check_differences(*store_, campaign_->objectives());
+    if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
+    const auto num_checks = static_cast<std::uint64_t>(store_->stop_checks().size());
+    return Check::holds(num_checks == 0 ? "none" : fmt::format("{} of a stop rule", num_checks));
+  }
+
+  /// Fails if two workers delivered different results of one run.
+  [[nodiscard]] Check check_contradictions() const {
+    const std::uint64_t num_compared = store_->num_compared();
+    const std::vector<Contradiction> contradictions = store_->contradictions();
+    if (contradictions.empty()) {
+      return Check::holds(num_compared == 0
+                              ? "no run was computed twice"
+                              : fmt::format("{} second {}: each is the stored one", num_compared,
+                                            num_compared == 1 ? "result" : "results"));
+    }
+    std::vector<std::string> lines;
+    for (const Contradiction& found : contradictions) {
+      lines.push_back(fmt::format("run {}: {} delivered {} (must be {}, as stored)",
+                                  found.run.value, found.worker, found.second_digest,
+                                  found.stored_digest));
+    }
+    return Check::fails(
+        fmt::format("{} of {} second results {} not the stored one: a worker computes wrongly",
+                    contradictions.size(), num_compared, contradictions.size() == 1 ? "is" : "are"),
+        std::move(lines));
+  }
+
   Check check_draws() {
     if (!is_same_model_) return Check::not_checked("another model made the file");
     if (!scan_) return Check::not_checked("the results cannot be read");
@@ -187,15 +306,18 @@ class Verification {
     if (!is_same_model_) return Check::not_checked("another model made the file");
     if (!why_no_runs_.empty()) return Check::not_checked(why_no_runs_);
     if (!scan_) return Check::not_checked("the results cannot be read");
-    ChosenRuns chosen(scan_->runs, options_.fraction);
-    if (chosen.size() == 0) return Check::not_checked("no run is finished");
+    const std::vector<RunIndex> chosen = chosen_runs(scan_->runs, options_.fraction);
+    if (chosen.empty()) return Check::not_checked("no run is finished");
+    // So many at a time that all threads are busy. Between them nothing is read: a coordinator that
+    // writes meanwhile can shorten its log.
+    constexpr std::size_t num_at_a_time = 4096;
     std::vector<ResultDifference> differences;
-    for (std::uint64_t done = 0; done < chosen.size();) {
-      const std::vector<RunResult> results = next_results(chosen, done);
-      const std::vector<ResultDifference> found =
-          simulate_again(*campaign_, results, options_.num_threads, is_stopped_);
-      differences.insert(differences.end(), found.begin(), found.end());
-      done += results.size();
+    for (std::size_t done = 0; done < chosen.size(); done += num_at_a_time) {
+      const auto some =
+          std::span(chosen).subspan(done, std::min(chosen.size() - done, num_at_a_time));
+      std::ranges::move(
+          simulate_again(*campaign_, results_of(some), options_.num_threads, is_stopped_),
+          std::back_inserter(differences));
     }
     const std::string runs = fmt::format("{} of {} runs", chosen.size(), num_runs_in(scan_->runs));
     if (differences.empty()) return Check::holds(runs + " simulated again: every bit is the same");
@@ -222,15 +344,10 @@ class Verification {
     return check;
   }
 
-  // Results of the next of the runs that are simulated again, so many that all threads are busy.
-  // Between them nothing is read: a coordinator that writes meanwhile can shorten its log.
-  std::vector<RunResult> next_results(ChosenRuns& chosen, std::uint64_t done) {
-    constexpr std::uint64_t num_at_a_time = 4096;
-    const std::uint64_t count = std::min(chosen.size() - done, num_at_a_time);
+  [[nodiscard]] std::vector<RunResult> results_of(std::span<const RunIndex> runs) const {
     std::vector<RunResult> results;
-    for (std::uint64_t i = done; i < done + count; ++i) {
+    for (const RunIndex run : runs) {
       if (is_stopped_()) throw Interrupted();
-      const RunIndex run = chosen.next(i);
       const std::optional<RunResult> result = store_->results({run, 1}).next();
       if (!result) {
         store_->refuse_as_damaged(fmt::format("the result of run {} went away", run.value));
@@ -253,17 +370,6 @@ class Verification {
   std::optional<ResultScan> scan_;
 };
 
-void check_campaign_file(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
-    throw ArchiveError(fmt::format("campaign database = {} (does not exist)", file.string()));
-  }
-  if (!may_be_campaign(file)) {
-    throw ArchiveError(
-        fmt::format("campaign database = {} (is not a Proofmass campaign)", file.string()));
-  }
-}
-
 constexpr std::size_t name_width = 12;
 constexpr std::size_t verdict_width = 13;
 
@@ -271,7 +377,7 @@ constexpr std::size_t verdict_width = 13;
 
 bool verify(const std::filesystem::path& file, const VerifyOptions& options,
             const std::function<void(const Check&)>& report, const IsStopped& is_stopped) {
-  check_campaign_file(file);
+  require_campaign_file(file);
   return Verification(file, options, report, is_stopped).run();
 }
 
@@ -304,165 +410,6 @@ std::string check_text(const Check& check, Paint paint) {
     text += "  " + wire::visible_text(detail) + "\n";  // It may quote the file.
   }
   return text;
-}
-
-namespace {
-
-void violate(ResultScan& scan, RunIndex run, const std::string& what) {
-  if (scan.num_violations++ >= details_named_max) return;
-  scan.violations.push_back(fmt::format("run {}: {}", run.value, what));
-}
-
-/// Reports each of these runs that is not one of those; both ascending.
-void violate_missing(std::span<const RunRange> those, std::span<const RunRange> these,
-                     const std::string& what, ResultScan& scan) {
-  auto next = those.begin();
-  for (const RunRange& range : these) {
-    for (std::uint64_t run = range.first.value; run < range.end();) {
-      while (next != those.end() && next->end() <= run) ++next;
-      if (next != those.end() && next->first.value <= run) {
-        run = next->end();  // All of these are there.
-        continue;
-      }
-      violate(scan, RunIndex{run++}, what);
-    }
-  }
-}
-
-constexpr std::string_view unfit = "not what follows from definition and results";
-
-using Lines = std::vector<std::string>;
-
-void append(Lines& lines, const Lines& further) {
-  std::ranges::copy(further, std::back_inserter(lines));
-}
-
-Lines count_differences(const Summary& stored, const CampaignStatistics& now) {
-  Lines lines;
-  const auto require_same = [&](std::string_view column, std::uint64_t count, std::uint64_t must) {
-    if (count == must) return;
-    lines.push_back(fmt::format("summary.{} = {} (must be {})", column, count, must));
-  };
-  require_same("num_estimated", stored.num_estimated, now.num_estimated);
-  require_same("num_not_converged", stored.num_not_converged, now.num_not_converged);
-  require_same("num_not_finite", stored.num_not_finite, now.num_not_finite);
-  require_same("num_no_draw", stored.num_no_draw, now.num_no_draw);
-  require_same("num_lost", stored.num_lost, now.num_lost);
-  require_same("num_within_objectives", stored.num_within_objectives, now.num_within_objectives);
-  if (stored.within_objectives != now.within_objectives(stored.num_given_up)) {
-    lines.emplace_back(
-        "summary.within_objectives_lower and _upper (must be those of num_within_objectives)");
-  }
-  return lines;
-}
-
-// A run is given up after the summary without another result, and remains so until it has one: of
-// as many results it cannot have been more.
-Lines given_up_differences(const Store& store, const Summary& summary) {
-  const std::uint64_t num_given_up = num_runs_in(store.given_up_runs());
-  if (summary.num_given_up <= num_given_up) return {};
-  return {fmt::format("summary.num_given_up = {} (must be at most {})", summary.num_given_up,
-                      num_given_up)};
-}
-
-Check check_current(const Store& store, const Campaign& campaign, const Summary& summary,
-                    const ReadResults& results) {
-  Lines lines = count_differences(summary, results.statistics);
-  append(lines, given_up_differences(store, summary));
-  append(lines, store.statistic_differences(results.statistics, campaign.error_budget(),
-                                            results.warnings.first));
-  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
-  return Check::holds(
-      fmt::format("of {} runs: every number and every budget", results.statistics.num_runs));
-}
-
-// Without a summary nothing was ever stored but the budget before estimation.
-Check check_first(const Store& store, const Campaign& campaign) {
-  Lines lines = store.statistic_differences({}, campaign.error_budget(), {});
-  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
-  return Check::not_checked("none are stored: a coordinator has the file, or was killed");
-}
-
-}  // namespace
-
-ResultScan scan_results(const Store& store, const Campaign& campaign, const IsStopped& is_stopped) {
-  ResultScan scan;
-  const std::vector<ValueColumn> columns = value_columns(store.schema());
-  const std::int64_t num_rounds_max = campaign.num_rounds_max();
-  Digest digest(store.schema());
-  std::uint64_t num_visits = 0;
-  store.for_each_result([&](const RunResult& result) {
-    constexpr std::uint64_t visits_between_questions = 1024;
-    if (num_visits++ % visits_between_questions == 0 && is_stopped()) throw Interrupted();
-    for (const std::string& broken :
-         broken_count_rules(result, store.schema().num_draws_max, num_rounds_max)) {
-      violate(scan, result.run, broken);
-    }
-    for (const ValueColumn& column : columns) {
-      if (column.kind == ValueKind::error) continue;  // Follow from the others.
-      const std::optional<double> value = column.value_in(result);
-      if (!value || is_in_range(*value)) continue;
-      violate(scan, result.run,
-              fmt::format("{} = {} (must be in [{}, {}])", column.name, *value, -magnitude_max,
-                          magnitude_max));
-    }
-    digest.add(result);
-    append(scan.runs, result.run);
-  });
-  scan.digests = digest.finish();
-  const std::vector<RunRange> delivered = store.finished_runs();
-  violate_missing(scan.runs, delivered, "has a delivery and no result", scan);
-  violate_missing(delivered, scan.runs, "has a result and no delivery", scan);
-  return scan;
-}
-
-Check check_stored_statistics(const Store& store, const Campaign& campaign,
-                              const ResultScan& scan) {
-  const std::optional<Summary> summary = store.summary();
-  if (!summary) return check_first(store, campaign);
-  if (summary->num_finished == num_runs_in(scan.runs) && summary->digests == scan.digests &&
-      scan.num_violations == 0) {
-    return check_current(store, campaign, *summary, read_results(store, campaign));
-  }
-  const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
-                                    summary->num_not_finite + summary->num_no_draw +
-                                    summary->num_lost;
-  if (num_counted != summary->num_finished) {
-    return Check::fails(std::string(unfit),
-                        {fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
-                                     summary->num_finished, num_counted)});
-  }
-  return Check::not_checked("they are not of the results that are in the file");
-}
-
-Check check_stored_stop_checks(const Store& store, const Campaign& campaign,
-                               const ResultScan& scan) {
-  if (scan.num_violations > 0) return Check::not_checked("a result breaks its rule");
-  Lines lines = stop_check_differences(store, campaign.objectives());
-  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
-  const auto num_checks = static_cast<std::uint64_t>(store.stop_checks().size());
-  return Check::holds(num_checks == 0 ? "none" : fmt::format("{} of a stop rule", num_checks));
-}
-
-Check check_contradictions(const Store& store) {
-  const std::uint64_t num_compared = store.num_compared();
-  const std::vector<Contradiction> contradictions = store.contradictions();
-  if (contradictions.empty()) {
-    return Check::holds(num_compared == 0
-                            ? "no run was computed twice"
-                            : fmt::format("{} second {}: each is the stored one", num_compared,
-                                          num_compared == 1 ? "result" : "results"));
-  }
-  Lines lines;
-  for (const Contradiction& found : contradictions) {
-    lines.push_back(fmt::format("run {}: {} delivered {} (must be {}, as stored)", found.run.value,
-                                found.worker, found.second_digest, found.stored_digest));
-  }
-  return Check::fails(
-      fmt::format("{} of {} second results {} not the stored one: a worker computes "
-                  "wrongly",
-                  contradictions.size(), num_compared, contradictions.size() == 1 ? "is" : "are"),
-      std::move(lines));
 }
 
 }  // namespace proofmass::coordinator

@@ -221,18 +221,6 @@ std::unique_ptr<Campaign> example_campaign(const Model& of) {
   return of.read_campaign(document, files);
 }
 
-void require_identity(const Campaign& defined, const StoredIdentity& stored) {
-  const auto require_same = [](std::string_view field, const std::string& value,
-                               const std::string& expected) {
-    if (value == expected) return;
-    throw DefinitionError(fmt::format("campaign.{} = {} (must be {}, as in the definition)", field,
-                                      wire::visible_text(value), wire::visible_text(expected)));
-  };
-  require_same("name", stored.name, defined.name);
-  require_same("seed", stored.seed, fmt::to_string(defined.seed));
-  require_same("num_runs", stored.num_runs, fmt::to_string(defined.num_runs));
-}
-
 std::vector<std::string> definition_differences(const Campaign& stored, const Campaign& wanted) {
   std::vector<std::string> texts;
   for (const auto& [field, first, second] : stored.differences_from(wanted)) {

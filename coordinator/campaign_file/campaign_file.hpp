@@ -80,16 +80,6 @@ struct EnvironmentRequest {
 /// The campaign of Model::example().
 [[nodiscard]] std::unique_ptr<Campaign> example_campaign(const Model& of);
 
-/// What a database says of its campaign besides the definition, as text.
-struct StoredIdentity {
-  std::string name;
-  std::string seed;
-  std::string num_runs;
-};
-
-/// @throws DefinitionError if these are not of the campaign that the definition is of.
-void require_identity(const Campaign& defined, const StoredIdentity& stored);
-
 /// What keeps the runs of two campaigns from being compared or joined, a line each:
 /// `seed: 1 in the database, 2 asked for`. The number of runs is no difference, nor is the name of
 /// a data file whose values are the same.

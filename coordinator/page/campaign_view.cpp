@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "coordinator/charts/chart.hpp"
@@ -149,38 +150,26 @@ namespace {
 constexpr double chart_span_s = 1800.0;
 constexpr std::size_t chart_lanes_max = 24;
 
-double end_of(const ComputedRuns& computed) {
-  return static_cast<double>(computed.received_unix_s);
-}
-double begin_of(const ComputedRuns& computed) { return end_of(computed) - computed.compute_s; }
+double end_of(const RecentAttempt& attempt) { return static_cast<double>(attempt.unix_s); }
+double begin_of(const RecentAttempt& attempt) { return end_of(attempt) - attempt.compute_s; }
 
-std::string worker_name(const RecentAttempts& attempts, std::uint64_t key) {
-  const auto found = std::ranges::find(attempts.workers, key, &WorkerRecord::key);
-  return found == attempts.workers.end() ? fmt::format("worker {}", key) : found->name;
-}
-
-/// `run 17`, `16 runs, 32 to 47`.
-std::string runs_text(const std::vector<RunIndex>& runs) {
-  if (runs.size() == 1) return fmt::format("run {}", runs.front().value);
-  return fmt::format("{} runs, {} to {}", runs.size(), runs.front().value, runs.back().value);
-}
-
-std::string runs_text(const RunRange& runs) {
-  if (runs.count == 1) return fmt::format("run {}", runs.first.value);
-  return fmt::format("runs {} to {}", runs.first.value, runs.end() - 1);
+/// `run 17`, `16 runs, 32 to 47`; of lost ones, which are all in a row, `runs 32 to 47`.
+std::string runs_text(const RecentAttempt& of) {
+  if (of.num_runs == 1) return fmt::format("run {}", of.first.value);
+  return fmt::format("{} {} to {}",
+                     of.reason.empty() ? fmt::format("{} runs,", of.num_runs) : "runs",
+                     of.first.value, of.last.value);
 }
 
 /// The part of time that the chart shows, seconds since 1970: from the first attempt to the last
 /// one, at most chart_span_s.
 std::pair<double, double> shown_time(const RecentAttempts& attempts) {
   double begin_s = 1e300, end_s = 0.0;
-  for (const ComputedRuns& computed : attempts.computed) {
-    begin_s = std::min(begin_s, begin_of(computed));
-    end_s = std::max(end_s, end_of(computed));
-  }
-  for (const LostAttempt& lost : attempts.lost) {
-    begin_s = std::min(begin_s, static_cast<double>(lost.lost_unix_s));
-    end_s = std::max(end_s, static_cast<double>(lost.lost_unix_s));
+  for (const auto* const some : {&attempts.computed, &attempts.lost}) {
+    for (const RecentAttempt& attempt : *some) {
+      begin_s = std::min(begin_s, begin_of(attempt));
+      end_s = std::max(end_s, end_of(attempt));
+    }
   }
   begin_s = std::max(begin_s, end_s - chart_span_s);
   return {std::min(begin_s, end_s - 1.0), end_s};
@@ -193,22 +182,20 @@ std::vector<TimelineLane> lanes_of(const RecentAttempts& attempts, double last_s
   // have, as far as the second is known.
   constexpr double shift_s_max = 1.0;
   std::map<std::uint64_t, std::vector<TimelineLane>> lanes;
-  const auto lanes_of_worker = [&](std::uint64_t key) -> std::vector<TimelineLane>& {
-    std::vector<TimelineLane>& of_worker = lanes[key];
-    if (of_worker.empty()) of_worker.push_back({.label = worker_name(attempts, key)});
+  const auto lanes_of_worker = [&](const RecentAttempt& of) -> std::vector<TimelineLane>& {
+    std::vector<TimelineLane>& of_worker = lanes[of.worker_key];
+    if (of_worker.empty()) of_worker.push_back({.label = of.worker});
     return of_worker;
   };
-  for (const LostAttempt& lost : attempts.lost) {
-    const double time_s = static_cast<double>(lost.lost_unix_s) - last_s;
-    lanes_of_worker(lost.worker_key)
-        .front()
-        .marks.push_back(
-            {.begin = time_s,
-             .end = time_s,
-             .tooltip = fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)});
+  for (const RecentAttempt& lost : attempts.lost) {
+    const double time_s = end_of(lost) - last_s;
+    lanes_of_worker(lost).front().marks.push_back(
+        {.begin = time_s,
+         .end = time_s,
+         .tooltip = fmt::format("{} lost: {}", runs_text(lost), lost.reason)});
   }
-  for (const ComputedRuns& computed : attempts.computed) {
-    std::vector<TimelineLane>& of_worker = lanes_of_worker(computed.worker_key);
+  for (const RecentAttempt& computed : attempts.computed) {
+    std::vector<TimelineLane>& of_worker = lanes_of_worker(computed);
     const double end_s = end_of(computed) - last_s;
     const auto free_until = [&](const TimelineLane& lane) {
       return lane.bars.empty() ? end_s : std::min(end_s, lane.bars.back().begin);
@@ -218,11 +205,10 @@ std::vector<TimelineLane> lanes_of(const RecentAttempts& attempts, double last_s
     });
     if (lane == of_worker.end()) lane = of_worker.insert(lane, TimelineLane());
     const double placed_end_s = free_until(*lane);
-    lane->bars.push_back(
-        {.begin = placed_end_s - computed.compute_s,
-         .end = placed_end_s,
-         .tooltip = fmt::format("{}, {:.3g} s, attempt {}", runs_text(computed.runs),
-                                computed.compute_s, computed.attempt.value)});
+    lane->bars.push_back({.begin = placed_end_s - computed.compute_s,
+                          .end = placed_end_s,
+                          .tooltip = fmt::format("{}, {:.3g} s, attempt {}", runs_text(computed),
+                                                 computed.compute_s, computed.attempt.value)});
   }
   std::vector<TimelineLane> all;
   for (auto& [key, of_worker] : lanes) std::ranges::move(of_worker, std::back_inserter(all));
@@ -235,6 +221,10 @@ std::string attempts_chart(const RecentAttempts& attempts) {
   }
   const auto [begin_s, end_s] = shown_time(attempts);
   const double span_s = end_s - begin_s;
+  std::set<std::uint64_t> workers;
+  for (const auto* const some : {&attempts.computed, &attempts.lost}) {
+    for (const RecentAttempt& attempt : *some) workers.insert(attempt.worker_key);
+  }
   std::vector<TimelineLane> lanes = lanes_of(attempts, end_s);
   // Lanes end with the span of the chart: others have nothing to show.
   std::erase_if(lanes, [&](const TimelineLane& lane) {
@@ -247,7 +237,7 @@ std::string attempts_chart(const RecentAttempts& attempts) {
                .title = "Attempts by worker",
                .description = fmt::format("Batches: {}, losses: {}, workers: {}, within {:.0f} s.",
                                           attempts.computed.size(), attempts.lost.size(),
-                                          attempts.workers.size(), span_s)},
+                                          workers.size(), span_s)},
       .x = {.label = "time until the last result, s", .from = -span_s, .to = 0.0},
       .lanes = std::move(lanes)};
   std::string html = fmt::format(

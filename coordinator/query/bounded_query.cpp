@@ -63,19 +63,14 @@ class Watch {
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  void add(std::string_view rows) {
+  /// Hands on all rows once there are so many bytes of them.
+  void add(std::string_view rows, std::size_t size_min = buffer_size) {
     const std::lock_guard lock(mutex_);
     rows_ += rows;
-    if (rows_.size() >= buffer_size) hand_on();
+    if (rows_.size() >= size_min) hand_on();
     if (failure_) std::rethrow_exception(failure_);
   }
-
-  /// Hands on what is left.
-  void finish() {
-    const std::lock_guard lock(mutex_);
-    hand_on();
-    if (failure_) std::rethrow_exception(failure_);
-  }
+  void finish() { add({}, 0); }
 
  private:
   void watch() {

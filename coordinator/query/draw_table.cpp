@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <memory>
+#include <new>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,7 +18,7 @@
 #include <vector>
 
 #include "coordinator/query/aggregates.hpp"
-#include "coordinator/query/virtual_table-inl.hpp"
+#include "coordinator/query/database_campaigns.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
@@ -24,6 +27,162 @@ SQLITE_EXTENSION_INIT3
 
 namespace proofmass::coordinator {
 namespace {
+
+std::string text_of(sqlite3_value* value) {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_value_text(value));
+  return text == nullptr ? std::string()
+                         : std::string(text, static_cast<std::size_t>(sqlite3_value_bytes(value)));
+}
+
+/// What a plan may hand to the scan, in the order of its arguments; bit i of the plan's number says
+/// that it does. The first is the argument of the table.
+struct Offer {
+  int column;
+  unsigned char comparison = SQLITE_INDEX_CONSTRAINT_EQ;
+  bool is_lower = false;  ///< It bounds the runs from below.
+  bool is_upper = false;
+  bool is_text = false;  ///< It names something, byte by byte.
+};
+constexpr int campaign_bit = 1 << 0;
+
+// Takes the first usable constraint that fits an offer.
+void take(const Offer& offer, int bit, sqlite3_index_info& plan) {
+  for (int i = 0; i < plan.nConstraint; ++i) {
+    const auto& constraint = plan.aConstraint[i];
+    if (constraint.iColumn != offer.column || constraint.op != offer.comparison) continue;
+    if (constraint.usable == 0) continue;
+    if (offer.is_text && std::string_view(sqlite3_vtab_collation(&plan, i)) != "BINARY") continue;
+    plan.idxNum |= bit;
+    plan.aConstraintUsage[i].argvIndex = std::popcount(static_cast<unsigned>(plan.idxNum));
+    plan.aConstraintUsage[i].omit = bit == campaign_bit ? 1 : 0;
+    return;
+  }
+}
+
+/// A table of one connection that is computed from the campaign of a database, as SQLite calls it.
+/// A `Cursor` is a place in a statement that names the table. It is an sqlite3_vtab_cursor and has
+///
+///     name         of the table, for errors
+///     module       its name for SQLite
+///     declaration  the SQL of its columns
+///     creation     the SQL that makes it, in the temporary database of a connection
+///     argument     the number of the hidden column that holds the argument of the table: a name
+///                  as of DatabaseCampaigns
+///     campaign     which that means
+///
+///     static void choose_plan(sqlite3_index_info& plan)
+///     void begin(bool is_other_campaign, int plan, sqlite3_value** arguments)
+///     void next(), bool is_at_end() const, std::int64_t row() const
+///     void give_column(sqlite3_context* context, int number) const
+template <typename Cursor>
+struct VirtualTable : sqlite3_vtab {
+  sqlite3* connection = nullptr;
+  DatabaseCampaigns campaigns;
+
+  /// Makes the table known to a connection.
+  /// @returns SQLite's result code.
+  static int add_to(sqlite3* connection) {
+    static constexpr sqlite3_module module = make_module();
+    const int code =
+        sqlite3_create_module_v2(connection, Cursor::module, &module, nullptr, nullptr);
+    if (code != SQLITE_OK) return code;
+    return sqlite3_exec(connection, Cursor::creation, nullptr, nullptr, nullptr);
+  }
+
+ private:
+  // No exception passes SQLite: its text becomes the error of the statement.
+  template <typename Work>
+  static int guarded(sqlite3_vtab& table, const Work& work) noexcept {
+    try {
+      work();
+      return SQLITE_OK;
+    } catch (const std::bad_alloc&) {
+      return SQLITE_NOMEM;
+    } catch (const std::exception& error) {
+      sqlite3_free(table.zErrMsg);
+      table.zErrMsg = sqlite3_mprintf("%s: %s", Cursor::name, error.what());
+      return SQLITE_ERROR;
+    }
+  }
+
+  static int connect(sqlite3* connection, void*, int, const char* const*, sqlite3_vtab** table,
+                     char**) {
+    const int code = sqlite3_declare_vtab(connection, Cursor::declaration);
+    if (code != SQLITE_OK) return code;
+    auto* made = new (std::nothrow) VirtualTable();
+    if (made == nullptr) return SQLITE_NOMEM;
+    made->connection = connection;
+    *table = made;
+    return SQLITE_OK;
+  }
+
+  // If a statement names a campaign in a way that the plan cannot use, the plan would ignore it.
+  static int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
+    const std::span constraints(plan->aConstraint, static_cast<std::size_t>(plan->nConstraint));
+    const bool is_ignored = std::ranges::any_of(constraints, [&](const auto& constraint) {
+      return constraint.iColumn == Cursor::argument &&
+             constraint.op == SQLITE_INDEX_CONSTRAINT_EQ && constraint.usable == 0;
+    });
+    if (is_ignored) return SQLITE_CONSTRAINT;
+    take({Cursor::argument}, campaign_bit, *plan);
+    Cursor::choose_plan(*plan);
+    return SQLITE_OK;
+  }
+
+  static int filter(sqlite3_vtab_cursor* cursor, int plan, const char*, int,
+                    sqlite3_value** values) {
+    auto& table = *static_cast<VirtualTable*>(cursor->pVtab);
+    return guarded(table, [&] {
+      std::optional<std::string> name;
+      if ((plan & campaign_bit) != 0) {
+        sqlite3_value* const argument = *values++;
+        if (sqlite3_value_type(argument) != SQLITE_NULL) name = text_of(argument);
+      }
+      const auto meant = table.campaigns.current(table.connection, name);
+      const bool is_other = std::exchange(of(cursor).campaign, meant) != meant;
+      of(cursor).begin(is_other, plan, values);
+    });
+  }
+
+  static Cursor& of(sqlite3_vtab_cursor* cursor) { return *static_cast<Cursor*>(cursor); }
+
+  static constexpr sqlite3_module make_module() {
+    sqlite3_module module{};
+    module.xConnect = connect;
+    // Another function than connect(): if both were the same, SQLite would take the table for one
+    // that exists without having been created, and find it under the name of any database.
+    // `other.draw` would then hold the runs of another campaign than the name says.
+    module.xCreate = [](sqlite3* connection, void* nothing, int num_arguments,
+                        const char* const* arguments, sqlite3_vtab** table, char** error) {
+      return connect(connection, nothing, num_arguments, arguments, table, error);
+    };
+    module.xBestIndex = choose_plan;
+    module.xDisconnect = module.xDestroy = [](sqlite3_vtab* table) {
+      delete static_cast<VirtualTable*>(table);
+      return SQLITE_OK;
+    };
+    module.xOpen = [](sqlite3_vtab* table, sqlite3_vtab_cursor** cursor) {
+      return guarded(*table, [&] { *cursor = std::make_unique<Cursor>().release(); });
+    };
+    module.xClose = [](sqlite3_vtab_cursor* cursor) {
+      delete &of(cursor);
+      return SQLITE_OK;
+    };
+    module.xFilter = filter;
+    module.xNext = [](sqlite3_vtab_cursor* cursor) {
+      return guarded(*cursor->pVtab, [&] { of(cursor).next(); });
+    };
+    module.xEof = [](sqlite3_vtab_cursor* cursor) { return of(cursor).is_at_end() ? 1 : 0; };
+    module.xColumn = [](sqlite3_vtab_cursor* cursor, sqlite3_context* context, int number) {
+      return guarded(*cursor->pVtab, [&] { of(cursor).give_column(context, number); });
+    };
+    module.xRowid = [](sqlite3_vtab_cursor* cursor, sqlite3_int64* identifier) {
+      *identifier = of(cursor).row();
+      return SQLITE_OK;
+    };
+    return module;
+  }
+};
 
 enum DrawColumn : int {
   run_index_column,
@@ -48,10 +207,10 @@ struct DrawCursor : sqlite3_vtab_cursor {
       "campaign TEXT HIDDEN)";
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw";
-  static constexpr int argument_column = draw_campaign_column;
+  static constexpr int argument = draw_campaign_column;
 
   static void choose_plan(sqlite3_index_info& plan);
-  void begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value** arguments);
+  void begin(bool is_other_campaign, int plan, sqlite3_value** arguments);
   void next();
   [[nodiscard]] bool is_at_end() const { return run >= scan.end_run; }
   [[nodiscard]] std::int64_t row() const;
@@ -69,41 +228,18 @@ struct DrawCursor : sqlite3_vtab_cursor {
   std::vector<double> values;  ///< Those its simulation begins with; empty without a draw.
 };
 
-/// What a plan may hand to the scan, in the order of its arguments; bit i of the plan's number says
-/// that it does.
-struct Offer {
-  int column;
-  unsigned char comparison;
-  bool is_lower = false;  ///< It bounds the runs from below.
-  bool is_upper = false;
-  bool is_text = false;  ///< It names something, byte by byte.
-};
-
-constexpr std::array<Offer, 7> offers{{
-    {draw_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ},
-    {.column = quantity_column, .comparison = SQLITE_INDEX_CONSTRAINT_EQ, .is_text = true},
+constexpr std::array<Offer, 6> offers{{
+    {.column = quantity_column, .is_text = true},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_EQ, true, true},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_GT, true, false},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_GE, true, false},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_LT, false, true},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_LE, false, true},
 }};
-constexpr int campaign_bit = 1 << 0;
-constexpr int quantity_bit = 1 << 1;
-constexpr int run_bit = 1 << 2;
-constexpr int range_bits = 0b1111 << 3;
-
-// The place of the first usable constraint that fits an offer.
-std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info& plan) {
-  for (int i = 0; i < plan.nConstraint; ++i) {
-    const auto& constraint = plan.aConstraint[i];
-    if (constraint.iColumn != offer.column || constraint.op != offer.comparison) continue;
-    if (constraint.usable == 0) continue;
-    if (offer.is_text && std::string_view(sqlite3_vtab_collation(&plan, i)) != "BINARY") continue;
-    return i;
-  }
-  return std::nullopt;
-}
+constexpr int bit_of(std::size_t offer) { return campaign_bit << (offer + 1); }
+constexpr int quantity_bit = bit_of(0);
+constexpr int run_bit = bit_of(1);
+constexpr int range_bits = bit_of(2) | bit_of(3) | bit_of(4) | bit_of(5);
 
 // A campaign of medium size; a draw costs as much as a dozen rows.
 void estimate_cost(sqlite3_index_info& plan) {
@@ -118,14 +254,7 @@ void estimate_cost(sqlite3_index_info& plan) {
 }
 
 void DrawCursor::choose_plan(sqlite3_index_info& plan) {
-  int num_arguments = 0;
-  for (std::size_t i = 0; i < offers.size(); ++i) {
-    const std::optional<int> constraint = constraint_for(offers[i], plan);
-    if (!constraint) continue;
-    plan.idxNum |= 1 << i;
-    plan.aConstraintUsage[*constraint].argvIndex = ++num_arguments;
-    plan.aConstraintUsage[*constraint].omit = offers[i].column == draw_campaign_column;
-  }
+  for (std::size_t i = 0; i < offers.size(); ++i) take(offers[i], bit_of(i), plan);
   estimate_cost(plan);
   plan.orderByConsumed = plan.nOrderBy == 1 && plan.aOrderBy[0].desc == 0 &&
                          plan.aOrderBy[0].iColumn == run_index_column;
@@ -164,19 +293,11 @@ void DrawCursor::go_to_run(std::uint64_t index) {
   last_run = RunIndex{run};
 }
 
-// Without an argument, the main database is meant.
-void DrawCursor::begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value** arguments) {
-  const bool is_named = (plan & campaign_bit) != 0;
-  const auto meant = table.campaigns.current(
-      table.connection, is_named ? database_of(table.connection, arguments[0]) : "main");
-  if (std::exchange(campaign, meant) != meant) last_run.reset();
+void DrawCursor::begin(bool is_other_campaign, int plan, sqlite3_value** arguments) {
+  if (is_other_campaign) last_run.reset();
   scan = {.first_run = 0, .end_run = campaign->num_runs, .quantity = {}};
   for (std::size_t i = 0; i < offers.size(); ++i) {
-    if ((plan & (1 << i)) == 0) continue;
-    sqlite3_value* value = *arguments++;
-    if (offers[i].column != draw_campaign_column) {
-      narrow(scan, offers[i], drawn(), value);
-    }
+    if ((plan & bit_of(i)) != 0) narrow(scan, offers[i], drawn(), *arguments++);
   }
   go_to_run(scan.first_run);
 }
@@ -190,23 +311,26 @@ std::int64_t DrawCursor::row() const {
   return static_cast<std::int64_t>(run * drawn().size() + quantity);
 }
 
-void set_text(sqlite3_context* context, std::string_view text) {
+// Gives SQLite a value with its own type.
+void set(sqlite3_context* context, std::string_view text) {
   sqlite3_result_text(context, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
 }
+void set(sqlite3_context* context, std::int64_t number) { sqlite3_result_int64(context, number); }
+void set(sqlite3_context* context, double number) { sqlite3_result_double(context, number); }
 
 void DrawCursor::give_column(sqlite3_context* context, int number) const {
   switch (number) {
     case run_index_column:
-      return sqlite3_result_int64(context, static_cast<sqlite3_int64>(run));
+      return set(context, static_cast<std::int64_t>(run));
     case quantity_column:
-      return set_text(context, drawn()[quantity].name);
+      return set(context, drawn()[quantity].name);
     case unit_column:
-      return set_text(context, drawn()[quantity].unit);
+      return set(context, drawn()[quantity].unit);
     case draw_value_column:
-      if (!values.empty()) sqlite3_result_double(context, values[quantity]);
+      if (!values.empty()) set(context, values[quantity]);
       return;
     default:
-      set_text(context, campaign->name);
+      set(context, campaign->name);
   }
 }
 
@@ -220,10 +344,10 @@ struct DefinitionCursor : sqlite3_vtab_cursor {
       "CREATE TABLE definition_entry(key TEXT, value, campaign TEXT HIDDEN)";
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.definition_entry USING proofmass_definition";
-  static constexpr int argument_column = entry_campaign_column;
+  static constexpr int argument = entry_campaign_column;
 
   static void choose_plan(sqlite3_index_info& plan);
-  void begin(VirtualTable<DefinitionCursor>& table, int plan, sqlite3_value** arguments);
+  void begin(bool is_other_campaign, int plan, sqlite3_value** arguments);
   void next() { ++position; }
   [[nodiscard]] bool is_at_end() const { return position >= items.size(); }
   [[nodiscard]] std::int64_t row() const { return static_cast<std::int64_t>(position); }
@@ -234,45 +358,26 @@ struct DefinitionCursor : sqlite3_vtab_cursor {
   std::size_t position = 0;
 };
 
-// The number of the plan is that of the arguments which the scan gets: the campaign or none.
 void DefinitionCursor::choose_plan(sqlite3_index_info& plan) {
-  if (const auto i = constraint_for({entry_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ}, plan)) {
-    plan.idxNum = 1;
-    plan.aConstraintUsage[*i].argvIndex = 1;
-    plan.aConstraintUsage[*i].omit = 1;
-  }
   constexpr int num_keys_expected = 500;
   plan.estimatedCost = num_keys_expected;
   plan.estimatedRows = num_keys_expected;
 }
 
-void DefinitionCursor::begin(VirtualTable<DefinitionCursor>& table, int plan,
-                             sqlite3_value** arguments) {
-  const std::string database = plan == 0 ? "main" : database_of(table.connection, arguments[0]);
-  const auto meant = table.campaigns.current(table.connection, database);
-  if (std::exchange(campaign, meant) != meant) items = campaign->items();
+void DefinitionCursor::begin(bool is_other_campaign, int /*plan*/, sqlite3_value** /*arguments*/) {
+  if (is_other_campaign) items = campaign->items();
   position = 0;
 }
 
-/// Gives SQLite a value with its own type.
-struct SetValue {
-  sqlite3_context* context;
-
-  void operator()(std::int64_t number) const { sqlite3_result_int64(context, number); }
-  void operator()(double number) const { sqlite3_result_double(context, number); }
-  void operator()(const std::string& text) const { set_text(context, text); }
-};
-
 void DefinitionCursor::give_column(sqlite3_context* context, int number) const {
   const DefinitionItem& item = items[position];
-  const SetValue set{context};
   switch (number) {
     case key_column:
-      return set(item.key);
+      return set(context, item.key);
     case entry_value_column:
-      return std::visit(set, item.value);
+      return std::visit([&](const auto& value) { set(context, value); }, item.value);
     default:
-      set(campaign->name);
+      set(context, campaign->name);
   }
 }
 

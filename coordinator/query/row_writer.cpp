@@ -23,7 +23,10 @@ struct TextOf {
   std::string operator()(std::int64_t value) const { return std::to_string(value); }
   std::string operator()(double value) const { return shortest_text(value); }
   std::string operator()(std::string_view text) const { return std::string(text); }
-  std::string operator()(const Blob& blob) const { return blob_text(blob); }
+  std::string operator()(const Blob& blob) const {
+    const auto* const bytes = reinterpret_cast<const unsigned char*>(blob.bytes.data());
+    return fmt::format("x'{:02x}'", fmt::join(bytes, bytes + blob.bytes.size(), ""));
+  }
 };
 
 }  // namespace
@@ -33,11 +36,6 @@ std::string shortest_text(double value) {
   const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
   PROOFMASS_EXPECT(error == std::errc());
   return {text.data(), end};
-}
-
-std::string blob_text(const Blob& blob) {
-  const auto* const bytes = reinterpret_cast<const unsigned char*>(blob.bytes.data());
-  return fmt::format("x'{:02x}'", fmt::join(bytes, bytes + blob.bytes.size(), ""));
 }
 
 std::string text_of(const Value& value) { return std::visit(TextOf{}, value); }

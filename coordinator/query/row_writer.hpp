@@ -23,10 +23,7 @@ using Value = std::variant<std::monostate, std::int64_t, double, std::string_vie
 /// The shortest text that reads back as the same double: `0.1`, `1e+20`, `-0`, `inf`.
 [[nodiscard]] std::string shortest_text(double value);
 
-/// Bytes as SQL writes them: `x'00ff'`.
-[[nodiscard]] std::string blob_text(const Blob& blob);
-
-/// Numbers in shortest form, text as it is, bytes as blob_text(), NULL as nothing.
+/// Numbers in shortest form, text as it is, bytes as SQL writes them, `x'00ff'`, NULL as nothing.
 [[nodiscard]] std::string text_of(const Value& value);
 
 [[nodiscard]] bool is_number(const Value& value);

@@ -278,38 +278,33 @@ void write_statistics(Store& store, const Campaign& campaign, const ReadResults&
                          results.warnings.first);
 }
 
-namespace {
-
-/// Two numbers of 32 bits as one, whose bytes are theirs one after the other.
-std::uint64_t pair_of(std::uint32_t first, std::uint32_t second) {
-  return first | std::uint64_t{second} << 32;
-}
-
-/// As many as there are; zeros where they mean nothing.
-void add_numbers(const std::vector<double>& values, bool have_meaning, std::size_t count,
-                 Sha256& hash) {
-  for (std::size_t i = 0; i < count; ++i) hash.add(have_meaning ? values[i] : 0.0);
-}
-
-}  // namespace
-
 Digest::Digest(const ResultSchema& schema) : num_quantities_(schema.quantities.size()) {}
 
 void Digest::add(const RunResult& result) {
+  const auto add_all = [](const std::vector<double>& values, Sha256& hash) {
+    for (const double value : values) hash.add(value);
+  };
+  const auto add_if = [&](bool has_meaning, const std::vector<double>& values) {
+    for (std::size_t i = 0; i < num_quantities_; ++i) hash_.add(has_meaning ? values[i] : 0.0);
+  };
   hash_.add(result.run.value);
-  hash_.add(pair_of(static_cast<std::uint32_t>(result.status), result.num_draws));
-  hash_.add(pair_of(result.num_rounds, 0));
-  add_numbers(result.truth, result.has_truth(), num_quantities_, hash_);
-  add_numbers(result.estimate, result.has_estimate(), num_quantities_, hash_);
-  for (const auto* const values : {&result.standard_error, &result.fit, &result.correlations}) {
-    add_numbers(*values, true, values->size(), hash_);
-  }
+  hash_.add(static_cast<std::uint32_t>(result.status));
+  hash_.add(result.num_draws);
+  hash_.add(result.num_rounds);
+  hash_.add(std::uint32_t{0});
+  add_if(result.has_truth(), result.truth);
+  add_if(result.has_estimate(), result.estimate);
+  add_all(result.standard_error, hash_);
+  add_all(result.fit, hash_);
+  add_all(result.correlations, hash_);
+
   if (result.health.empty()) return;
   has_health_ = true;
   health_hash_.add(result.run.value);
-  add_numbers(result.health, true, result.health.size(), health_hash_);
+  add_all(result.health, health_hash_);
   const Loss loss = result.status == RunStatus::lost ? result.loss : Loss{};
-  health_hash_.add(pair_of(loss.cause, loss.session));
+  health_hash_.add(loss.cause);
+  health_hash_.add(loss.session);
 }
 
 ResultDigests Digest::finish() {
@@ -335,12 +330,9 @@ std::optional<Summary> summary_of_all(const Store& store, std::uint64_t num_resu
     if (store.has_statistics()) store.refuse_as_damaged("its statistics are there without summary");
     return std::nullopt;
   }
-  const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
-                                    summary->num_not_finite + summary->num_no_draw +
-                                    summary->num_lost;
-  if (summary->num_finished != num_counted) {
+  if (summary->num_finished != summary->num_counted) {
     store.refuse_as_damaged(fmt::format("summary.num_finished is {} and its kinds are {}",
-                                        summary->num_finished, num_counted));
+                                        summary->num_finished, summary->num_counted));
   }
   if (num_results < summary->num_finished) {
     store.refuse_as_damaged(fmt::format("it has {} results, and its statistics are of {}",

@@ -112,8 +112,10 @@ Table execution_table(const Review& review) {
   Table table = facts(
       "execution", "How it was computed",
       {{"time of processor cores", duration_text(execution.compute_s)},
-       {"first and last result", execution.first_result_utc.value_or("none") + " to " +
-                                     execution.last_result_utc.value_or("none")},
+       {"first and last result",
+        execution.first_result_utc.empty()
+            ? "none to none"
+            : execution.first_result_utc + " to " + execution.last_result_utc},
        {"workers",
         fmt::format("{} on {}", execution.num_workers, counted(execution.num_hosts, "machine"))},
        {"starts of a coordinator", std::to_string(execution.num_coordinators)},

@@ -18,16 +18,16 @@ using detail::Database;
 
 CampaignRecord read_record(const Database& database) {
   const CampaignControl control = detail::read_control(database);
-  CampaignRecord record{.id = {database.count("SELECT campaign_uid FROM campaign")},
-                        .seed = detail::read_seed(database),
-                        .created_utc = database.text("SELECT created_utc FROM campaign")};
-  record.status.set_name(database.text("SELECT name FROM campaign"));
+  const detail::Statement row = database.first_row(
+      "SELECT campaign_uid, created_utc, name, num_runs, model_version, owner FROM campaign");
+  CampaignRecord record{
+      .id = {row.count(0)}, .seed = detail::read_seed(database), .created_utc = row.text(1)};
+  record.status.set_name(row.text(2));
   record.status.set_phase(wire::message_value(control.phase));
   record.status.set_priority(control.priority);
-  record.status.set_num_runs(database.count("SELECT num_runs FROM campaign"));
-  record.status.set_model_version(
-      wire::name_from(database.text("SELECT model_version FROM campaign")));
-  record.status.set_owner(database.text("SELECT owner FROM campaign"));
+  record.status.set_num_runs(row.count(3));
+  record.status.set_model_version(wire::name_from(row.text(4)));
+  record.status.set_owner(row.text(5));
   return record;
 }
 

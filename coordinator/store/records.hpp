@@ -149,14 +149,14 @@ struct CampaignExecution {
   std::uint64_t num_coordinators = 0;  ///< Starts of one.
   std::uint64_t num_workers = 0;
   std::uint64_t num_hosts = 0;
-  double compute_s = 0.0;        ///< Of the results that were kept; time of processor cores.
-  std::vector<HostShare> hosts;  ///< At most 20, those with the most results first.
+  double compute_s = 0.0;          ///< Of the results that were kept; time of processor cores.
+  std::uint64_t num_retried = 0;   ///< Results that were kept of a later attempt than the first.
+  std::uint64_t num_audited = 0;   ///< Results that were compared with a second one.
+  std::string first_result_utc{};  ///< Empty if there is none.
+  std::string last_result_utc{};
+  std::vector<HostShare> hosts{};  ///< At most 20, those with the most results first.
   /// By reason and whether they are blamed, the one with the most runs first.
-  std::vector<LossCount> losses;
-  std::uint64_t num_retried = 0;  ///< Results that were kept of a later attempt than the first.
-  std::uint64_t num_audited = 0;  ///< Results that were compared with a second one.
-  std::optional<std::string> first_result_utc;
-  std::optional<std::string> last_result_utc;
+  std::vector<LossCount> losses{};
 };
 
 /// When a campaign ends before all of its runs are finished.
@@ -201,17 +201,9 @@ struct ResultDigests {
 /// What the stored statistics were computed from.
 struct Summary {
   std::uint64_t num_finished = 0;
-  std::uint64_t num_estimated = 0;  ///< Completed.
-  std::uint64_t num_not_converged = 0;
-  std::uint64_t num_not_finite = 0;
-  std::uint64_t num_no_draw = 0;
-  std::uint64_t num_lost = 0;
+  std::uint64_t num_counted = 0;   ///< Those of each status together: as many.
   std::uint64_t num_given_up = 0;  ///< Not among the finished ones.
-  std::uint64_t num_within_objectives = 0;
-  /// Their share, as CampaignStatistics::within_objectives() has it.
-  std::optional<Interval> within_objectives{};
   ResultDigests digests;
-  std::string computed_utc;
 
   bool operator==(const Summary&) const = default;
 };
@@ -260,37 +252,25 @@ struct GivenUpRecord {
   std::string given_up_utc = {};
 };
 
-/// Runs that one thread of a worker computed together and delivered within one second.
-struct ComputedRuns {
-  std::vector<RunIndex> runs = {};  ///< Ascending.
-  wire::Attempt attempt = {};
+/// Runs that one thread of a worker computed together and delivered within one second, or that came
+/// back without a result.
+struct RecentAttempt {
   std::uint64_t worker_key = 0;
-  double compute_s = 0.0;             ///< Of all of them.
-  std::uint64_t received_unix_s = 0;  ///< When the results came.
-};
-
-/// Runs that came back without a result.
-struct LostAttempt {
-  RunRange runs = {};
+  std::string worker = {};  ///< Its name.
+  std::uint64_t num_runs = 1;
+  RunIndex first = {};
+  RunIndex last = {};
   wire::Attempt attempt = {};
-  std::uint64_t worker_key = 0;
-  std::string reason = {};
-  std::uint64_t lost_unix_s = 0;
-};
-
-/// A worker that delivered or lost runs.
-struct WorkerRecord {
-  std::uint64_t key = 0;
-  std::string name = {};
-  std::string host = {};
+  double compute_s = 0.0;    ///< Of all of them; 0 without a result.
+  std::uint64_t unix_s = 0;  ///< When the results came, or the runs were lost.
+  std::string reason = {};   ///< Of a loss.
 };
 
 /// The newest attempts of a campaign.
 struct RecentAttempts {
-  std::vector<ComputedRuns> computed = {};  ///< The newest first.
-  std::vector<LostAttempt> lost = {};       ///< The newest first.
-  std::vector<WorkerRecord> workers = {};   ///< The workers of `computed` and `lost`, by key.
-  std::uint64_t num_runs_left_out = 0;      ///< Older delivered runs.
+  std::vector<RecentAttempt> computed = {};  ///< The newest first.
+  std::vector<RecentAttempt> lost = {};      ///< The newest first.
+  std::uint64_t num_runs_left_out = 0;       ///< Older delivered runs.
 };
 
 }  // namespace proofmass::coordinator

@@ -77,7 +77,7 @@ Store Store::create_filled(const std::filesystem::path& path, const Campaign& ca
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   detail::check_absence(path);
-  detail::appear_complete(path, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
+  detail::appear_complete(path, [&](const std::filesystem::path& draft) {
     write_draft(draft, campaign, definition, fill);
   });
   return Store(std::make_unique<Impl>(path, std::move(lock)));
@@ -217,13 +217,6 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
   while (const std::optional<RunResult> result = reader.next()) visit(*result);
 }
 
-void Store::for_each_error(std::size_t quantity, std::uint64_t num_runs,
-                           const std::function<void(double)>& visit) const {
-  detail::Statement row = detail::select_errors(impl_->database, schema().quantities[quantity]);
-  row.bind_all(num_runs);
-  while (row.step()) visit(row.real(0));
-}
-
 ResultReader Store::results() const { return {impl_->database, schema()}; }
 
 ResultReader Store::results(RunRange runs) const { return {impl_->database, schema(), runs}; }
@@ -270,10 +263,9 @@ void Store::back_up(const std::filesystem::path& destination,
   check_name(destination);
   const detail::StoreLock lock(destination, detail::IfNoLocks::go_on);
   detail::check_absence(destination);
-  detail::appear_complete(destination, wire::IfThere::keep,
-                          [&](const std::filesystem::path& draft) {
-                            detail::copy_whole(impl_->database, impl_->path, draft, on_part);
-                          });
+  detail::appear_complete(destination, [&](const std::filesystem::path& draft) {
+    detail::copy_whole(impl_->database, impl_->path, draft, on_part);
+  });
 }
 
 }  // namespace proofmass::coordinator

@@ -148,11 +148,9 @@ class Store {
   [[nodiscard]] std::string table_digest() const;
   /// The digest of what the tables hold now; it differs if a number in them has changed.
   [[nodiscard]] std::string computed_table_digest() const;
-  /// The data that all runs share.
-  [[nodiscard]] std::vector<DataTable> data_tables() const;
-
-  /// Values of `table` quantities for each run, as in Campaign::table_columns.
-  [[nodiscard]] std::vector<std::vector<double>> table_columns() const;
+  /// The campaign of the definition, which may have been changed: see stored_campaign().
+  /// @throws DefinitionError if it is none, or another one's.
+  [[nodiscard]] std::shared_ptr<const Campaign> campaign() const;
 
   /// Raises the number of runs; takes the table values of the new ones.
   /// @pre It is the campaign of the file: the caller has compared them.
@@ -272,11 +270,13 @@ class Store {
   /// definition, a line each: `parameter.unit of gain = m (must be 1)`. Numbers are equal if
   /// their bits are.
   [[nodiscard]] std::vector<std::string> parameter_differences(const Campaign& campaign) const;
-  /// What `statistic`, `budget_entry` and `run_warning` have other than write_statistics() would
-  /// store, a line each; only the first in a file that was made before there were the others.
+  /// What `summary`, `statistic`, `budget_entry` and `run_warning` have other than
+  /// write_statistics() would store, a line each; only the first two in a file that was made before
+  /// there were the others.
+  /// @param summary  As it is stored; its digests and the runs that are given up are not compared.
   [[nodiscard]] std::vector<std::string> statistic_differences(
       const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget,
-      std::span<const RunWarning> warnings) const;
+      std::span<const RunWarning> warnings, const std::optional<Summary>& summary) const;
   /// What rows of `stop_check` have other than these; there may be more of them.
   [[nodiscard]] std::vector<std::string> stop_check_differences(
       std::span<const StopCheckRow> expected) const;

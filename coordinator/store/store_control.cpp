@@ -4,14 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
-#include <charconv>
 #include <cstddef>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "coordinator/store/detail/database.hpp"
@@ -57,178 +53,25 @@ void check_blamed_attempts(const Database& database) {
   Statement select = database.prepare(
       "SELECT first_run, num_runs FROM attempt"
       " WHERE is_blamed AND (first_run + num_runs > ? OR first_run < 0 OR num_runs < 0)");
-  select.bind(1, num_runs);
+  select.bind_all(num_runs);
   if (!select.step()) return;
   database.refuse_as_damaged(fmt::format("attempt at runs {} to {}, of {} there are",
                                          select.count(0), select.count(0) + select.count(1) - 1,
                                          num_runs));
 }
 
-wire::SessionId session_of(const std::string& digits) {
-  wire::SessionId session;
-  const char* const end = digits.data() + digits.size();
-  const auto [stop, error] = std::from_chars(digits.data(), end, session.value, 16);
-  if (error == std::errc() && stop == end) return session;
-  throw StoreError(fmt::format("worker.session = {} (must be hexadecimal)", digits));
-}
-
-wire::Attempt attempt_in(const Statement& row, int column) {
-  return {static_cast<decltype(wire::Attempt::value)>(row.count(column))};
-}
-
-bool is_of_batch(const ComputedRuns& batch, const Statement& row) {
-  return batch.worker_key == row.count(1) && batch.attempt == attempt_in(row, 2) &&
-         batch.received_unix_s == row.count(4);
-}
-
-/// Runs of one batch have the same share of its time, to the bit, and come in one message.
-std::vector<ComputedRuns> computed_runs(const Database& database, std::size_t num_runs_max) {
-  Statement row = database.prepare(
-      "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM "
-      "(SELECT * FROM delivery ORDER BY received_unix_s DESC, run_index LIMIT ?) "
-      "ORDER BY received_unix_s DESC, worker_key, compute_s, attempt, run_index");
-  row.bind_all(static_cast<std::uint64_t>(num_runs_max));
-  std::vector<ComputedRuns> computed;
-  std::uint64_t last_share_bits = 0;
-  while (row.step()) {
-    const double share_s = row.real(3);
-    const auto share_bits = std::bit_cast<std::uint64_t>(share_s);
-    const bool is_same_share = share_bits == std::exchange(last_share_bits, share_bits);
-    if (computed.empty() || !is_same_share || !is_of_batch(computed.back(), row)) {
-      computed.push_back({.runs = {},
-                          .attempt = attempt_in(row, 2),
-                          .worker_key = row.count(1),
-                          .received_unix_s = row.count(4)});
-    }
-    computed.back().runs.push_back({row.count(0)});
-    computed.back().compute_s = share_s * static_cast<double>(computed.back().runs.size());
-  }
-  return computed;
-}
-
-std::vector<LostAttempt> lost_attempts(const Database& database, std::size_t count_max) {
-  const auto lost = [](const Statement& row) {
-    return LostAttempt{.runs = {{row.count(0)}, row.count(1)},
-                       .attempt = attempt_in(row, 2),
-                       .worker_key = row.count(3),
-                       .reason = row.text(4),
-                       .lost_unix_s = row.count(5)};
-  };
-  return rows_of(
-      database,
-      "SELECT first_run, num_runs, attempt, worker_key, reason, lost_unix_s FROM attempt "
-      "ORDER BY attempt_id DESC LIMIT ?",
-      lost, std::uint64_t{count_max});
-}
-
-std::vector<WorkerRecord> worker_records(const Database& database, const RecentAttempts& attempts) {
-  std::set<std::uint64_t> keys;
-  for (const ComputedRuns& computed : attempts.computed) keys.insert(computed.worker_key);
-  for (const LostAttempt& lost : attempts.lost) keys.insert(lost.worker_key);
-  Statement row = database.prepare("SELECT worker, host FROM worker WHERE worker_key = ?");
-  std::vector<WorkerRecord> workers;
-  for (const std::uint64_t key : keys) {
-    row.bind_all(key);
-    if (!row.step()) continue;
-    workers.push_back({.key = key, .name = row.text(0), .host = row.text(1)});
-    row.finish();
-  }
-  return workers;
-}
-
-std::vector<HostShare> read_hosts(const Database& database) {
-  const auto host = [](const Statement& row) {
-    return HostShare{.host = row.text(0),
-                     .num_workers = row.count(1),
-                     .num_results = row.count(2),
-                     .compute_s = row.real(3),
-                     .serving_s = row.real(4),
-                     .cards = row.text(5)};
-  };
-  return rows_of(database,
-                 "SELECT host, count(*), sum(num_results), sum(compute_s),"
-                 " ifnull(max(last_result_unix_s) - min(unixepoch(first_seen_utc)), 0),"
-                 " ifnull(group_concat(DISTINCT nullif(cards, '')), '') "
-                 "FROM worker GROUP BY host ORDER BY sum(num_results) DESC, host LIMIT 20",
-                 host);
-}
-
 /// Reasons are words of this program; a file from elsewhere may have any number of others.
 /// @param keys  Columns of which each combination is counted by itself.
 std::vector<LossCount> losses_by(const Database& database, std::string_view keys) {
-  const auto loss = [](const Statement& row) {
-    return LossCount{.reason = row.text(0),
-                     .num_losses = row.count(1),
-                     .num_runs = row.count(2),
-                     .num_blamed = row.count(3)};
-  };
-  return rows_of(database,
-                 fmt::format("SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt "
-                             "GROUP BY {0} ORDER BY 3 DESC, {0} LIMIT 20",
-                             keys),
-                 loss);
-}
-
-std::optional<std::string> utc_of(const Database& database, std::string_view bound) {
-  Statement row = database.prepare("SELECT strftime('%Y-%m-%dT%H:%M:%SZ', " + std::string(bound) +
-                                   "(received_unix_s), 'unixepoch') FROM delivery");
-  if (!row.step()) return std::nullopt;
-  std::string text = row.text(0);
-  if (text.empty()) return std::nullopt;
-  return text;
+  return detail::structs_of<LossCount, 4>(
+      database, fmt::format("SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt "
+                            "GROUP BY {0} ORDER BY 3 DESC, {0} LIMIT 20",
+                            keys));
 }
 
 }  // namespace
 
 CampaignControl Store::control() const { return detail::read_control(impl_->database); }
-
-StopPlan Store::stop_plan() const {
-  const Statement select =
-      impl_->database.first_row("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
-  return {.stop_rule = select.text(0),
-          .num_runs_max = select.optional_count(1),
-          .failures_max = select.optional_count(2)};
-}
-
-void Store::set_stop_plan(const StopPlan& plan) {
-  impl_->commit([&](Database& database) {
-    database
-        .prepare(
-            "UPDATE campaign SET stop_rule = ?1, num_runs_max = ?2, failures_max = ?3,"
-            " phase = iif(phase = 'finished' AND ?1 <> ''"
-            " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
-        .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
-    detail::fix_num_runs(database);
-    detail::write_table_digest(database, model());
-  });
-}
-
-std::optional<std::uint64_t> Store::num_runs_fixed() const {
-  return detail::read_num_runs_fixed(impl_->database);
-}
-
-void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic,
-                              const StopCheck& check) {
-  impl_->commit([&](Database& database) {
-    detail::replace_stop_check(database, num_runs, statistic, check);
-  });
-}
-
-std::vector<StopCheckRow> Store::stop_checks() const {
-  const auto check = [](const Statement& row) {
-    return StopCheckRow{.statistic = row.text(0),
-                        .num_runs = row.count(1),
-                        .check = {.is_reached = row.integer(2) != 0,
-                                  .estimate = row.real(3),
-                                  .interval = row.interval(4),
-                                  .relative_half_width = row.optional_real(6)}};
-  };
-  return rows_of(
-      impl_->database,
-      "SELECT statistic, num_runs, is_reached, estimate, lower, upper, relative_half_width "
-      "FROM stop_check ORDER BY statistic, num_runs",
-      check);
-}
 
 std::uint64_t Store::num_without_estimate() const {
   return impl_->database.count("SELECT count(*) FROM run_result WHERE status <> 1");
@@ -253,21 +96,16 @@ std::vector<RunRange> Store::given_up_runs() const {
 std::vector<BlamedRun> Store::blamed_runs() const {
   const detail::ReadTransaction one_state(impl_->database);
   check_blamed_attempts(impl_->database);
-  const auto blamed = [](const Statement& row) {
-    return BlamedRun{.run = RunIndex{row.count(0)},
-                     .num_crashes = static_cast<std::uint32_t>(row.count(1)),
-                     .attempt = {static_cast<std::uint32_t>(row.count(2))}};
-  };
-  return rows_of(impl_->database,
-                 "WITH RECURSIVE blamed (run, last, attempt) AS ("
-                 " SELECT first_run, first_run + num_runs - 1, attempt FROM attempt"
-                 " WHERE is_blamed AND num_runs > 0"
-                 " UNION ALL SELECT run + 1, last, attempt FROM blamed WHERE run < last) "
-                 "SELECT run, count(*), max(attempt) FROM blamed"
-                 " WHERE NOT EXISTS (SELECT 1 FROM run_result WHERE run_index = blamed.run)"
-                 " AND NOT EXISTS (SELECT 1 FROM run_failure WHERE run_index = blamed.run)"
-                 " GROUP BY run ORDER BY run",
-                 blamed);
+  return detail::structs_of<BlamedRun, 3>(
+      impl_->database,
+      "WITH RECURSIVE blamed (run, last, attempt) AS ("
+      " SELECT first_run, first_run + num_runs - 1, attempt FROM attempt"
+      " WHERE is_blamed AND num_runs > 0"
+      " UNION ALL SELECT run + 1, last, attempt FROM blamed WHERE run < last) "
+      "SELECT run, count(*), max(attempt) FROM blamed"
+      " WHERE NOT EXISTS (SELECT 1 FROM run_result WHERE run_index = blamed.run)"
+      " AND NOT EXISTS (SELECT 1 FROM run_failure WHERE run_index = blamed.run)"
+      " GROUP BY run ORDER BY run");
 }
 
 std::uint64_t Store::num_before_blame() const {
@@ -285,24 +123,20 @@ std::uint64_t Store::num_contradicting() const {
 }
 
 std::vector<Contradiction> Store::contradictions() const {
-  const auto contradiction = [](const Statement& row) {
-    return Contradiction{.run = RunIndex{row.count(0)},
-                         .worker = row.text(1),
-                         .stored_digest = row.text(2),
-                         .second_digest = row.text(3)};
-  };
-  return rows_of(impl_->database,
-                 "SELECT a.run_index, w.worker, a.stored_digest, a.second_digest "
-                 "FROM audit AS a JOIN worker AS w USING (worker_key) "
-                 "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker_key",
-                 contradiction);
+  return detail::structs_of<Contradiction, 4>(
+      impl_->database,
+      "SELECT a.run_index, w.worker, a.stored_digest, a.second_digest "
+      "FROM audit AS a JOIN worker AS w USING (worker_key) "
+      "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker_key");
 }
 
 std::vector<wire::SessionId> Store::attached_sessions() const {
   return rows_of(impl_->database,
                  "SELECT session FROM worker WHERE session IS NOT NULL AND ended_utc IS NULL"
                  " ORDER BY session",
-                 [](const Statement& row) { return session_of(row.text(0)); });
+                 [this](const Statement& row) -> wire::SessionId {
+                   return {detail::number_in(impl_->database, "worker.session", row.text(0), 16)};
+                 });
 }
 
 void Store::begin_coordinator(const CoordinatorStart& start) {
@@ -326,15 +160,11 @@ void Store::end_coordinator(wire::Epoch epoch) {
 }
 
 std::vector<StoredEvent> Store::events_after(std::uint64_t id, std::size_t count_max) const {
-  const auto event = [](const Statement& row) {
-    return StoredEvent{
-        .id = row.count(0), .time_utc = row.text(1), .kind = row.text(2), .text = row.text(3)};
-  };
-  std::vector<StoredEvent> events =
-      rows_of(impl_->database,
-              "SELECT event_id, time_utc, kind, text FROM event WHERE event_id > ? "
-              "ORDER BY event_id DESC LIMIT ?",
-              event, id, std::uint64_t{count_max});
+  std::vector<StoredEvent> events = detail::structs_of<StoredEvent, 4>(
+      impl_->database,
+      "SELECT event_id, time_utc, kind, text FROM event WHERE event_id > ? "
+      "ORDER BY event_id DESC LIMIT ?",
+      id, std::uint64_t{count_max});
   std::ranges::reverse(events);
   return events;
 }
@@ -343,64 +173,64 @@ std::vector<LossCount> Store::losses() const { return losses_by(impl_->database,
 
 // The condition of the inner query is that of an index: completed runs are not looked at.
 std::vector<EndCount> Store::ends_without_estimate() const {
-  const auto end = [](const Statement& row) {
-    const std::uint64_t status = row.count(0);
-    return EndCount{.status = status == 2   ? "not converged"
-                              : status == 3 ? "not finite"
-                              : status == 4 ? "no draw"
-                                            : "lost",
-                    .cause = row.text(1),
-                    .session = row.text(2),
-                    .num_runs = row.count(3)};
-  };
-  return rows_of(
+  return detail::structs_of<EndCount, 4>(
       impl_->database,
-      "SELECT status, cause, session, count(*) FROM "
+      "SELECT CASE status WHEN 2 THEN 'not converged' WHEN 3 THEN 'not finite'"
+      " WHEN 4 THEN 'no draw' ELSE 'lost' END, cause, session, count(*) FROM "
       "(SELECT r.status, ifnull(h.loss_cause, '') AS cause, ifnull(h.loss_session, '') AS session "
       " FROM run_result AS r LEFT JOIN loop_health AS h USING (run_index) "
       " WHERE r.status <> 1) "
-      "GROUP BY 1, 2, 3 ORDER BY 4 DESC, 1, 2, 3",
-      end);
+      "GROUP BY status, cause, session ORDER BY 4 DESC, status, cause, session");
 }
 
 std::vector<GivenUpRecord> Store::given_up_records(std::size_t count_max) const {
-  const auto run = [](const Statement& row) {
-    return GivenUpRecord{.run = {row.count(0)},
-                         .reason = row.text(1),
-                         .num_attempts = row.count(2),
-                         .given_up_utc = row.text(3)};
-  };
-  return rows_of(impl_->database,
-                 "SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure "
-                 "ORDER BY run_index LIMIT ?",
-                 run, std::uint64_t{count_max});
+  return detail::structs_of<GivenUpRecord, 4>(
+      impl_->database,
+      "SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure "
+      "ORDER BY run_index LIMIT ?",
+      std::uint64_t{count_max});
 }
 
+// Runs of one batch have the same share of its time, to the bit, and come in one message.
 RecentAttempts Store::recent_attempts(std::size_t num_runs_max, std::size_t num_losses_max) const {
   const detail::ReadTransaction one_state(impl_->database);
-  RecentAttempts attempts{.computed = computed_runs(impl_->database, num_runs_max),
-                          .lost = lost_attempts(impl_->database, num_losses_max),
-                          .workers = {}};
-  attempts.workers = worker_records(impl_->database, attempts);
   const std::uint64_t num_runs = impl_->database.count("SELECT count(*) FROM delivery");
-  attempts.num_runs_left_out = num_runs - std::min<std::uint64_t>(num_runs, num_runs_max);
-  return attempts;
+  return {.computed = detail::structs_of<RecentAttempt, 8>(
+              impl_->database,
+              "SELECT worker_key, worker, count(*), min(run_index), max(run_index), attempt,"
+              " d.compute_s * count(*), received_unix_s FROM "
+              "(SELECT * FROM delivery ORDER BY received_unix_s DESC, run_index LIMIT ?) AS d "
+              "JOIN worker USING (worker_key) "
+              "GROUP BY received_unix_s, worker_key, d.compute_s, attempt "
+              "ORDER BY received_unix_s DESC, worker_key, d.compute_s, attempt",
+              std::uint64_t{num_runs_max}),
+          .lost = detail::structs_of<RecentAttempt, 9>(
+              impl_->database,
+              "SELECT worker_key, worker, num_runs, first_run, first_run + num_runs - 1, attempt,"
+              " 0.0, lost_unix_s, reason FROM attempt JOIN worker USING (worker_key) "
+              "ORDER BY attempt_id DESC LIMIT ?",
+              std::uint64_t{num_losses_max}),
+          .num_runs_left_out = num_runs - std::min<std::uint64_t>(num_runs, num_runs_max)};
 }
 
 CampaignExecution Store::execution() const {
-  const Database& database = impl_->database;
-  CampaignExecution execution;
-  execution.num_coordinators = database.count("SELECT count(*) FROM coordinator_start");
-  execution.num_workers = database.count("SELECT count(*) FROM worker");
-  execution.num_hosts = database.count("SELECT count(DISTINCT host) FROM worker");
-  Statement total = database.prepare("SELECT total(compute_s) FROM worker");
-  if (total.step()) execution.compute_s = total.real(0);
-  execution.hosts = read_hosts(database);
-  execution.losses = losses_by(database, "reason, is_blamed");
-  execution.num_retried = database.count("SELECT count(*) FROM delivery WHERE attempt > 1");
-  execution.num_audited = num_compared();
-  execution.first_result_utc = utc_of(database, "min");
-  execution.last_result_utc = utc_of(database, "max");
+  CampaignExecution execution =
+      detail::structs_of<CampaignExecution, 8>(
+          impl_->database,
+          "SELECT (SELECT count(*) FROM coordinator_start), count(*), count(DISTINCT host),"
+          " total(compute_s), (SELECT count(*) FROM delivery WHERE attempt > 1),"
+          " (SELECT count(*) FROM audit), first, last FROM worker,"
+          " (SELECT strftime('%Y-%m-%dT%H:%M:%SZ', min(received_unix_s), 'unixepoch') AS first,"
+          "  strftime('%Y-%m-%dT%H:%M:%SZ', max(received_unix_s), 'unixepoch') AS last"
+          "  FROM delivery)")
+          .front();
+  execution.hosts = detail::structs_of<HostShare, 6>(
+      impl_->database,
+      "SELECT host, count(*), sum(num_results), sum(compute_s),"
+      " ifnull(max(last_result_unix_s) - min(unixepoch(first_seen_utc)), 0),"
+      " ifnull(group_concat(DISTINCT nullif(cards, '')), '') "
+      "FROM worker GROUP BY host ORDER BY sum(num_results) DESC, host LIMIT 20");
+  execution.losses = losses_by(impl_->database, "reason, is_blamed");
   return execution;
 }
 

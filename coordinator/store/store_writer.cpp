@@ -17,92 +17,22 @@
 
 namespace proofmass::coordinator {
 
-namespace detail {
-namespace {
-
-// What somebody waits for. The rest is history, which shares the next commit.
-bool is_urgent(const Entry& entry) {
-  return is_result(entry) || std::holds_alternative<CampaignControl>(entry);
-}
-
-// What the history of a campaign can do without.
-bool is_record(const Entry& entry) {
-  return std::holds_alternative<ReturnedRuns>(entry) || std::holds_alternative<EventEntry>(entry);
-}
-
-}  // namespace
-
-bool is_result(const Entry& entry) {
-  return std::holds_alternative<Delivery>(entry) || std::holds_alternative<SecondDelivery>(entry);
-}
-
-void WaitingEntries::add(Entry entry, TimePoint now) {
-  if (is_record(entry) && num_records_ >= num_records_max_) {
-    ++num_dropped_;
-    return;
-  }
-  if (is_result(entry)) ++num_results_;
-  if (is_record(entry)) ++num_records_;
-  if (is_urgent(entry) && num_urgent_++ == 0) urgent_since_ = now;
-  if (entries_.empty()) waiting_since_ = now;
-  entries_.push_back(std::move(entry));
-}
-
-void WaitingEntries::take(std::size_t num_max, std::vector<Entry>& entries, TimePoint now) {
-  const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(std::min(num_max, size()));
-  num_results_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_result));
-  num_urgent_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_urgent));
-  num_records_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_record));
-  std::move(entries_.begin(), end, std::back_inserter(entries));
-  entries_.erase(entries_.begin(), end);
-  if (num_results_ == 0) is_hurried_ = false;
-  waiting_since_ = entries_.empty() ? std::nullopt : std::optional(now);
-  urgent_since_ = num_urgent_ == 0 ? std::nullopt : std::optional(now);
-  if (num_dropped_ == 0) return;
-  entries.push_back(
-      entry_of({.kind = "records_dropped",
-                .fields = {{"losses_and_events", std::exchange(num_dropped_, 0)},
-                           wire::Field::remark("(the disk did not take them for too long)")}}));
-}
-
-std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config) {
-  if (file.retry_at) return file.retry_at;
-  const std::optional<TimePoint> since = file.waiting.waiting_since();
-  if (!since) return file.rest_at;
-  const TimePoint due = *since + config.record_after;
-  const std::optional<TimePoint> urgent_since = file.waiting.urgent_since();
-  if (!urgent_since) return due;
-  const bool is_complete = file.waiting.num_results() >= config.commit_runs_max;
-  if (is_complete || file.waiting.is_hurried()) return urgent_since;
-  return std::min(due, *urgent_since + config.commit_after);
-}
-
-}  // namespace detail
-
-using detail::OpenFile;
-using detail::TimePoint;
-
 namespace {
 
 // Entries of one transaction: enough that its cost is shared, few enough that the first of them
 // does not wait long for the last.
 constexpr std::size_t entries_per_commit_max = 8192;
 
-bool is_written_out(const OpenFile& file) {
-  return file.writing.empty() && file.waiting.size() == 0;
+template <typename... Kinds>
+bool is_one_of(const Entry& entry) {
+  return (std::holds_alternative<Kinds>(entry) || ...);
 }
 
-/// Whether an entry that is for no single campaign is for this file.
-bool concerns(const Entry& entry, const OpenFile& file) {
-  const auto* const ended = std::get_if<WorkerEnded>(&entry);
-  return ended != nullptr ? file.known.contains(ended->session) : !file.is_rest_wanted;
-}
+// A worker waits for its acknowledgement.
+bool is_result(const Entry& entry) { return is_one_of<Delivery, SecondDelivery>(entry); }
 
-/// Keeps in mind which workers the file has without an end.
-void note_worker(OpenFile& file, const Entry& entry) {
-  if (const auto* joined = std::get_if<WorkerJoined>(&entry)) file.known.insert(joined->session);
-  if (const auto* ended = std::get_if<WorkerEnded>(&entry)) file.known.erase(ended->session);
-}
+// What the history of a campaign can do without.
+bool is_record(const Entry& entry) { return is_one_of<ReturnedRuns, EventEntry>(entry); }
 
 /// Tries to fold the log in; returns why it is still needed.
 std::optional<std::string> try_to_rest(Store& store) {
@@ -114,6 +44,16 @@ std::optional<std::string> try_to_rest(Store& store) {
 }
 
 }  // namespace
+
+bool StoreWriter::OpenFile::is_concerned_by(const Entry& entry) const {
+  const auto* const ended = std::get_if<WorkerEnded>(&entry);
+  return ended != nullptr ? known.contains(ended->session) : !is_rest_wanted;
+}
+
+void StoreWriter::OpenFile::note_worker(const Entry& entry) {
+  if (const auto* joined = std::get_if<WorkerJoined>(&entry)) known.insert(joined->session);
+  if (const auto* ended = std::get_if<WorkerEnded>(&entry)) known.erase(ended->session);
+}
 
 /// Tries to write what `writing` holds, to a file that has its name before and afterwards.
 StoreWriter::Attempted StoreWriter::try_to_write(OpenFile& file) {
@@ -131,31 +71,46 @@ StoreWriter::Attempted StoreWriter::try_to_write(OpenFile& file) {
   return attempted;
 }
 
-OpenFile& StoreWriter::file(wire::CampaignId campaign) {
+StoreWriter::OpenFile& StoreWriter::file(wire::CampaignId campaign) {
   const auto found = files_.find(campaign);
   PROOFMASS_EXPECT(found != files_.end());
   return found->second;
 }
 
-/// True if the file is to be written to sooner than before. @pre The lock is held.
-bool StoreWriter::add(OpenFile& open_file, Entry entry) {
+/// True if the file is to be written to sooner than before. What somebody waits for is written
+/// soon; the rest is history, which shares the next commit. @pre The lock is held.
+bool StoreWriter::add(OpenFile& file, Entry entry) {
+  const std::optional<TimePoint> due_before = file.due;
+  file.note_worker(entry);
+  if (is_result(entry)) file.is_rest_wanted = false;
+  file.is_fold_due = file.is_rest_wanted;
+  if (is_record(entry) && file.num_records >= config_.num_records_max) {
+    ++file.num_dropped;
+    return false;
+  }
+  if (is_result(entry)) ++file.num_results;
+  if (is_record(entry)) ++file.num_records;
+  const bool is_urgent = is_one_of<Delivery, SecondDelivery, CampaignControl>(entry);
+  file.waiting.push_back(std::move(entry));
+  if (file.has_failed) return false;
   const TimePoint now = std::chrono::steady_clock::now();
-  const std::optional<TimePoint> due_before = due_time(open_file, config_);
-  note_worker(open_file, entry);
-  if (detail::is_result(entry)) open_file.is_rest_wanted = false;
-  open_file.waiting.add(std::move(entry), now);
-  open_file.rest_at = open_file.is_rest_wanted ? std::optional(now) : std::nullopt;
-  return due_time(open_file, config_) != due_before;
+  const bool is_complete = file.num_results >= config_.commit_runs_max;
+  file.be_due(is_complete ? now : now + (is_urgent ? config_.commit_after : config_.record_after));
+  return file.due != due_before;
+}
+
+void StoreWriter::change(const std::function<void()>& action) {
+  {
+    const std::lock_guard lock(mutex_);
+    action();
+  }
+  changed_.notify_one();
 }
 
 void StoreWriter::wait_for(wire::CampaignId campaign, std::function<void()> action) {
   Request request{.campaign = campaign, .action = std::move(action), .done = {}};
   std::future<void> done = request.done.get_future();
-  {
-    const std::lock_guard lock(mutex_);
-    requests_.push_back(std::move(request));
-  }
-  changed_.notify_one();
+  change([&] { requests_.push_back(std::move(request)); });
   done.get();
 }
 
@@ -199,9 +154,9 @@ void StoreWriter::serve_request(Lock& lock) {
 void StoreWriter::write_due(Lock& lock) {
   const TimePoint now = std::chrono::steady_clock::now();
   for (const wire::CampaignId campaign : ids()) {
-    const std::optional<TimePoint> due = due_time(file(campaign), config_);
-    if (!due || *due > now) continue;
-    if (!file(campaign).retry_at && is_written_out(file(campaign))) {
+    const OpenFile& open_file = file(campaign);
+    if (!open_file.due || *open_file.due > now) continue;
+    if (!open_file.has_failed && open_file.is_written_out()) {
       fold(campaign, lock);
     } else {
       write_some(campaign, entries_per_commit_max, lock);
@@ -213,7 +168,7 @@ void StoreWriter::write_due(Lock& lock) {
 void StoreWriter::look_at_all(Lock& lock) {
   if (std::chrono::steady_clock::now() < look_at_) return;
   for (const wire::CampaignId campaign : ids()) {
-    if (!file(campaign).retry_at) write_some(campaign, 0, lock);
+    if (!file(campaign).has_failed) write_some(campaign, 0, lock);
   }
   look_at_ = std::chrono::steady_clock::now() + config_.look_after;
 }
@@ -227,19 +182,21 @@ void StoreWriter::write_all(wire::CampaignId campaign, Lock& lock) {
     is_written = write_some(campaign, num_entries, lock);
     num_left -= num_entries;
   }
-  if (file(campaign).rest_at && is_written_out(file(campaign))) fold(campaign, lock);
+  if (file(campaign).is_fold_due && file(campaign).is_written_out()) fold(campaign, lock);
 }
 
 /// Brings a file of which nothing waits to rest.
 void StoreWriter::fold(wire::CampaignId campaign, Lock& lock) {
-  if (!write_some(campaign, 0, lock)) return;
   OpenFile& open_file = file(campaign);
-  open_file.rest_at.reset();  // What is added meanwhile sets it again.
+  if (!write_some(campaign, 0, lock) || !open_file.is_written_out()) return;
+  open_file.is_fold_due = false;  // What is added meanwhile sets both again.
+  open_file.due.reset();
   lock.unlock();
   const std::optional<std::string> reason = try_to_rest(open_file.store);
   lock.lock();
   if (reason && open_file.is_rest_wanted) {
-    open_file.rest_at = std::chrono::steady_clock::now() + config_.retry_after;
+    open_file.is_fold_due = true;
+    open_file.be_due(std::chrono::steady_clock::now() + config_.retry_after);
   }
   if (reason.has_value() == open_file.is_log_kept) return;
   open_file.is_log_kept = reason.has_value();
@@ -254,13 +211,28 @@ void StoreWriter::fold(wire::CampaignId campaign, Lock& lock) {
   lock.lock();
 }
 
+/// Moves entries from those that wait to those that are written, and what was dropped as an event.
+void StoreWriter::take(OpenFile& file, std::size_t num_max) {
+  for (; num_max > 0 && !file.waiting.empty(); --num_max) {
+    if (is_result(file.waiting.front())) --file.num_results;
+    if (is_record(file.waiting.front())) --file.num_records;
+    file.writing.push_back(std::move(file.waiting.front()));
+    file.waiting.pop_front();
+  }
+  file.due.reset();
+  if (!file.waiting.empty()) file.due = std::chrono::steady_clock::now();
+  if (file.num_dropped == 0) return;
+  file.writing.push_back(
+      entry_of({.kind = "records_dropped",
+                .fields = {{"losses_and_events", std::exchange(file.num_dropped, 0)},
+                           wire::Field::remark("(the disk did not take them for too long)")}}));
+}
+
 /// Tries to write what failed before or, if nothing did, up to `num_max` more entries. The file
 /// stays: only the thread itself removes one.
 bool StoreWriter::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
   OpenFile& open_file = file(campaign);
-  if (open_file.writing.empty() && num_max > 0) {
-    open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
-  }
+  if (open_file.writing.empty() && num_max > 0) take(open_file, num_max);
   lock.unlock();
   Attempted attempted = try_to_write(open_file);
   const bool is_written = !attempted.failure;
@@ -277,9 +249,10 @@ bool StoreWriter::write_some(wire::CampaignId campaign, std::size_t num_max, Loc
 
 void StoreWriter::finish_write(wire::CampaignId campaign, OpenFile& open_file,
                                Attempted attempted) {
-  const bool has_failed_before = open_file.retry_at.has_value();
+  const bool has_failed_before = std::exchange(open_file.has_failed, attempted.failure.has_value());
+  const TimePoint now = std::chrono::steady_clock::now();
   if (attempted.failure) {
-    open_file.retry_at = std::chrono::steady_clock::now() + config_.retry_after;
+    open_file.due = now + config_.retry_after;
     if (std::exchange(open_file.failure, *attempted.failure) == *attempted.failure) return;
     completions_.emplace_back(StoreFailed{.campaign = campaign,
                                           .text = *attempted.failure,
@@ -287,7 +260,9 @@ void StoreWriter::finish_write(wire::CampaignId campaign, OpenFile& open_file,
     return;
   }
   open_file.failure.clear();
-  open_file.retry_at.reset();
+  if (has_failed_before) open_file.due.reset();
+  const bool is_more_due = open_file.waiting.empty() ? open_file.is_fold_due : has_failed_before;
+  if (is_more_due && (has_failed_before || !open_file.writing.empty())) open_file.be_due(now);
   std::vector<RunIndex> runs;
   for (const Entry& entry : open_file.writing) {
     if (const auto* delivery = std::get_if<Delivery>(&entry)) runs.push_back(delivery->result.run);
@@ -317,12 +292,11 @@ void StoreWriter::watch_log(wire::CampaignId campaign, OpenFile& open_file,
   completions_.emplace_back(FileEvent{.campaign = campaign, .event = std::move(event)});
 }
 
-std::optional<TimePoint> StoreWriter::next_due_time() const {
+std::optional<StoreWriter::TimePoint> StoreWriter::next_due_time() const {
   std::optional<TimePoint> next;
   if (!files_.empty()) next = look_at_;
   for (const auto& [campaign, file] : files_) {
-    const std::optional<TimePoint> due = due_time(file, config_);
-    if (due && (!next || *due < *next)) next = due;
+    if (file.due && (!next || *file.due < *next)) next = file.due;
   }
   return next;
 }
@@ -337,30 +311,17 @@ StoreWriter::StoreWriter(std::function<void()> wake, const WriterConfig& config)
     : config_(config), wake_(std::move(wake)), thread_([this] { run(); }) {}
 
 StoreWriter::~StoreWriter() {
-  {
-    const std::lock_guard lock(mutex_);
-    is_ending_ = true;
-  }
-  changed_.notify_one();
+  change([this] { is_ending_ = true; });
   thread_.join();
 }
 
 void StoreWriter::open(wire::CampaignId campaign, Store store) {
   const std::vector<wire::SessionId> attached = store.attached_sessions();
-  {
-    const std::lock_guard lock(mutex_);
-    OpenFile file{.store = std::move(store),
-                  .waiting = detail::WaitingEntries(config_.num_records_max),
-                  .writing = {},
-                  .retry_at = {},
-                  .failure = {},
-                  .known = {},
-                  .rest_at = {}};
-    for (const wire::SessionId session : attached) file.known.insert(session);
+  change([&] {
+    OpenFile file{.store = std::move(store), .known = {attached.begin(), attached.end()}};
     const bool is_new = files_.emplace(campaign, std::move(file)).second;
     PROOFMASS_EXPECT(is_new);
-  }
-  changed_.notify_one();
+  });
 }
 
 Store StoreWriter::close(wire::CampaignId campaign) {
@@ -390,7 +351,7 @@ void StoreWriter::write(wire::CampaignId campaign, Entry entry) {
       is_sooner = add(file(campaign), std::move(entry));
     } else {
       for (auto& [id, open_file] : files_) {
-        if (concerns(entry, open_file)) is_sooner = add(open_file, entry) || is_sooner;
+        if (open_file.is_concerned_by(entry)) is_sooner = add(open_file, entry) || is_sooner;
       }
     }
   }
@@ -398,21 +359,20 @@ void StoreWriter::write(wire::CampaignId campaign, Entry entry) {
 }
 
 void StoreWriter::rest(wire::CampaignId campaign) {
-  {
-    const std::lock_guard lock(mutex_);
+  change([&] {
     OpenFile& open_file = file(campaign);
-    open_file.is_rest_wanted = true;
-    open_file.rest_at = std::chrono::steady_clock::now();
-  }
-  changed_.notify_one();
+    open_file.is_rest_wanted = open_file.is_fold_due = true;
+    if (!open_file.waiting.empty() || open_file.has_failed) return;
+    open_file.be_due(std::chrono::steady_clock::now());
+  });
 }
 
 void StoreWriter::hurry(wire::CampaignId campaign) {
-  {
-    const std::lock_guard lock(mutex_);
-    file(campaign).waiting.hurry();
-  }
-  changed_.notify_one();
+  change([&] {
+    OpenFile& open_file = file(campaign);
+    if (open_file.num_results == 0 || open_file.has_failed) return;
+    open_file.be_due(std::chrono::steady_clock::now());
+  });
 }
 
 std::vector<Completion> StoreWriter::take_completions() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -73,67 +74,6 @@ struct FileEvent {
 
 using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered, FileEvent>;
 
-namespace detail {
-
-using TimePoint = std::chrono::steady_clock::time_point;
-
-/// Whether a worker waits for its acknowledgement.
-[[nodiscard]] bool is_result(const Entry& entry);
-
-/// What waits to be written to one campaign database, in the order in which it was handed over.
-class WaitingEntries {
- public:
-  /// @param num_records_max  Losses and events beyond this many are counted and dropped.
-  explicit WaitingEntries(std::size_t num_records_max) : num_records_max_(num_records_max) {}
-
-  void add(Entry entry, TimePoint now);
-
-  /// No more results will come soon: those that wait need not wait for others.
-  void hurry() { is_hurried_ = num_results_ > 0; }
-
-  /// Moves up to `num_max` entries to the end of `entries`, and what was dropped as an event.
-  void take(std::size_t num_max, std::vector<Entry>& entries, TimePoint now);
-
-  [[nodiscard]] std::size_t size() const { return entries_.size(); }
-  [[nodiscard]] std::size_t num_results() const { return num_results_; }
-  [[nodiscard]] bool is_hurried() const { return is_hurried_; }
-  /// Since when the oldest one waits, roughly; nothing if none does.
-  [[nodiscard]] std::optional<TimePoint> waiting_since() const { return waiting_since_; }
-  /// Since when the oldest urgent entry waits: a result, or how the campaign is to be served.
-  [[nodiscard]] std::optional<TimePoint> urgent_since() const { return urgent_since_; }
-
- private:
-  std::size_t num_records_max_;
-  std::deque<Entry> entries_;
-  std::size_t num_results_ = 0;  ///< Of the entries, those that a worker waits for.
-  bool is_hurried_ = false;
-  std::size_t num_urgent_ = 0;   ///< Those, and how the campaign is to be served.
-  std::size_t num_records_ = 0;  ///< Losses and events among them.
-  std::uint64_t num_dropped_ = 0;
-  std::optional<TimePoint> waiting_since_;
-  std::optional<TimePoint> urgent_since_;
-};
-
-/// One campaign database of a StoreWriter. The writer's thread alone uses `store` and `writing`,
-/// without the writer's lock.
-struct OpenFile {
-  Store store;
-  WaitingEntries waiting;
-  std::vector<Entry> writing;         ///< Taken from `waiting`; kept if the last attempt failed.
-  std::optional<TimePoint> retry_at;  ///< If the last attempt failed.
-  std::string failure;                ///< Why the last attempt failed, as the log last said.
-  bool has_large_log = false;         ///< As the log of the program last said.
-  std::set<wire::SessionId> known;    ///< Workers of which the file has no end yet.
-  bool is_rest_wanted = false;        ///< Nothing more is expected.
-  std::optional<TimePoint> rest_at;   ///< When to fold the log in, once nothing waits.
-  bool is_log_kept = false;           ///< A reader keeps the log from that, as was last said.
-};
-
-/// When the file wants to be written to or brought to rest; nothing if nothing waits.
-[[nodiscard]] std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config);
-
-}  // namespace detail
-
 /// Writes to campaign databases, in a thread of its own: a service never waits for a disk.
 ///
 /// What is handed over is written in that order, many entries in one durable transaction. The
@@ -180,8 +120,33 @@ class StoreWriter {
   void flush();
 
  private:
-  using OpenFile = detail::OpenFile;
-  using TimePoint = detail::TimePoint;
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// One campaign database. The writer's thread alone uses `store` and `writing`, without the lock.
+  struct OpenFile {
+    Store store;
+    std::deque<Entry> waiting{};      // In the order in which it was handed over.
+    std::size_t num_results = 0;      // Of them, those that a worker waits for.
+    std::size_t num_records = 0;      // Of them, losses and events.
+    std::uint64_t num_dropped = 0;    // Losses and events beyond `num_records_max`.
+    std::vector<Entry> writing{};     // Taken from `waiting`; kept if the last attempt failed.
+    std::optional<TimePoint> due{};   // When to write, to try again or to fold the log in.
+    bool has_failed = false;          // The last attempt.
+    std::string failure{};            // Why it did, as the log last said.
+    bool has_large_log = false;       // As the log of the program last said.
+    std::set<wire::SessionId> known;  // Workers of which the file has no end yet.
+    bool is_rest_wanted = false;      // Nothing more is expected.
+    bool is_fold_due = false;         // The log is to be folded in, once nothing waits.
+    bool is_log_kept = false;         // A reader keeps the log from that, as was last said.
+
+    [[nodiscard]] bool is_written_out() const { return writing.empty() && waiting.empty(); }
+    /// Whether an entry that is for no single campaign is for this file.
+    [[nodiscard]] bool is_concerned_by(const Entry& entry) const;
+    /// Keeps in mind which workers the file has without an end.
+    void note_worker(const Entry& entry);
+    /// Sets `due`, unless something sooner is.
+    void be_due(TimePoint at) { due = std::min(at, due.value_or(at)); }
+  };
 
   /// Something that the caller waits for, after all that was handed over for its file.
   struct Request {
@@ -199,7 +164,8 @@ class StoreWriter {
 
   // Called by the service.
   OpenFile& file(wire::CampaignId campaign);
-  [[nodiscard]] bool add(OpenFile& open_file, Entry entry);
+  [[nodiscard]] bool add(OpenFile& file, Entry entry);
+  void change(const std::function<void()>& action);
   void wait_for(wire::CampaignId campaign, std::function<void()> action);
 
   // The thread.
@@ -209,6 +175,7 @@ class StoreWriter {
   void write_due(Lock& lock);
   void look_at_all(Lock& lock);
   void write_all(wire::CampaignId campaign, Lock& lock);
+  static void take(OpenFile& file, std::size_t num_max);
   void fold(wire::CampaignId campaign, Lock& lock);
   bool write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock);
   void finish_write(wire::CampaignId campaign, OpenFile& file, Attempted attempted);

@@ -18,6 +18,7 @@
 #include "core/definition/entry.hpp"
 #include "core/definition/law_reader.hpp"
 #include "core/math/hash.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 
@@ -334,6 +335,39 @@ const Model& recorded_model(const ModelRecord& record) {
   const Model& described = described_model(record.description, record.reference_digest, source);
   if (described.version() == record.version) return described;
   throw DefinitionError(fmt::format("{}: of {}", source, described.version()));
+}
+
+std::shared_ptr<const Campaign> recorded_campaign(
+    const Model& model, const CampaignTexts& record, const std::string& database,
+    const std::function<std::vector<double>(const std::string& sql)>& numbers) {
+  Definition definition{.text = record.definition};
+  for (const DataTableSchema& schema : model.tables()) {
+    std::vector<double> values =
+        numbers(fmt::format("SELECT {} FROM {}.{} ORDER BY position",
+                            fmt::join(schema.columns, ", "), database, schema.table));
+    if (values.empty()) continue;
+    definition.tables.push_back({.key = std::string(schema.key),
+                                 .num_columns = static_cast<std::uint32_t>(schema.columns.size()),
+                                 .values = std::move(values)});
+  }
+  for (const DrawnQuantity& drawn : model.drawn()) {
+    std::vector<double> values = numbers(fmt::format(
+        "SELECT value FROM {}.dispersion_value WHERE quantity = '{}' ORDER BY run_index", database,
+        drawn.name));
+    if (!values.empty()) definition.table_columns.push_back(std::move(values));
+  }
+  std::shared_ptr<const Campaign> campaign =
+      model.campaign_of(std::move(definition), TableColumns::included, "stored definition");
+  const auto require_same = [](std::string_view field, const std::string& stored,
+                               const std::string& defined) {
+    if (stored == defined) return;
+    throw DefinitionError(fmt::format("campaign.{} = {} (must be {}, as in the definition)", field,
+                                      visible_text(stored), visible_text(defined)));
+  };
+  require_same("name", record.name, campaign->name);
+  require_same("seed", record.seed, fmt::to_string(campaign->seed));
+  require_same("num_runs", record.num_runs, fmt::to_string(campaign->num_runs));
+  return campaign;
 }
 
 }  // namespace proofmass::wire

@@ -227,4 +227,21 @@ struct ModelRecord {
 ///         breaks a rule.
 [[nodiscard]] const Model& recorded_model(const ModelRecord& record);
 
+/// By which a database says what its campaign is. All of it may be anything.
+struct CampaignTexts {
+  std::string definition = {};
+  std::string name = {};
+  std::string seed = {};
+  std::string num_runs = {};
+};
+
+/// The campaign of a database.
+/// @param model     recorded_model().
+/// @param database  By which SQL knows it, in quotes.
+/// @param numbers   Yields those of the rows of a query, row by row.
+/// @throws DefinitionError if the definition is none of the model, or another campaign's.
+[[nodiscard]] std::shared_ptr<const Campaign> recorded_campaign(
+    const Model& model, const CampaignTexts& record, const std::string& database,
+    const std::function<std::vector<double>(const std::string& sql)>& numbers);
+
 }  // namespace proofmass::wire

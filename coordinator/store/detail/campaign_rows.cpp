@@ -18,6 +18,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -52,26 +53,28 @@ void insert_data_tables(Database& database, const Campaign& campaign) {
   }
 }
 
-/// Name of each quantity with values in a table, in the order of the campaign's columns.
-std::vector<std::string_view> table_quantity_names(const Campaign& campaign) {
-  std::vector<std::string_view> names;
-  for (const std::size_t quantity : campaign.table_quantities()) {
-    names.push_back(campaign.model().drawn()[quantity].name);
-  }
-  return names;
-}
-
 // Only runs of the campaign are stored: files may well hold values for more.
 void insert_dispersion_values(Database& database, const Campaign& campaign,
                               std::uint64_t first_run) {
   Statement insert = database.prepare("INSERT INTO dispersion_value VALUES (?, ?, ?)");
-  const std::vector<std::string_view> names = table_quantity_names(campaign);
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  const std::vector<std::size_t> quantities = campaign.table_quantities();
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
     const std::vector<double>& values = campaign.table_columns[i];
+    const std::string_view name = campaign.model().drawn()[quantities[i]].name;
     for (std::uint64_t run = first_run; run < campaign.num_runs; ++run) {
-      insert.run(names[i], run, values[run]);
+      insert.run(name, run, values[run]);
     }
   }
+}
+
+/// While there is no result, nobody can have looked at one: the runs that are asked for now are
+/// fixed, unless a stop rule decides about their number.
+void fix_num_runs(const Database& database) {
+  database
+      .prepare(
+          "UPDATE campaign SET num_runs_fixed = iif(stop_rule = '', num_runs, NULL)"
+          " WHERE NOT EXISTS (SELECT 1 FROM delivery)")
+      .run();
 }
 
 void insert_budget_coefficients(Database& database, const Campaign& campaign) {
@@ -87,22 +90,6 @@ void insert_budget_coefficients(Database& database, const Campaign& campaign) {
       if (value != 0.0) insert.run(term.info.name, quantities[j].name, value, level);
     }
   }
-}
-
-/// Values of one drawn quantity, run by run; empty if the file has none.
-std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
-  Statement select = database.prepare(
-      "SELECT value, run_index FROM dispersion_value WHERE quantity = ? ORDER BY 2");
-  select.bind_all(drawn_name);
-  std::vector<double> values;
-  while (select.step()) {
-    if (select.count(1) != values.size()) {
-      database.refuse_as_damaged(fmt::format("dispersion_value of {}: run {} follows {} values",
-                                             drawn_name, select.count(1), values.size()));
-    }
-    values.push_back(select.real(0));
-  }
-  return values;
 }
 
 }  // namespace
@@ -183,56 +170,53 @@ void write_control(const Database& database, const CampaignControl& control) {
       .run(wire::name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
 }
 
-std::optional<std::uint64_t> read_num_runs_fixed(const Database& database) {
-  return database.first_row("SELECT num_runs_fixed FROM campaign").optional_count(0);
-}
-
-void fix_num_runs(const Database& database) {
-  database
-      .prepare(
-          "UPDATE campaign SET num_runs_fixed = iif(stop_rule = '', num_runs, NULL)"
-          " WHERE NOT EXISTS (SELECT 1 FROM delivery)")
-      .run();
-}
-
-void replace_stop_check(const Database& database, std::uint64_t num_runs,
-                        std::string_view statistic, const StopCheck& check) {
-  database
-      .prepare(
-          "INSERT OR REPLACE INTO stop_check (statistic, num_runs, estimate, lower, upper,"
-          " relative_half_width, is_reached) VALUES (?, ?, ?, ?, ?, ?, ?)")
-      .run(statistic, num_runs, check.estimate, check.interval, check.relative_half_width,
-           std::int64_t{check.is_reached});
-}
-
 }  // namespace proofmass::coordinator::detail
 
 namespace proofmass::coordinator {
 
-std::vector<DataTable> Store::data_tables() const {
-  std::vector<DataTable> tables;
-  for (const DataTableSchema& schema : model().tables()) {
-    DataTable table{.key = std::string(schema.key),
-                    .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
-    detail::Statement select = impl_->database.prepare(fmt::format(
-        "SELECT {} FROM {} ORDER BY position", fmt::join(schema.columns, ", "), schema.table));
-    while (select.step()) {
-      for (int column = 0; column < select.num_columns(); ++column) {
-        table.values.push_back(select.real(column));
-      }
-    }
-    if (!table.values.empty()) tables.push_back(std::move(table));
-  }
-  return tables;
+std::shared_ptr<const Campaign> Store::campaign() const {
+  const detail::Statement row =
+      impl_->database.first_row("SELECT definition, name, seed, num_runs FROM campaign");
+  return wire::recorded_campaign(model(),
+                                 {.definition = row.text(0),
+                                  .name = row.text(1),
+                                  .seed = row.text(2),
+                                  .num_runs = row.text(3)},
+                                 "main", [this](const std::string& sql) {
+                                   std::vector<double> numbers;
+                                   detail::Statement of = impl_->database.prepare(sql);
+                                   while (of.step()) {
+                                     for (int i = 0; i < of.num_columns(); ++i) {
+                                       numbers.push_back(of.real(i));
+                                     }
+                                   }
+                                   return numbers;
+                                 });
 }
 
-std::vector<std::vector<double>> Store::table_columns() const {
-  std::vector<std::vector<double>> columns;
-  for (const DrawnQuantity& quantity : model().drawn()) {
-    columns.push_back(detail::read_dispersion_values(impl_->database, quantity.name));
-    if (columns.back().empty()) columns.pop_back();
-  }
-  return columns;
+std::optional<std::uint64_t> Store::num_runs_fixed() const {
+  return impl_->database.first_row("SELECT num_runs_fixed FROM campaign").optional_count(0);
+}
+
+StopPlan Store::stop_plan() const {
+  const detail::Statement select =
+      impl_->database.first_row("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
+  return {.stop_rule = select.text(0),
+          .num_runs_max = select.optional_count(1),
+          .failures_max = select.optional_count(2)};
+}
+
+void Store::set_stop_plan(const StopPlan& plan) {
+  impl_->commit([&](detail::Database& database) {
+    database
+        .prepare(
+            "UPDATE campaign SET stop_rule = ?1, num_runs_max = ?2, failures_max = ?3,"
+            " phase = iif(phase = 'finished' AND ?1 <> ''"
+            " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
+        .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
+    detail::fix_num_runs(database);
+    detail::write_table_digest(database, model());
+  });
 }
 
 void Store::extend(const Campaign& campaign, std::string_view definition) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -7,6 +9,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/statistics/interval.hpp"
@@ -57,26 +61,20 @@ class Statement {
     (put(values), ...);
   }
 
-  /// Binds the next parameters after those that were put since the statement last ended.
-  template <typename Value>
-  void put(const Value& value) {
-    bind(++num_bound_, value);
-  }
-  /// Two parameters.
-  void put(const std::optional<Interval>& interval);
-
-  void bind(int position, std::int64_t value);
+  // Binds the next parameter after those that were put since the statement last ended.
+  void put(std::int64_t value);
   /// @throws StoreError if the value is not below 2⁶³.
-  void bind(int position, std::uint64_t value);
-  void bind(int position, std::uint32_t value);
+  void put(std::uint64_t value);
+  void put(std::uint32_t value) { put(std::int64_t{value}); }
   /// A zero loses its sign: SQLite keeps none in a column of type REAL.
   /// @throws StoreError if the value is not finite; SQLite would turn NaN into NULL.
-  void bind(int position, double value);
-  void bind(int position, std::string_view value);
+  void put(double value);
+  void put(std::string_view value);
   template <typename Value>
-  void bind(int position, const std::optional<Value>& value) {
-    value ? bind(position, *value) : bind_null(position);
+  void put(const std::optional<Value>& value) {
+    value ? put(*value) : put_null();
   }
+  void put(const std::optional<Interval>& interval);  ///< Two parameters.
 
   /// Goes to the next row; false, and reset, after the last.
   [[nodiscard]] bool step();
@@ -104,7 +102,7 @@ class Statement {
  private:
   friend class Database;
   Statement(const Database& database, sqlite3_stmt* statement);
-  void bind_null(int position);
+  void put_null();
   void check(int code) const;
 
   const Database* database_;
@@ -260,6 +258,38 @@ template <typename Make, typename... Values>
   std::vector<decltype(make(row))> rows;
   while (row.step()) rows.push_back(make(row));
   return rows;
+}
+
+/// A cell that becomes what it initialises: a number, a text or an identifier.
+struct Cell {
+  const Statement& row;
+  int column;
+
+  template <typename Value>
+  operator Value() const {  // NOLINT: a member of a struct takes it as its value.
+    if constexpr (std::same_as<Value, std::string>) {
+      return row.text(column);
+    } else if constexpr (std::same_as<Value, double>) {
+      return row.real(column);
+    } else if constexpr (std::is_integral_v<Value>) {
+      return static_cast<Value>(row.count(column));
+    } else {
+      return {static_cast<decltype(Value::value)>(row.count(column))};
+    }
+  }
+};
+
+/// rows_of() a query whose columns are the first members of a struct, in their order.
+template <typename Row, std::size_t num_columns, typename... Values>
+[[nodiscard]] std::vector<Row> structs_of(const Database& database, std::string_view sql,
+                                          const Values&... values) {
+  const auto make = [](const Statement& row) {
+    return [&]<int... columns>(std::integer_sequence<int, columns...>) {
+      return Row{Cell{row, columns}...};
+    }
+    (std::make_integer_sequence<int, num_columns>());
+  };
+  return rows_of(database, sql, make, values...);
 }
 
 /// `?, ?, ?`: places for so many values in a statement.

@@ -218,12 +218,12 @@ void check_presence(const std::filesystem::path& path) {
   refuse_file(path, std::filesystem::exists(status) ? "is no file" : "does not exist");
 }
 
-void appear_complete(const std::filesystem::path& path, wire::IfThere if_there,
+void appear_complete(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& draft)>& write) {
   try {
     wire::DraftFile file("campaign database", path, wire::trusted_mode, ".unfinished");
     write(file.draft());
-    file.publish(if_there);
+    file.publish(wire::IfThere::keep);
   } catch (const StoreError&) {
     throw;
   } catch (const Error& error) {

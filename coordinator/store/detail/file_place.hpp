@@ -31,8 +31,8 @@ void check_presence(const std::filesystem::path& path);
 
 /// Lets `write` make a file beside `path`, which then takes that name: complete or not at all, and
 /// durable.
-/// @throws StoreError if that cannot be done, or if the name is taken and is to be kept.
-void appear_complete(const std::filesystem::path& path, wire::IfThere if_there,
+/// @throws StoreError if that cannot be done, or if the name is taken.
+void appear_complete(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& draft)>& write);
 
 /// Where SQLite keeps the write-ahead log of a database file: beside the file itself, also if

@@ -1,12 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -96,13 +93,13 @@ void check_largest_errors(const Database& database, const ResultSchema& schema) 
     }
     if (!result->is_completed()) continue;
     for (std::size_t i = 0; i < worst.size(); ++i) {
-      worst[i].offer({.magnitude = std::abs(result->error(i)), .run = result->run});
+      offer(worst[i], {.magnitude = std::abs(result->error(i)), .run = result->run});
     }
   }
   if (overrun.step()) database.refuse("is damaged: overrun has a run too many");
   const WorstRunTable stored = read_worst_runs(database, schema);
   for (std::size_t i = 0; i < worst.size(); ++i) {
-    if (stored[i].runs() == worst[i].runs()) continue;
+    if (stored[i] == worst[i]) continue;
     database.refuse(fmt::format("is damaged: worst_run does not follow from the results of {}",
                                 schema.quantities[i].name));
   }
@@ -161,47 +158,6 @@ void check_audits(const Database& database, const ResultSchema& schema) {
   }
 }
 
-/// Numbers that agree but for what another processor or another version of Boost.Math rounds.
-bool agree(const std::string& stored, const std::string& expected, double tolerance) {
-  if (stored == expected) return true;
-  const auto number_in = [](const std::string& text) {
-    double number = std::numeric_limits<double>::quiet_NaN();
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    return end == text.data() + text.size() ? number : std::numeric_limits<double>::quiet_NaN();
-  };
-  const double a = number_in(stored), b = number_in(expected);
-  return std::abs(a - b) <= tolerance * std::max(std::abs(a), std::abs(b));
-}
-
-void compare(const Database& stored_in, const Database& expected_in, const ComparedTable& table,
-             FurtherRows further, std::vector<std::string>& differences) {
-  const std::string sql =
-      fmt::format("SELECT {}, {} FROM {}", table.row_name, table.columns, table.name);
-  std::map<std::string, std::vector<std::string>> stored;  // Cells by the name of the row.
-  for (Statement row = stored_in.prepare(sql); row.step();) {
-    std::vector<std::string>& cells = stored[row.text(0)];
-    for (int i = 0; i < row.num_columns(); ++i) cells.push_back(row.shown(i));
-  }
-  for (Statement must = expected_in.prepare(sql); must.step();) {
-    const auto row = stored.find(must.text(0));
-    if (row == stored.end()) {
-      differences.push_back(fmt::format("{} lacks {}", table.name, must.text(0)));
-      continue;
-    }
-    for (int i = 1; i < must.num_columns(); ++i) {
-      const std::string& cell = row->second[static_cast<std::size_t>(i)];
-      if (agree(cell, must.shown(i), table.tolerance)) continue;
-      differences.push_back(fmt::format("{}.{} of {} = {} (must be {})", table.name,
-                                        must.column_name(i), must.text(0), cell, must.shown(i)));
-    }
-    stored.erase(row);
-  }
-  if (further == FurtherRows::ignore) return;
-  for (const auto& [name, cells] : stored) {
-    differences.push_back(fmt::format("{} has a row too many: {}", table.name, name));
-  }
-}
-
 }  // namespace
 
 std::string compute_table_digest(const Database& database, const Model& model) {
@@ -227,21 +183,6 @@ void check_integrity(const Database& database, const StoredKind& kind) {
   check_largest_errors(database, results);
   check_workers(database);
   check_audits(database, results);
-}
-
-std::vector<std::string> table_differences(const Database& database, const StoredKind& kind,
-                                           const std::function<void(Database&)>& write,
-                                           std::span<const ComparedTable> tables,
-                                           FurtherRows further) {
-  Database expected("new campaign", Access::memory);
-  Transaction transaction(expected);
-  migrate(expected, *kind.model, kind.results);
-  write(expected);
-  std::vector<std::string> differences;
-  for (const ComparedTable& table : tables) {
-    compare(database, expected, table, further, differences);
-  }
-  return differences;
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -11,6 +11,7 @@
 
 #include "coordinator/store/detail/rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
@@ -93,32 +94,24 @@ RunStatus read_status(const Statement& row) {
                                             static_cast<std::int64_t>(RunStatus::lost)));
 }
 
+enum class Numbers : std::uint8_t { any, magnitudes };  ///< Health and fit are magnitudes.
+
 // SQLite would read a missing number as 0.
-std::vector<double> read_values(const Statement& row, int first, int count) {
+std::vector<double> read_values(const Statement& row, int first, int count, Numbers numbers) {
+  const bool are_magnitudes = numbers == Numbers::magnitudes;
   std::vector<double> values;
   values.reserve(static_cast<std::size_t>(count));
   for (int column = first; column < first + count; ++column) {
     const std::optional<double> value = row.optional_real(column);
-    if (!value) {
+    if (value && (!are_magnitudes || (*value >= 0.0 && *value <= magnitude_max))) {
+      values.push_back(*value);
+    } else if (are_magnitudes) {
+      row.refuse_as_damaged(fmt::format("{} of run {} (must be in [0, {}])",
+                                        row.column_name(column), row.count(0), magnitude_max));
+    } else {
       row.refuse_as_damaged(
           fmt::format("{} = NULL of run {}", row.column_name(column), row.count(0)));
     }
-    values.push_back(*value);
-  }
-  return values;
-}
-
-// Of health or fit.
-std::vector<double> read_magnitudes(const Statement& row, int first, int count) {
-  std::vector<double> values;
-  values.reserve(static_cast<std::size_t>(count));
-  for (int column = first; column < first + count; ++column) {
-    const double value = row.optional_real(column).value_or(-1.0);
-    if (!(value >= 0.0 && value <= magnitude_max)) {
-      row.refuse_as_damaged(fmt::format("{} of run {} (must be in [0, {}])",
-                                        row.column_name(column), row.count(0), magnitude_max));
-    }
-    values.push_back(value);
   }
   return values;
 }
@@ -146,11 +139,13 @@ RunResult read_result(const Statement& row, const ResultColumns& at) {
                    .status = read_status(row),
                    .num_draws = read_number(row, 2, 0, number_max),
                    .num_rounds = read_number(row, 3, 0, number_max)};
-  if (result.has_truth()) result.truth = read_values(row, at.truth, at.num_quantities);
-  if (result.has_estimate()) result.estimate = read_values(row, at.estimate, at.num_quantities);
+  if (result.has_truth())
+    result.truth = read_values(row, at.truth, at.num_quantities, Numbers::any);
+  if (result.has_estimate())
+    result.estimate = read_values(row, at.estimate, at.num_quantities, Numbers::any);
   // A run without a draw has no health.
   if (at.num_health > 0 && row.optional_real(at.health)) {
-    result.health = read_magnitudes(row, at.health, at.num_health);
+    result.health = read_values(row, at.health, at.num_health, Numbers::magnitudes);
   }
   result.loss = read_loss(row, at, result.status);
   return result;
@@ -175,43 +170,12 @@ std::vector<double> read_correlations(const Statement& row, int column, std::siz
 
 /// Of a row of select_standard_errors_sql().
 void read_standard_errors(const Statement& row, const ResultColumns& at, RunResult& result) {
-  result.standard_error = read_values(row, 1, at.num_standard_errors);
-  result.fit = read_magnitudes(row, 1 + at.num_standard_errors, at.num_fit);
+  result.standard_error = read_values(row, 1, at.num_standard_errors, Numbers::any);
+  result.fit = read_values(row, 1 + at.num_standard_errors, at.num_fit, Numbers::magnitudes);
   if (at.num_correlations == 0) return;
   result.correlations =
       read_correlations(row, 1 + at.num_standard_errors + at.num_fit, at.num_correlations);
 }
-
-/// Those of results that are read in run order, from the same state of the file.
-class StandardErrorRows {
- public:
-  /// @param at  Outlives the object.
-  StandardErrorRows(const Database& database, const ResultColumns& at, std::optional<RunRange> runs)
-      : columns_(at) {
-    if (at.num_standard_errors == 0) return;
-    rows_ = database.prepare(
-        select_standard_errors_sql(at, runs ? "run_index >= ? AND run_index < ?" : "TRUE"));
-    if (runs) rows_->bind_all(runs->first.value, runs->end());
-  }
-
-  /// Sets those of a result, if it has any. Begins to read with the first call.
-  void add_to(RunResult& result) {
-    if (!rows_) return;
-    if (!at_) advance();
-    while (*at_ < result.run) advance();
-    if (*at_ == result.run) read_standard_errors(*rows_, columns_, result);
-  }
-
- private:
-  void advance() {
-    at_ = rows_->step() ? RunIndex{rows_->count(0)}
-                        : RunIndex{std::numeric_limits<std::uint64_t>::max()};
-  }
-
-  const ResultColumns& columns_;
-  std::optional<Statement> rows_;
-  std::optional<RunIndex> at_;  ///< Of the next row; beyond all runs after the last.
-};
 
 }  // namespace
 
@@ -229,12 +193,6 @@ ResultColumns::ResultColumns(const ResultSchema& results)
       loss_cause(health + num_health),
       loss_session(loss_cause + 1),
       num_all(loss_session + 1 + num_standard_errors + num_fit + (num_correlations > 0 ? 1 : 0)) {}
-
-Statement select_errors(const Database& database, const Quantity& quantity) {
-  return database.prepare(fmt::format(
-      "SELECT error_{} FROM run_result WHERE run_index < ? AND status = {} ORDER BY run_index",
-      quantity.column(), static_cast<std::int64_t>(RunStatus::completed)));
-}
 
 ResultRows::ResultRows(const Database& database, const ResultSchema& results)
     : database_(database),
@@ -345,16 +303,31 @@ struct ResultReader::Impl {
         columns(results),
         row(file.prepare(detail::select_sql(
             columns, runs ? "WHERE run_index >= ? AND run_index < ? ORDER BY run_index"
-                          : "ORDER BY run_index"))),
-        standard_errors(file, columns, runs) {
-    if (runs) row.bind_all(runs->first.value, runs->end());
+                          : "ORDER BY run_index"))) {
+    if (columns.num_standard_errors > 0) {
+      errors = file.prepare(detail::select_standard_errors_sql(
+          columns, runs ? "run_index >= ? AND run_index < ?" : "TRUE"));
+    }
+    if (!runs) return;
+    row.bind_all(runs->first.value, runs->end());
+    if (errors) errors->bind_all(runs->first.value, runs->end());
+  }
+
+  /// Sets those of a result, if it has any. Begins to read with the first one.
+  void add_standard_errors(RunResult& result) {
+    while (errors && (!run_with_errors || *run_with_errors < result.run)) {
+      run_with_errors = errors->step() ? RunIndex{errors->count(0)}
+                                       : RunIndex{std::numeric_limits<std::uint64_t>::max()};
+    }
+    if (run_with_errors == result.run) detail::read_standard_errors(*errors, columns, result);
   }
 
   const detail::Database& database;
   detail::ResultColumns columns;
   detail::Statement row;
-  detail::StandardErrorRows standard_errors;
-  std::optional<std::uint64_t> num_runs;  // Of the campaign; read with the first result.
+  std::optional<detail::Statement> errors;  // Of the same state of the file; none if none has any.
+  std::optional<RunIndex> run_with_errors;  // Of the row of `errors`; beyond all after the last.
+  std::optional<std::uint64_t> num_runs;    // Of the campaign; read with the first result.
   std::optional<RunIndex> last;
 };
 
@@ -374,7 +347,7 @@ std::optional<RunResult> ResultReader::next() {
     impl_->num_runs = impl_->database.count("SELECT num_runs FROM campaign");
   }
   RunResult result = detail::read_result(impl_->row, impl_->columns);
-  impl_->standard_errors.add_to(result);
+  impl_->add_standard_errors(result);
   if (impl_->last && !(*impl_->last < result.run)) {
     impl_->database.refuse_as_damaged(fmt::format("result of run {} comes after that of run {}",
                                                   result.run.value, impl_->last->value));
@@ -385,6 +358,15 @@ std::optional<RunResult> ResultReader::next() {
   }
   impl_->last = result.run;
   return result;
+}
+
+void Store::for_each_error(std::size_t quantity, std::uint64_t num_runs,
+                           const std::function<void(double)>& visit) const {
+  detail::Statement row = impl_->database.prepare(fmt::format(
+      "SELECT error_{} FROM run_result WHERE run_index < ? AND status = {} ORDER BY run_index",
+      schema().quantities[quantity].column(), static_cast<std::int64_t>(RunStatus::completed)));
+  row.bind_all(num_runs);
+  while (row.step()) visit(row.real(0));
 }
 
 }  // namespace proofmass::coordinator

@@ -45,16 +45,6 @@ void insert_parameters(Database& database, const Campaign& campaign);
 [[nodiscard]] CampaignControl read_control(const Database& database);
 void write_control(const Database& database, const CampaignControl& control);
 
-/// See Store::num_runs_fixed().
-[[nodiscard]] std::optional<std::uint64_t> read_num_runs_fixed(const Database& database);
-/// While there is no result, nobody can have looked at one: the runs that are asked for now are
-/// fixed, unless a stop rule decides about their number.
-void fix_num_runs(const Database& database);
-
-/// A row of `stop_check`.
-void replace_stop_check(const Database& database, std::uint64_t num_runs,
-                        std::string_view statistic, const StopCheck& check);
-
 /// Where the columns of the values of a campaign stand in a row of `run_result`, from 0. Standard
 /// errors and their fit are read by themselves: where there are none, reading them would cost a
 /// tenth of all reading.
@@ -94,9 +84,6 @@ class ResultRows {
   std::optional<Statement> select_standard_errors_;  ///< None if the campaign has none.
 };
 
-/// estimate − truth of a quantity in the completed runs below ?1, in run order.
-[[nodiscard]] Statement select_errors(const Database& database, const Quantity& quantity);
-
 /// Whether two results of one run agree in everything that means something.
 [[nodiscard]] bool are_equal(const RunResult& left, const RunResult& right);
 
@@ -107,18 +94,6 @@ class ResultRows {
 /// Checks a delivery before it is stored.
 /// @throws StoreError naming the field.
 void check_delivery(const Delivery& delivery, const ResultSchema& results, std::uint64_t num_runs);
-
-/// Replaces the rows of `statistic`; leaves none if no run has an estimate.
-void replace_statistics(Database& database, const ResultSchema& results,
-                        const CampaignStatistics& statistics);
-
-/// Replaces the row of `summary`.
-void replace_summary(const Database& database, const CampaignStatistics& statistics,
-                     const ResultDigests& digests);
-
-/// Replaces the rows of `run_warning`.
-void replace_warnings(Database& database, const ResultSchema& results,
-                      std::span<const RunWarning> warnings);
 
 /// Replaces the rows of `budget_entry`; those after estimation are absent while no run has an
 /// estimate. Leaves none without a budget.
@@ -136,27 +111,14 @@ struct RankedRun {
   bool operator==(const RankedRun&) const = default;
 };
 
-/// The runs with the largest |error| of one parameter: the same ones in whatever order runs come.
-class WorstRuns {
- public:
-  /// What became of a run that was offered.
-  struct Change {
-    bool is_taken = false;
-    std::optional<RunIndex> dropped;  ///< In its place.
-  };
-
-  /// Takes a run if its |error| is among the largest; of equal ones the first run counts as larger.
-  Change offer(const RankedRun& offered);
-
-  /// Largest first.
-  [[nodiscard]] const std::vector<RankedRun>& runs() const { return runs_; }
-
- private:
-  std::vector<RankedRun> runs_;
-};
+/// Takes a run into those with the largest |error| of one parameter, the largest first, if it is
+/// one of num_worst_runs; of equal ones the first run counts as larger, in whatever order runs
+/// come.
+/// @return Whether it was.
+bool offer(std::vector<RankedRun>& worst, const RankedRun& offered);
 
 /// The worst runs of each parameter, by its index.
-using WorstRunTable = std::vector<WorstRuns>;
+using WorstRunTable = std::vector<std::vector<RankedRun>>;
 
 /// The rows of `worst_run`.
 [[nodiscard]] WorstRunTable read_worst_runs(const Database& database, const ResultSchema& results);
@@ -185,7 +147,7 @@ class LargestErrorRows {
   WorstRunTable worst_;
   Statement insert_overrun_;
   Statement insert_worst_;
-  Statement delete_worst_;
+  Statement trim_worst_;
 };
 
 /// 16 hexadecimal digits: SQLite's integers have a sign.
@@ -305,26 +267,5 @@ void write_table_digest(const Database& database, const Model& model);
 /// Checks everything that SQLite can check, and that the schema is that of a new file.
 /// @throws StoreError naming the first finding.
 void check_integrity(const Database& database, const StoredKind& kind);
-
-/// What is compared of a table.
-struct ComparedTable {
-  std::string_view name;
-  std::string_view row_name;       ///< An SQL expression that no two rows share: `parameter`.
-  std::string_view columns = "*";  ///< All of them, or `a, b`.
-  double tolerance = 0.0;          ///< Relative, of numbers; 0: their bits are equal.
-};
-
-/// Rows that are not expected.
-enum class FurtherRows : std::uint8_t { refuse, ignore };
-
-/// What tables have other than they would have in a new file, a line each: `statistic lacks gain`,
-/// `statistic.mean of gain = 1 (must be 25.5)`.
-///
-/// @param kind     Of the database.
-/// @param write    Writes to a new file in memory what is expected. The same functions as those
-/// that write to a campaign database: nothing is said twice of what a table holds.
-[[nodiscard]] std::vector<std::string> table_differences(
-    const Database& database, const StoredKind& kind, const std::function<void(Database&)>& write,
-    std::span<const ComparedTable> tables, FurtherRows further = FurtherRows::refuse);
 
 }  // namespace proofmass::coordinator::detail

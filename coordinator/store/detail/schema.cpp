@@ -1,5 +1,6 @@
 #include "coordinator/store/detail/schema.hpp"
 
+#include <fmt/args.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -150,7 +151,7 @@ std::vector<std::string_view> status_names() {
   return names;
 }
 
-std::map<std::string_view, std::string> texts(const Model& model, const ResultSchema& schema) {
+std::map<const char*, std::string> texts(const Model& model, const ResultSchema& schema) {
   return {
       {"data_tables", data_tables(model)},
       {"digested_tables", digested_tables(model)},
@@ -186,20 +187,6 @@ std::string has_standard_errors_sql(const ResultSchema& schema) {
   std::vector<std::string> columns = columns_of_standard_errors(schema);
   if (num_correlations(schema) > 0) columns.emplace_back("correlations");
   return joined(columns, "\n   OR ", [](const auto& column) { return column + " IS NOT NULL"; });
-}
-
-std::string with_quantities(std::string_view sql, const Model& model, const ResultSchema& schema) {
-  const std::map<std::string_view, std::string> replacements = texts(model, schema);
-  std::string text;
-  while (true) {
-    const std::size_t begin = std::min(sql.find('{'), sql.size());
-    text += sql.substr(0, begin);
-    if (begin == sql.size()) return text;
-    const std::size_t end = sql.find('}', begin);
-    PROOFMASS_EXPECT(end != std::string_view::npos);
-    text += replacements.at(sql.substr(begin + 1, end - begin - 1));
-    sql.remove_prefix(end + 1);
-  }
 }
 
 namespace {
@@ -345,10 +332,10 @@ StoredKind stored_kind(const Database& database, std::int64_t version) {
 }  // namespace
 
 std::vector<std::string> migrations(const Model& model, const ResultSchema& results) {
+  fmt::dynamic_format_arg_store<fmt::format_context> words;
+  for (const auto& [word, text] : texts(model, results)) words.push_back(fmt::arg(word, text));
   std::vector<std::string> steps;
-  for (const std::string_view file : schema_files()) {
-    steps.push_back(with_quantities(file, model, results));
-  }
+  for (const std::string_view file : schema_files()) steps.push_back(fmt::vformat(file, words));
   return steps;
 }
 
@@ -385,32 +372,6 @@ RowCounts check_all_pages(const Database& database) {
     counts[table] = count_rows(database, table);
   }
   return counts;
-}
-
-void check_after_unclean_end(const Database& database) {
-  if (database.text("PRAGMA journal_mode") != "wal") return;
-  const std::string finding = database.text("PRAGMA quick_check(1)");
-  if (finding == "ok") return;
-  database.refuse_as_damaged(finding);
-}
-
-void check_results(const Database& database, const RowCounts& counts) {
-  const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
-  const std::uint64_t end = database.count("SELECT ifnull(max(run_index) + 1, 0) FROM run_result");
-  if (end > num_runs) {
-    database.refuse_as_damaged(fmt::format("result of run {}, of {} there are", end - 1, num_runs));
-  }
-  const auto num_rows = [&](const std::string& table) {
-    const auto found = counts.find(table);
-    return found == counts.end() ? 0 : found->second;
-  };
-  if (num_rows("run_result") == num_rows("delivery")) return;
-  database.refuse_as_damaged(
-      fmt::format("results = {}, deliveries = {}", num_rows("run_result"), num_rows("delivery")));
-}
-
-bool is_older(const Database& database) {
-  return database.integer("PRAGMA user_version") < schema_version();
 }
 
 void check_schema(const Database& database, std::int64_t version, const Model& model,
@@ -450,15 +411,6 @@ void migrate(Database& database, const Model& model, const ResultSchema& results
     PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version);
     wire::kill_point(wire::KillPoint::while_migrating);
   }
-}
-
-void migrate_privately(Database& database, const StoredKind& kind) {
-  database.go_on_with_private_copy();
-  database.distrust_content();
-  Transaction transaction(database);
-  migrate(database, *kind.model, kind.results);
-  transaction.commit();
-  database.execute("PRAGMA query_only = ON");  // What would be written is lost.
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -29,8 +29,12 @@ struct StoredKind {
   ResultSchema results;          ///< What the results of the campaign are.
 };
 
-/// The schema as SQL: replaces each word in braces of a file of schema/ by the text that follows
-/// from the model and the results of the campaign.
+/// What holds for a row of run_result with a standard error, or its fit; empty if the campaign has
+/// none.
+[[nodiscard]] std::string has_standard_errors_sql(const ResultSchema& results);
+
+/// The schema files as SQL: each word in braces becomes the text that follows from the model and
+/// the results of the campaign.
 ///
 ///     {data_tables}         the tables of data that all runs share
 ///     {truth_columns}       columns of run_result, one a line; also {estimate_columns},
@@ -49,14 +53,6 @@ struct StoredKind {
 ///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
 ///     {digested_tables}     names of the tables that campaign.table_digest is of
 ///     {example_quantity}    its name, for comments; see example_quantity()
-[[nodiscard]] std::string with_quantities(std::string_view sql, const Model& model,
-                                          const ResultSchema& results);
-
-/// What holds for a row of run_result with a standard error, or its fit; empty if the campaign has
-/// none.
-[[nodiscard]] std::string has_standard_errors_sql(const ResultSchema& results);
-
-/// The schema files as SQL, see with_quantities().
 [[nodiscard]] std::vector<std::string> migrations(const Model& model, const ResultSchema& results);
 
 /// The version that this program reads and writes.
@@ -82,34 +78,16 @@ using RowCounts = std::map<std::string, std::uint64_t>;
 /// @throws StoreError naming what is damaged.
 RowCounts check_all_pages(const Database& database);
 
-/// Checks the rows as well if no coordinator ended in order since the file was opened for writing:
-/// a file whose journal is still a write-ahead log. Takes some 1 s for a million runs.
-/// @throws StoreError naming the first finding.
-void check_after_unclean_end(const Database& database);
-
 /// Checks that each table, view and index is that of a file of this version, and that there is
 /// none else. Reads sqlite_schema only, so that nothing in the file can make it take long.
 /// @throws StoreError naming the first that is not.
 void check_schema(const Database& database, std::int64_t version, const Model& model,
                   const ResultSchema& results);
 
-/// Whether a campaign database has an older version than this program writes.
-[[nodiscard]] bool is_older(const Database& database);
-
 /// The definition of a table, view or index of a campaign without what SQLite 3.25 does not know.
 [[nodiscard]] std::string plain_definition(std::string sql);
 
 /// Brings the schema up to date, step by step. @pre Inside a transaction.
 void migrate(Database& database, const Model& model, const ResultSchema& results);
-
-/// Goes on with a private copy of an older file that is up to date; the file stays as it is.
-/// @throws StoreError if there is no room for the copy, or the file is damaged.
-void migrate_privately(Database& database, const StoredKind& kind);
-
-/// A run without a delivery would be lent again and come back as a second result, and a result of a
-/// run that there is not would stand for one that is missing.
-/// @param counts  As check_all_pages() found them.
-/// @throws StoreError if results and deliveries differ in number, or for such a result.
-void check_results(const Database& database, const RowCounts& counts);
 
 }  // namespace proofmass::coordinator::detail

@@ -18,32 +18,28 @@ void Statement::check(int code) const {
   if (code != SQLITE_OK) database_->fail(code);
 }
 
-void Statement::bind(int position, std::int64_t value) {
-  check(sqlite3_bind_int64(statement_.get(), position, value));
+void Statement::put(std::int64_t value) {
+  check(sqlite3_bind_int64(statement_.get(), ++num_bound_, value));
 }
 
-void Statement::bind(int position, std::uint64_t value) {
+void Statement::put(std::uint64_t value) {
   if (value > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
     database_->refuse(fmt::format("a number to be stored = {} (must be below 2⁶³)", value));
   }
-  bind(position, static_cast<std::int64_t>(value));
+  put(static_cast<std::int64_t>(value));
 }
 
-void Statement::bind(int position, std::uint32_t value) {
-  bind(position, static_cast<std::int64_t>(value));
-}
-
-void Statement::bind(int position, double value) {
+void Statement::put(double value) {
   if (!std::isfinite(value)) {
     database_->refuse(fmt::format("a number to be stored = {} (must be finite)", value));
   }
-  check(sqlite3_bind_double(statement_.get(), position, value));
+  check(sqlite3_bind_double(statement_.get(), ++num_bound_, value));
 }
 
-void Statement::bind_null(int position) { check(sqlite3_bind_null(statement_.get(), position)); }
+void Statement::put_null() { check(sqlite3_bind_null(statement_.get(), ++num_bound_)); }
 
-void Statement::bind(int position, std::string_view value) {
-  check(sqlite3_bind_text64(statement_.get(), position, value.data(), value.size(),
+void Statement::put(std::string_view value) {
+  check(sqlite3_bind_text64(statement_.get(), ++num_bound_, value.data(), value.size(),
                             SQLITE_TRANSIENT, SQLITE_UTF8));
 }
 

@@ -109,13 +109,6 @@ TEST_F(Listing, NamesAFileThatItMayNotRead) {
 
 using ::testing::ThrowsMessage;
 
-std::vector<RunIndex> chosen_runs(const std::vector<RunRange>& runs, double fraction) {
-  ChosenRuns chosen(runs, fraction);
-  std::vector<RunIndex> all;
-  for (std::uint64_t i = 0; i < chosen.size(); ++i) all.push_back(chosen.next(i));
-  return all;
-}
-
 std::vector<RunRange> first_runs(std::uint64_t count) { return {{RunIndex{0}, count}}; }
 
 TEST(ChosenRuns, AreAsManyAsAskedFor) {
@@ -123,7 +116,7 @@ TEST(ChosenRuns, AreAsManyAsAskedFor) {
   EXPECT_EQ(chosen_runs(first_runs(1000), 0.0101).size(), 11U);
   EXPECT_EQ(chosen_runs(first_runs(1000), 0.0).size(), 1U);
   EXPECT_EQ(chosen_runs(first_runs(3), 0.01).size(), 1U);
-  EXPECT_THAT(chosen_runs({{{3}, 2}, {{9}, 1}, {{20}, 2}}, 1.0),
+  EXPECT_THAT(chosen_runs(std::vector<RunRange>{{{3}, 2}, {{9}, 1}, {{20}, 2}}, 1.0),
               ElementsAre(RunIndex{3}, RunIndex{4}, RunIndex{9}, RunIndex{20}, RunIndex{21}));
   EXPECT_THAT(chosen_runs({}, 1.0), IsEmpty());
 }

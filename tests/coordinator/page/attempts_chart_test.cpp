@@ -7,13 +7,15 @@
 namespace proofmass::coordinator {
 namespace {
 
-ComputedRuns computed(std::uint64_t run, std::uint64_t worker, double compute_s,
-                      std::uint64_t received) {
-  return {.runs = {{run}},
+RecentAttempt computed(std::uint64_t run, std::uint64_t worker, double compute_s,
+                       std::uint64_t received) {
+  return {.worker_key = worker,
+          .worker = worker == 1 ? "a" : "b",
+          .first = {run},
+          .last = {run},
           .attempt = {1},
-          .worker_key = worker,
           .compute_s = compute_s,
-          .received_unix_s = received};
+          .unix_s = received};
 }
 
 /// Of two workers, with up to three threads each.
@@ -26,7 +28,6 @@ RecentAttempts random_attempts(unsigned seed, double compute_s_max) {
     const double compute_s = compute_s_max * static_cast<double>(random() % 1000 + 1) / 1000.0;
     attempts.computed.push_back(computed(run, random() % 2 + 1, compute_s, received));
   }
-  attempts.workers = {{.key = 1, .name = "a", .host = "h"}, {.key = 2, .name = "b", .host = "h"}};
   return attempts;
 }
 
@@ -45,8 +46,7 @@ TEST(AttemptLanes, HoldEachAttemptOnceWithoutOverlap) {
         EXPECT_EQ(attempts.computed.at(run).worker_key, worker == "a" ? 1U : 2U);
         EXPECT_LE(bar.end, free_until);
         free_until = bar.begin;
-        const double received =
-            static_cast<double>(attempts.computed[run].received_unix_s) - last_s;
+        const double received = static_cast<double>(attempts.computed[run].unix_s) - last_s;
         EXPECT_LE(bar.end, received);
         EXPECT_GE(bar.end, received - 1.0);
       }

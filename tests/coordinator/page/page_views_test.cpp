@@ -109,9 +109,8 @@ TEST(Pages, ShowHostileTextAsText) {
   details.losses = {{.reason = hostile_name, .num_losses = 1, .num_runs = 2, .num_blamed = 0}};
   details.ends = {{.status = hostile_name, .cause = hostile_name, .session = hostile_name}};
   details.given_up = {{.run = {3}, .reason = hostile_name, .given_up_utc = hostile_name}};
-  details.attempts.computed = {{.runs = {{4}}, .worker_key = 1, .received_unix_s = 1000}};
-  details.attempts.lost = {{.runs = {{5}, 1}, .worker_key = 1, .reason = hostile_name}};
-  details.attempts.workers = {{.key = 1, .name = hostile_name, .host = hostile_name}};
+  details.attempts.computed = {{.worker_key = 1, .worker = hostile_name, .unix_s = 1000}};
+  details.attempts.lost = {{.worker_key = 1, .worker = hostile_name, .reason = hostile_name}};
   details.failure = hostile_name;
   const std::string html = text_of(campaign_page(snapshot.campaigns[0], &details, {}, TimePoint{}));
   expect_harmless(html);

@@ -65,7 +65,8 @@ TEST_F(StoreDispatch, ReportsASessionThatNobodyCanHave) {
   write(store, {worker_1()});
   change("UPDATE worker SET session = 'not hexadecimal!'");
   EXPECT_EQ(store_error_of([&] { (void)store.attached_sessions(); }),
-            "worker.session = not hexadecimal! (must be hexadecimal)");
+            "campaign database = " + file().string() +
+                " (is damaged: worker.session = not hexadecimal!; restore it from a copy)");
 }
 
 TEST_F(StoreDispatch, KeepsAndCountsWhoDeliveredARun) {

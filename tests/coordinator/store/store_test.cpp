@@ -12,6 +12,7 @@ namespace {
 
 using detail::Access;
 using detail::Database;
+using detail::Statement;
 using test::result_of;
 using test::session_1;
 
@@ -60,11 +61,27 @@ TEST_F(StoreTest, HoldsTheCampaignThatItWasCreatedWith) {
   EXPECT_EQ(store.seed(), 18446744073709551615u);
   EXPECT_EQ(store.num_runs(), 3u);
   EXPECT_EQ(store.definition(), "name = \"naïve\"\n");
-  EXPECT_EQ(environment_of(store.data_tables()), campaign.environment_table);
-  const std::vector<std::vector<double>> columns = store.table_columns();
-  ASSERT_EQ(columns.size(), 2u);
-  EXPECT_THAT(columns[0], ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0));
-  EXPECT_THAT(columns[1], ElementsAre(17.0, 17.0 + 1.0 / 7.0, 17.0 + 2.0 / 7.0));
+}
+
+TEST_F(StoreTest, HoldsTheDataOfItsCampaign) {
+  Store::create(file(), campaign_with_data(3), "");
+  const Database database(file(), Access::read_only);
+  Statement row = database.prepare("SELECT * FROM environment_row ORDER BY position");
+  ASSERT_TRUE(row.step());
+  EXPECT_EQ(row.real(1), -0.1);
+  EXPECT_EQ(row.real(3), 1.0 / 3.0);
+  EXPECT_EQ(row.real(7), 3e-300);
+  ASSERT_TRUE(row.step());
+  EXPECT_EQ(row.real(1), 6000.0);
+  EXPECT_FALSE(row.step());
+  Statement value = database.prepare("SELECT value FROM dispersion_value ORDER BY value");
+  for (const double element : {3.0, 17.0}) {
+    for (const double run : {0.0, 1.0, 2.0}) {
+      ASSERT_TRUE(value.step());
+      EXPECT_EQ(value.real(0), element + run / 7.0);
+    }
+  }
+  EXPECT_FALSE(value.step());
 }
 
 TEST_F(StoreTest, ReturnsResultsBitForBit) {

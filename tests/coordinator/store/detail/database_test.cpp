@@ -4,7 +4,6 @@
 
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/schema.hpp"
-#include "coordinator/store/store_writer.hpp"
 #include "core/microscope/results/health.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -111,9 +110,9 @@ TEST_F(DatabaseTest, IsAFileWhateverItsName) {
 
 TEST_F(DatabaseDeathTest, RefusesANumberThatSqliteCannotHold) {
   Statement select = database_.prepare("SELECT ?");
-  EXPECT_THROW(select.bind(1, std::numeric_limits<double>::quiet_NaN()), StoreError);
-  EXPECT_THROW(select.bind(1, std::numeric_limits<double>::infinity()), StoreError);
-  EXPECT_THROW(select.bind(1, std::uint64_t{1} << 63), StoreError);
+  EXPECT_THROW(select.bind_all(std::numeric_limits<double>::quiet_NaN()), StoreError);
+  EXPECT_THROW(select.bind_all(std::numeric_limits<double>::infinity()), StoreError);
+  EXPECT_THROW(select.bind_all(std::uint64_t{1} << 63), StoreError);
 }
 
 using SchemaTest = test::StoreTest;
@@ -144,47 +143,6 @@ TEST_F(SchemaTest, TiesEveryNumberToTheStatus) {
             "");
   EXPECT_NE(test::store_error_of([&] { database.execute("UPDATE run_result SET status = 5"); }),
             "");
-}
-
-using std::chrono::seconds;
-
-constexpr TimePoint start{};
-
-EventEntry event(const std::string& kind) { return {.kind = kind, .text = ""}; }
-
-TEST(WaitingEntries, KnowHowManyResultsWaitAndSinceWhen) {
-  WaitingEntries waiting(10);
-  EXPECT_EQ(waiting.waiting_since(), std::nullopt);
-  waiting.add(event("a"), start + seconds(1));
-  waiting.add(delivery_of(0), start + seconds(2));
-  waiting.add(SecondDelivery{delivery_of(0)}, start + seconds(3));
-  waiting.add(GivenUpRun{RunIndex{1}}, start + seconds(3));
-  EXPECT_EQ(waiting.num_results(), 2u);
-  EXPECT_EQ(waiting.waiting_since(), start + seconds(1));
-
-  std::vector<Entry> taken;
-  waiting.take(2, taken, start + seconds(5));
-  EXPECT_EQ(waiting.num_results(), 1u);
-  EXPECT_EQ(waiting.waiting_since(), start + seconds(5));
-  waiting.take(2, taken, start + seconds(6));
-  EXPECT_EQ(waiting.num_results(), 0u);
-  EXPECT_EQ(waiting.waiting_since(), std::nullopt);
-}
-
-TEST(WaitingEntries, KnowSinceWhenSomethingUrgentWaits) {
-  WaitingEntries waiting(10);
-  waiting.add(event("a"), start + seconds(1));
-  EXPECT_EQ(waiting.urgent_since(), std::nullopt);
-  waiting.add(CampaignControl{}, start + seconds(2));
-  waiting.add(delivery_of(0), start + seconds(3));
-  EXPECT_EQ(waiting.urgent_since(), start + seconds(2));
-  std::vector<Entry> taken;
-  waiting.take(2, taken, start + seconds(5));
-  EXPECT_EQ(waiting.urgent_since(), start + seconds(5));
-  waiting.add(event("b"), start + seconds(6));
-  waiting.take(1, taken, start + seconds(7));
-  EXPECT_EQ(waiting.urgent_since(), std::nullopt);
-  EXPECT_EQ(waiting.waiting_since(), start + seconds(7));
 }
 
 using FileSystemTest = test::StoreTest;
