@@ -57,10 +57,12 @@ int number_of(std::string_view version) {
 
 /// With the columns of standard errors whatever the method is, as databases of all campaigns had
 /// them from the first; where sessions test, of what has them, and the quantities of the test.
+/// Without noise there is nothing that standard errors could be of.
 ResultSchema scenario_results(const Scenario& scenario, std::string_view version) {
-  constexpr int with_session_fits = 6, with_test_residual = 10;
+  constexpr int with_session_fits = 6, with_test_residual = 10, of_noise_alone = 11;
   const bool has_tests = scenario.has_tests();
-  const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors;
+  const bool has_errors = estimation_method(scenario.estimation.method).has_standard_errors &&
+                          (scenario.noise.scale > 0.0 || number_of(version) < of_noise_alone);
   ResultSchema schema = has_tests && !has_errors ? microscope_results() : results_with_errors();
   if (has_tests) {
     schema.quantities.insert(schema.quantities.end(), test_quantities().begin(),
@@ -95,7 +97,7 @@ std::string unwatched_note(const Scenario& scenario) {
   const auto is_quiet = [](const Session& session) {
     return !is_test(session) && session.excitations.empty();
   };
-  if (std::ranges::any_of(scenario.sessions, is_quiet)) return {};
+  if (scenario.noise.scale == 0.0 || std::ranges::any_of(scenario.sessions, is_quiet)) return {};
   return "no session watches the noise of the loops, which may move every estimate: add one "
          "without excitations";
 }

@@ -170,7 +170,8 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
       white_density_(differential_x_density(
           scenario.noise, [](const SensorNoise& x) { return square(x.white_asd); })),
       duration_s_(0.0),
-      has_noise_(scenario.noise.scale > 0.0) {
+      has_noise_(scenario.noise.scale > 0.0),
+      gradient_line_s2_(0.75 * square(mean_motion_rad_s(scenario))) {
   if (has_noise_) white_density_ *= square(scenario.noise.scale);
   for (const Session& session : scenario.sessions) {
     if (is_test(session)) continue;
@@ -267,11 +268,15 @@ void ShiftBounds::add_residual(double residual_m_s2, Sum& sum) const {
 void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
   using enum Parameter;
   constexpr double num_deviations = 3.0;
-  // The residual's own lines times the constant b_1d, which a_d11' takes up, look like noise too.
-  const double scale = 2.0 * sum[k2c] * differential_bias_max_m_s2;
-  const double of_lines =
-      2.0 * block_s_ *
-      (square(scale * health.residual_m_s2) + step_share_ * square(scale * known_line_m_s2_));
+  // Lines times the constant b_1d, which a_d11' and a_c11 take up, look like noise too: those of
+  // the residual with K2c, and with K2d that of the gradient in Γ_App,dx.
+  const double twice_bias_m_s2 = 2.0 * differential_bias_max_m_s2;
+  const double gradient_line_m_s2 =
+      gradient_line_s2_ * std::hypot(sum[a_c11_delta_x], sum[a_c11_delta_z]);
+  const double of_residual = twice_bias_m_s2 * sum[k2c] * health.residual_m_s2;
+  const double of_known =
+      twice_bias_m_s2 * (sum[k2c] * known_line_m_s2_ + sum[k2d] * gradient_line_m_s2);
+  const double of_lines = 2.0 * block_s_ * (square(of_residual) + step_share_ * square(of_known));
   const double density = std::max(0.0, health.quadratic_noise * least_density_ - of_lines);
   for (std::size_t p = 0; p < num_parameters; ++p) {
     const auto parameter = static_cast<Parameter>(p);

@@ -80,6 +80,7 @@ class ShiftBounds {
   double white_density_;  ///< Of Γ_mes,dx, below that of every line; of scale 1 without noise.
   double duration_s_;     ///< Of the records of all sessions that are fitted.
   bool has_noise_;
+  double gradient_line_s2_;  ///< Amplitude of ½T_xx and ½T_xz at 2 f_EP, on a circular orbit.
   /// Largest (ω² + |k/m|)Δ_TM of the masses that move along each axis.
   std::array<double, 3> mass_acceleration_m_s2_{};
   /// Shifts by spin for K2c = 1 s²/m and, but for a_c13, Δx = 1 m.

@@ -227,17 +227,25 @@ struct RunPlan::Impl : RunParts {
             .sample_period_s = scenario.simulation.sample_period_s};
   }
 
+  /// Whether results have standard errors of the calibration: without noise those that it finds
+  /// are of noise that was not there.
+  [[nodiscard]] bool has_standard_errors() const {
+    return method.has_standard_errors && campaign.scenario.noise.scale > 0.0;
+  }
+
   /// Sets the estimates of the calibration and, if the scenario has one, of the test.
   void set_estimates(const RunRecord& record, const Estimation& found, RunResult& result) const {
     result.estimate.assign(found.values.begin(), found.values.end());
-    if (method.has_standard_errors) {
+    if (has_standard_errors()) {
       result.standard_error.assign(found.standard_errors.begin(), found.standard_errors.end());
     }
     TestEstimation test;
     if (campaign.scenario.has_tests()) {
       test = estimate_ep_test(record.phasors, estimation_input(), found);
       result.estimate.insert(result.estimate.end(), test.values.begin(), test.values.end());
-      result.standard_error.push_back(test.standard_error);
+      if (campaign.scenario.noise.scale > 0.0) {
+        result.standard_error.push_back(test.standard_error);
+      }
     }
     result.correlations = pairs(result.standard_error.size(), [&](std::size_t i, std::size_t j) {
       return j < num_parameters ? found.correlations[i][j] : test.correlations[i];
@@ -360,8 +368,8 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   result.truth = run_truth(scenario, record.truth, record.eotvos_parameter);
   const Estimation found = estimation(record);
   result.num_rounds = found.num_rounds;
-  const bool has_errors = impl_->method.has_standard_errors;
-  const bool are_errors_usable = has_errors && are_in_range(found.standard_errors);
+  const bool are_errors_usable =
+      impl_->method.has_standard_errors && are_in_range(found.standard_errors);
   const HealthFinding finding =
       judge_health(scenario, impl_->bounds, record.health, record.phasors, record.truth,
                    are_errors_usable ? std::span<const double>(found.standard_errors)
@@ -384,7 +392,7 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
     return without_estimates;
   }
   result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
-  if (has_errors) {
+  if (impl_->has_standard_errors()) {
     result.fit = {0.0, 0.0};
     for (const SessionFit& session : found.session_fits) {
       // A session whose data are all adapted to has none left, but for rounding.

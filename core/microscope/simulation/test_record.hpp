@@ -89,8 +89,9 @@ struct TestSums {
     const T weight = window_weights.at(num_blocks - 1);
     std::array<T, num_test_signals> weighted;
     for (std::size_t s = 0; s < num_test_signals; ++s) weighted[s] = weight * means[s];
+    static constexpr auto pairs = test_product_pairs;  // A kernel's own: see batch_kernel-inl.hpp.
     for (std::size_t k = 0; k < num_test_products; ++k) {
-      const auto [i, j] = test_product_pairs[k];
+      const auto [i, j] = pairs[k];
       products[k] = products[k] + weighted[i] * means[j];
     }
   }

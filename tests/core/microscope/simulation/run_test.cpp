@@ -213,7 +213,7 @@ TEST(RunPlan, SaysWhatLostARunAndWhichEstimateIsOff) {
 
 // Two metres from the centre of mass, the loop leaves 1.5e-9 m/s² of the gradient at 2 f_orb, which
 // 2 K2c b_1d turn into a line that â_d11' takes away: it moves no estimate, although blocks of 512
-// s step by it. Noise of the thrust does.
+// s step by it; nor does that of an offcentring, with 2 K2d b_1d. Noise of the thrust does.
 TEST(RunPlan, TakesAKnownLineOfTheGradientForNoNoise) {
   MicroscopeCampaign campaign = short_campaign(10);
   std::erase_if(campaign.scenario.sessions, [](const Session& session) {
@@ -236,6 +236,10 @@ TEST(RunPlan, TakesAKnownLineOfTheGradientForNoNoise) {
     }
     return largest;
   };
+  EXPECT_EQ(largest_part(campaign), 0.0);
+  campaign.scenario.sensor.position_m = {};
+  test::fix(campaign, "quadratic_factor_s2_m.sensor_2_x", -14000.0);
+  test::fix(campaign, "offcentring_m.x", 40e-6);
   EXPECT_EQ(largest_part(campaign), 0.0);
   campaign.scenario.noise.scale = 1.0;
   campaign.scenario.noise.thrust_asd_m_s2 = 1e-6;
