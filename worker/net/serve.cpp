@@ -174,6 +174,11 @@ class Keeping {
     if (!path) return;
     spool_.emplace(*path, model);
     spooler_.emplace(*spool_);
+    if (!spool_->former_spool().empty()) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "spool_of_another_model",
+            .fields = {{"kept_as", spool_->former_spool().string()}}});
+    }
     if (spool_->num_bytes_dropped() > 0) {
       log_({.severity = wire::Severity::warning,
             .kind = "spool_torn",
