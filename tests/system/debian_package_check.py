@@ -225,7 +225,7 @@ def check_units(machine):
 
 def run_campaign(machine, expected):
     machine.run(
-        "proofmass keygen /etc/proofmass/keys\n"
+        "(umask 077; proofmass keygen /etc/proofmass/keys)\n"
         "echo PROOFMASS_CONNECT=tcp://127.0.0.1:5555 >> /etc/default/proofmass-worker\n"
         "systemctl enable --now proofmass-coordinator\n"
         "systemctl enable --now proofmass-worker@1\n"
