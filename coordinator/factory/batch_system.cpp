@@ -154,7 +154,8 @@ BatchCommand condor_listing(const FactoryConfig& config) {
 
 BatchCommand local_submission(const FactoryConfig& config) {
   return {{"sh", "-c",
-           "exec 3>>\"$2\"; setsid sh -c 'set -- \"$$\"; eval \"$0\"' \"$1\" "
+           "[ \"$(stat -c %s \"$2\" 2>/dev/null || echo 0)\" -lt 16777216 ] || mv \"$2\" \"$2.1\"\n"
+           "exec 3>>\"$2\"; setsid bash -c 'set -- \"$$\"; eval \"$0\"' \"$1\" "
            ">/dev/null 2>&3 </dev/null 3>&- & echo $!",
            "sh", config.worker_command, config.workers_log}};
 }

@@ -168,14 +168,19 @@ TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifierAndALog) {
   FactoryConfig config = example();
   const std::string file = testing::TempDir() + "/started-by-factory";
   config.workers_log = file + ".log";
-  config.worker_command = "echo here >&2; echo \"$1\" $$ > " + wire::shell_word(file + ".new") +
-                          " && mv " + wire::shell_word(file + ".new") + " " +
-                          wire::shell_word(file);
+  std::ofstream(config.workers_log).close();
+  std::filesystem::resize_file(config.workers_log, 17 << 20);
+  config.worker_command = "source /dev/null; echo here >&2; echo \"$1\" $$ > " +
+                          wire::shell_word(file + ".new") + " && mv " +
+                          wire::shell_word(file + ".new") + " " + wire::shell_word(file);
   const BatchSystem& local = system_of("local");
   const std::string id = id_in(output_of(local.submission(config)), "sh");
-  const std::string seen = output_of(
-      {{"sh", "-c", "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\"*; rm \"$0\"*", file}});
-  EXPECT_EQ(seen, id + " " + id + "\nhere\n");
+  const std::string seen =
+      output_of({{"sh", "-c",
+                  "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\" \"$0.log\"; stat -c %s "
+                  "\"$0.log.1\"; rm \"$0\"*",
+                  file}});
+  EXPECT_EQ(seen, id + " " + id + "\nhere\n17825792\n") << "an old log made room";
 }
 
 TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {
