@@ -433,7 +433,8 @@ int run_worker(int argc, char** argv, const Program& program) {
   add_options(app, options);
   program.add_options(app);
   wire::add_model_program_option(app);
-  app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
+  app.set_version_flag(
+      "--version", fmt::format("{} {} ({})", program.name, PROOFMASS_VERSION, model().version()));
   return reporting_errors(program, [&] {
     wire::settle_surroundings();
     const auto left_out = wire::choose_models(argc, argv, wire::Broken::left_out);

@@ -358,7 +358,8 @@ int run_proofmass_coordinator(int argc, char** argv) {
   app.footer(exit_codes_text({}) +
              "\n  130  interrupted by SIGINT, with --exit-when-done also by SIGTERM; what is\n"
              "       stored stands");
-  app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
+  app.set_version_flag("--version", fmt::format("proofmass-coordinator {} ({})", PROOFMASS_VERSION,
+                                                model().version()));
   wire::add_option_file(app, "File with these options, as in\n`bind = \"tcp://*:5555\"`",
                         "PROOFMASS_CONFIG");
   ServeOptions options;

@@ -150,7 +150,8 @@ int run_proofmass(int argc, char** argv) {
   if (const auto refused = refused_model(argc, argv, "proofmass", broken)) return *refused;
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
-  app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
+  app.set_version_flag("--version",
+                       fmt::format("proofmass {} ({})", PROOFMASS_VERSION, model().version()));
   app.require_subcommand(1);
   wire::add_option_file(app, "TOML file with options, a section a command", "PROOFMASS_CONFIG");
   wire::add_model_program_option(app);

@@ -60,7 +60,7 @@ void append(std::vector<std::string>& arguments, const std::vector<std::string>&
 // Slurm.
 
 BatchCommand slurm_submission(const FactoryConfig& config) {
-  BatchCommand command{{"sbatch", "--parsable", "--job-name=" + config.name, "--nodes=1",
+  BatchCommand command{{"sbatch", "--parsable", "--job-name=" + config.queue_name, "--nodes=1",
                         "--ntasks=1", "--time=" + clock_text(config.walltime)},
                        script(config, "SLURM_JOB_ID")};
   command.arguments.push_back(config.num_processors
@@ -71,15 +71,16 @@ BatchCommand slurm_submission(const FactoryConfig& config) {
 }
 
 BatchCommand slurm_listing(const FactoryConfig& config) {
-  return {{"squeue", "--me", "--noheader", "--name=" + config.name,
+  return {{"squeue", "--me", "--noheader", "--name=" + config.queue_name,
            "--states=PENDING,CONFIGURING,RUNNING,SUSPENDED", "--sort=i", "--format=%i %T"}};
 }
 
 // PBS: OpenPBS and PBS Pro.
 
 BatchCommand pbs_submission(const FactoryConfig& config) {
-  BatchCommand command{{"qsub", "-N", config.name, "-l", "walltime=" + clock_text(config.walltime)},
-                       script(config, "PBS_JOBID")};
+  BatchCommand command{
+      {"qsub", "-N", config.queue_name, "-l", "walltime=" + clock_text(config.walltime)},
+      script(config, "PBS_JOBID")};
   append(command.arguments,
          config.num_processors ? std::vector<std::string>{"-l", fmt::format("select=1:ncpus={}",
                                                                             *config.num_processors)}
@@ -95,7 +96,7 @@ BatchCommand pbs_listing(const FactoryConfig& config) {
            "others=$(qselect -u \"$(id -un)\" -N \"$1\" -s HQSTUW) || exit\n"
            "for id in $others; do echo \"$id Q\"; done\n"
            "for id in $running; do echo \"$id R\"; done\n",
-           "sh", config.name}};
+           "sh", config.queue_name}};
 }
 
 // HTCondor.
@@ -127,7 +128,7 @@ BatchCommand condor_submission(const FactoryConfig& config) {
       "arguments = \"-c {} bash $(ClusterId).$(ProcId)\"\n"
       "batch_name = {}\n"
       "getenv = true\n",
-      quoted_for_condor(config.worker_command), config.name);
+      quoted_for_condor(config.worker_command), config.queue_name);
   if (config.num_processors) {
     description += fmt::format("request_cpus = {}\n", *config.num_processors);
   }
@@ -140,7 +141,7 @@ BatchCommand condor_listing(const FactoryConfig& config) {
   return {{"condor_q", "-constraint",
            fmt::format("JobBatchName == \"{}\" && (JobStatus <= 2 || JobStatus == 5 || "
                        "JobStatus == 7)",
-                       config.name),
+                       config.queue_name),
            "-format", "%d.", "ClusterId", "-format", "%d ", "ProcId", "-format", "%d\n",
            "JobStatus"}};
 }
@@ -149,7 +150,8 @@ BatchCommand condor_listing(const FactoryConfig& config) {
 
 BatchCommand local_submission(const FactoryConfig& config) {
   return {{"sh", "-c",
-           "exec 3>>\"$2\"; setsid sh -c 'set -- \"$$\"; eval \"$0\"' \"$1\" "
+           "[ \"$(stat -c %s \"$2\" 2>/dev/null || echo 0)\" -lt 16777216 ] || mv \"$2\" \"$2.1\"\n"
+           "exec 3>>\"$2\"; setsid bash -c 'set -- \"$$\"; eval \"$0\"' \"$1\" "
            ">/dev/null 2>&3 </dev/null 3>&- & echo $!",
            "sh", config.worker_command, config.workers_log}};
 }
@@ -160,9 +162,11 @@ std::vector<Allocation> local_workers(const FactoryConfig& config, std::string_v
   std::vector<Allocation> allocations;
   for (const std::string& line : lines_of(output)) {
     const std::vector<std::string> words = words_of(line);
-    const std::string name = words.empty() ? "" : config.name + "-" + words.front();
-    const auto option = std::ranges::find(words, "--name");
-    if (option == words.end() || option + 1 == words.end() || *(option + 1) != name) continue;
+    if (words.empty()) continue;
+    // Of all arguments; a worker of another coordinator may have a factory of the same name.
+    const std::string mark =
+        fmt::format(" --connect {} --name {}-{} ", config.worker_endpoint, config.name, words[0]);
+    if ((line + " ").find(mark) == std::string::npos) continue;
     allocations.push_back({words.front(), true});
   }
   return allocations;

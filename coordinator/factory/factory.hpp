@@ -18,8 +18,10 @@ using FactoryTime = std::chrono::steady_clock::time_point;
 
 /// How many workers a factory keeps, and what each of its allocations is to be.
 struct FactoryConfig {
-  std::string name =
-      "proofmass";  ///< Of its allocations; a worker's name is NAME-ID. is_name() holds.
+  std::string name = "proofmass";  ///< A worker's name is NAME-ID. is_name() holds.
+  /// Of its allocations, by which a factory that is started again finds them; no other factory and
+  /// nobody else gives it to theirs.
+  std::string queue_name = {};
   std::uint64_t workers_min = 0;  ///< Kept while any run is open.
   std::uint64_t workers_max =
       10;                     ///< Allocations, queued and running together; >= workers_min, > 0.
@@ -27,7 +29,9 @@ struct FactoryConfig {
   std::chrono::seconds walltime = std::chrono::hours(8);  ///< Of an allocation.
   /// Share of its walltime, in (0, 1], that a worker must find work for, or it is not asked for.
   double utilisation_min = 0.1;
-  std::string worker_command = {};  ///< A line of `sh` that ends as a worker named NAME-"$1".
+  std::string worker_endpoint = {};  ///< The coordinator's address for workers.
+  /// A line of bash that ends as `proofmass-worker --connect ADDRESS --name NAME-"$1" ...`.
+  std::string worker_command = {};
   std::optional<unsigned> num_processors = {};   ///< Of a worker; nothing: a node of its own.
   std::vector<std::string> submit_options = {};  ///< Further ones, as the batch system has them.
   std::string batch_system = {};                 ///< Its name.

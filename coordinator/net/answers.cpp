@@ -104,15 +104,20 @@ Order order_for(const proto::AnswerRequest& request, const ServiceConfig& config
   return order;
 }
 
-/// So that no copy takes the space that results need.
-void require_space(const Order& order, const std::filesystem::path& database) {
+/// So that copies do not take the space that results need.
+/// @param promised  Bytes of the copies that are being made.
+/// @return Bytes of the copy.
+std::uint64_t require_space(const Order& order, const std::filesystem::path& database,
+                            std::uint64_t promised) {
   std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(database, error);
-  if (error) return;  // Making the copy says why.
+  const std::uint64_t size = std::filesystem::file_size(database, error);
+  if (error) return 0;  // Making the copy says why.
   const std::filesystem::space_info space = std::filesystem::space(order.directory, error);
-  if (error || space.available >= 2 * size) return;
-  throw Error(fmt::format("disk = {} bytes available (must be {}, twice the size of the database)",
-                          space.available, 2 * size));
+  const std::uint64_t wanted = 2 * (size + promised);
+  if (error || space.available >= wanted) return size;
+  throw Error(fmt::format(
+      "disk = {} bytes available (must be {}, twice the size of the database{})", space.available,
+      wanted, promised > 0 ? " and of those that are being copied; try again later" : ""));
 }
 
 /// @param directory  Is made if it is not there.
@@ -257,7 +262,9 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
   require_room(asker.name);
   const std::uint64_t id = std::max<std::uint64_t>(1, context_.start.epoch.value + num_answers_++);
   const Order order = order_for(request, context_.config, database, id);
-  if (order.copy) require_space(order, database);
+  std::uint64_t promised = 0;
+  for (const Computing& other : computing_) promised += other.copy_size;
+  const std::uint64_t copy_size = order.copy ? require_space(order, database, promised) : 0;
   make_room();
   const auto is_cancelled = std::make_shared<std::atomic<bool>>(false);
   const auto compute = [order, id, is_cancelled]() -> Computed {
@@ -277,6 +284,7 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
   computing_.push_back({.owner = asker.name,
                         .respond = std::move(respond),
                         .is_cancelled = is_cancelled,
+                        .copy_size = copy_size,
                         .result = std::async(std::launch::async, compute)});
 }
 

@@ -64,6 +64,7 @@ class Answers {
     std::string owner;
     Respond respond;
     std::shared_ptr<std::atomic<bool>> is_cancelled;
+    std::uint64_t copy_size = 0;  ///< Bytes; 0 if no copy is made.
     std::future<Computed> result;
   };
   struct Kept {

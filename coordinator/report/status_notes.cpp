@@ -96,7 +96,13 @@ Remark comparison_note(const proto::CampaignStatus& campaign) {
 
 std::string service_line(const proto::StatusReply& status, std::set<std::string> versions) {
   versions.erase("");
-  if (versions.empty()) versions.insert(status.model_version());
+  // A campaign that is finished may be of another version of the program's model.
+  const std::string& own = status.model_version();
+  const auto num_own = std::erase_if(
+      versions, [family = own.substr(0, own.rfind('-') + 1)](const std::string& version) {
+        return !family.empty() && version.starts_with(family);
+      });
+  if (versions.empty() || num_own > 0) versions.insert(own);
   return fmt::format("Proofmass {}, model{} {}, up {}", status.version(),
                      versions.size() > 1 ? "s" : "", fmt::join(versions, ", "),
                      duration_text(status.uptime_s()));

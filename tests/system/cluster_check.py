@@ -3,7 +3,8 @@
 digest of `proofmass run`:
 
 - all connections, with keys, pass through forwarders of TCP, as ssh -L makes them;
-- the workers are started by deploy/dask_workers.py on the two workers of a Dask cluster.
+- the workers are started by deploy/dask_workers.py on the two workers of a Dask cluster, of which
+  one is lost the next time.
 
 Needs Debian's python3-distributed. Exit code 0 if all holds, 1 if not; 77 if it cannot run, but 1 if
 the environment has CI.
@@ -135,16 +136,18 @@ def check_dask(campaign):
     port = socket.create_server(("127.0.0.1", 0)).getsockname()[1]
     campaign.start("scheduler", "dask-scheduler", "--host", "127.0.0.1", "--port", str(port),
                    "--no-dashboard")
-    for number in (1, 2):
+    dask_workers = [
         campaign.start(f"dask-{number}", "dask-worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1",
                        "--no-dashboard", "--local-directory", str(campaign.directory))
+        for number in (1, 2)
+    ]
     for number in (1, 2):
         log = campaign.directory / f"dask-{number}.log"
         wait_until("dask-worker", lambda log=log: "Registered to" in log.read_text())
-    recipe = campaign.start("recipe", PYTHON, str(DEPLOY / "dask_workers.py"),
-                            f"tcp://127.0.0.1:{port}", "--connect",
-                            f"tcp://127.0.0.1:{campaign.worker_port}", "--keys",
-                            str(campaign.directory / "keys"), "--threads", "1", "--idle-timeout", "5")
+    command = (PYTHON, str(DEPLOY / "dask_workers.py"), f"tcp://127.0.0.1:{port}", "--connect",
+               f"tcp://127.0.0.1:{campaign.worker_port}", "--keys", str(campaign.directory / "keys"),
+               "--threads", "1", "--idle-timeout")
+    recipe = campaign.start("recipe", *command, "5")
     log = campaign.directory / "coordinator.log"
     before = 1  # The worker behind the tunnel.
     wait_until("workers", lambda: log.read_text().count("worker_registered") == before + 2)
@@ -152,6 +155,10 @@ def check_dask(campaign):
     campaign.wait_for_end(campaign.client_port, "dask")
     assert recipe.wait(PATIENCE_S) == 0, "the exit code of dask_workers.py"
     assert campaign.num_workers("dask") == 2, "both workers delivered"
+    recipe = campaign.start("recipe-2", *command, "20")
+    wait_until("workers", lambda: log.read_text().count("worker_registered") == before + 4)
+    dask_workers[1].terminate()
+    assert recipe.wait(PATIENCE_S) == 1, "the exit code of dask_workers.py after a loss"
 
 
 def main():

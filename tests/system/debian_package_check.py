@@ -75,6 +75,10 @@ def check_contents(build, packages, directory):
     packaged = {name for name in packaged if not name.startswith("/etc/default/")}
     check(packaged == installed, f"packaged and installed differ by {packaged ^ installed}")
 
+    for package in packages.values():
+        version = output_of("dpkg-deb", "--field", package, "Version")
+        check(re.search(r"\+\d{8}\.\d{6}", version), f"version = {version} (must have a time)")
+
     worker = packages["proofmass-worker"]
     size = worker.stat().st_size
     check(size < WORKER_SIZE_MAX, f"size = {size} bytes (must be below {WORKER_SIZE_MAX})")
@@ -225,7 +229,7 @@ def check_units(machine):
 
 def run_campaign(machine, expected):
     machine.run(
-        "proofmass keygen /etc/proofmass/keys\n"
+        "(umask 077; proofmass keygen /etc/proofmass/keys)\n"
         "echo PROOFMASS_CONNECT=tcp://127.0.0.1:5555 >> /etc/default/proofmass-worker\n"
         "systemctl enable --now proofmass-coordinator\n"
         "systemctl enable --now proofmass-worker@1\n"

@@ -358,8 +358,9 @@ def run_by_factory(site, expected):
         return json.loads(process.stdout)["campaigns"][0]["num_done"] if process.stdout else 0
 
     def jobs(state):
-        listing = ("squeue", "--noheader", "--name=fleet", f"--states={state}", "--format=%i %N")
-        return [line.split() for line in site.answer(*listing).stdout.splitlines()]
+        listing = ("squeue", "--noheader", f"--states={state}", "--format=%j %i %N")
+        lines = [line.split() for line in site.answer(*listing).stdout.splitlines()]
+        return [line[1:] for line in lines if line[0].startswith("fleet-")]
 
     with (
         site.started("served.log", *coordinator) as service,

@@ -97,7 +97,10 @@ void Conversation::give_back_late_batches(TimePoint now) {
 
 void Conversation::leave_if_done() {
   if (ending_ || !leaving_ || !unfinished_.empty() || !unacknowledged_.empty()) return;
-  leave(leaving_->reason == wire::LossReason::drained ? "drained" : "nothing left to do");
+  const wire::LossReason reason = leaving_->reason;
+  const bool is_out_of_time = reason == wire::LossReason::walltime;
+  leave(reason == wire::LossReason::drained ? "drained"
+                                            : (is_out_of_time ? "its time is up" : "asked to end"));
 }
 
 void Conversation::leave(const std::string& reason) {

@@ -217,6 +217,11 @@ class Service {
  private:
   void open_spool(const std::filesystem::path& path, std::string_view model) {
     spool_.emplace(path, model);
+    if (!spool_->former_spool().empty()) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "spool_of_another_model",
+            .fields = {{"kept_as", spool_->former_spool().string()}}});
+    }
     if (spool_->num_bytes_dropped() > 0) {
       log_({.severity = wire::Severity::warning,
             .kind = "spool_torn",

@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 #include "proto/link/whole_file.hpp"
@@ -17,6 +18,7 @@
 namespace proofmass::worker {
 namespace {
 
+constexpr std::string_view header_begin = "proofmass-spool 1 ";
 constexpr std::size_t size_bytes = 4;
 constexpr std::size_t checksum_bytes = 8;
 
@@ -62,11 +64,19 @@ std::optional<proto::ResultBatch> batch_from(std::string_view payload) {
   return std::move(*envelope->mutable_result_batch());
 }
 
+/// The model of a spool; empty of another file.
+std::string_view model_in(std::string_view content) {
+  if (!content.starts_with(header_begin)) return {};
+  content.remove_prefix(header_begin.size());
+  const std::string_view model = content.substr(0, content.find('\n'));
+  return model.size() < content.size() && is_name(model) ? model : std::string_view();
+}
+
 }  // namespace
 
 Spool::Spool(std::filesystem::path path, std::string_view model, std::uint64_t size_max)
     : path_(std::move(path)),
-      header_(fmt::format("proofmass-spool 1 {}\n", model)),
+      header_(fmt::format("{}{}\n", header_begin, model)),
       size_max_(size_max),
       file_(wire::open_own_file("spool", path_, wire::IfAbsent::make)) {
   lock();
@@ -104,9 +114,24 @@ void Spool::read() {
     if (const auto reason = write(header_)) throw Error(*reason);
   } else if (content.starts_with(header_)) {
     read_records(content);
+  } else if (const std::string_view model = model_in(content); !model.empty()) {
+    set_aside(model);
   } else {
-    throw Error(message("must be a spool of the same model, or not exist"));
+    throw Error(message("must be a spool, or not exist"));
   }
+}
+
+// Its results are of use to a coordinator of that model only.
+void Spool::set_aside(std::string_view model) {
+  former_spool_ = fmt::format("{}.{}", path_.string(), model);
+  const int error_number = wire::publish_file(path_, former_spool_, wire::IfThere::keep);
+  if (error_number != 0) {
+    throw Error(message(fmt::format("of the model {}; cannot become {}: {}", model,
+                                    former_spool_.string(), std::strerror(error_number))));
+  }
+  file_ = wire::Descriptor(wire::open_own_file("spool", path_, wire::IfAbsent::make));
+  lock();
+  read();
 }
 
 void Spool::read_records(std::string_view content) {

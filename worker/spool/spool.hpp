@@ -30,11 +30,10 @@ class Spool {
 
   /// Opens or makes the file and reads what it holds.
   ///
-  /// @param model     is_name() holds; results of another model are not delivered.
+  /// @param model     is_name() holds; a spool of another model is set aside.
   /// @param size_max  Bytes that the file may have.
-  /// @throws Error reading `spool = PATH (rule)` if it cannot be opened, read or written, is
-  /// another
-  ///         worker's, or is no spool of this model.
+  /// @throws Error reading `spool = PATH (rule)` if it cannot be opened, read, written or set
+  ///         aside, is another worker's, or is no spool.
   Spool(std::filesystem::path path, std::string_view model,
         std::uint64_t size_max = default_size_max);
   ~Spool();  ///< Removes the file if it holds nothing.
@@ -45,6 +44,8 @@ class Spool {
   [[nodiscard]] const std::vector<wire::LeasedResult>& former_results() const {
     return former_results_;
   }
+  /// Where the spool of another model is now that had its name; empty if there was none.
+  [[nodiscard]] const std::filesystem::path& former_spool() const { return former_spool_; }
   /// Bytes at its end that were no records and have been dropped.
   [[nodiscard]] std::uint64_t num_bytes_dropped() const { return num_bytes_dropped_; }
 
@@ -67,6 +68,7 @@ class Spool {
   [[nodiscard]] std::string message(std::string_view reason) const;
   void lock() const;
   void read();
+  void set_aside(std::string_view model);
   void read_records(std::string_view content);
   void clear();
   /// The reason if it cannot be written; then the file is as before.
@@ -77,6 +79,7 @@ class Spool {
   std::uint64_t size_max_;
   wire::Descriptor file_;
   std::uint64_t size_ = 0;
+  std::filesystem::path former_spool_;
   std::uint64_t num_bytes_dropped_ = 0;
   std::vector<wire::LeasedResult> former_results_;
   std::set<RunKey> spooled_;

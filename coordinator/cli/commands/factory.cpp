@@ -18,6 +18,7 @@
 #include "coordinator/report/status_notes.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
 #include "proto/link/machine.hpp"
@@ -37,8 +38,7 @@ constexpr std::chrono::seconds start_margin{60};
 struct FactoryOptions {
   ClientOptions client;
   BatchSystem system;
-  FactoryConfig factory;  ///< But for the walltime and the worker's command.
-  std::string worker_endpoint;
+  FactoryConfig factory;  ///< But for the walltime, the name in the queue and the command.
   std::string worker_keys;
   std::string start_command;
   std::string wrap_command;
@@ -63,9 +63,10 @@ std::string worker_command(const FactoryOptions& options) {
     command += checked_line("worker-wrap-cmd", options.wrap_command) + " ";
   }
   const auto walltime = std::chrono::minutes(options.walltime_min) - start_margin;
-  command += fmt::format("proofmass-worker --connect {} --name {}-\"$1\" --max-walltime {}s",
-                         wire::shell_word(checked_line("worker-connect", options.worker_endpoint)),
-                         options.factory.name, walltime.count());
+  command +=
+      fmt::format("proofmass-worker --connect {} --name {}-\"$1\" --max-walltime {}s",
+                  wire::shell_word(checked_line("worker-connect", options.factory.worker_endpoint)),
+                  options.factory.name, walltime.count());
   command += fmt::format(" --idle-timeout {}s", options.idle_timeout_s);
   if (!options.worker_keys.empty()) {
     command +=
@@ -93,6 +94,10 @@ FactoryConfig checked(const FactoryOptions& options) {
     throw UsageError(fmt::format("--workers-min = {} (must be at most --workers-max, {})",
                                  config.workers_min, config.workers_max));
   }
+  // Also campaign.sbatch, and a factory of another coordinator, may be called `proofmass`. Older
+  // versions of PBS take 15 characters.
+  const std::string coordinator = config.worker_endpoint + " " + options.client.connection.endpoint;
+  config.queue_name = fmt::format("{}-{:05x}", config.name, fnv1a(coordinator) & 0xfffff);
   config.worker_command = worker_command(options);
   if (options.system.running.empty()) {
     config.workers_log = std::filesystem::absolute(config.name + "-workers.log").string();
@@ -274,7 +279,7 @@ void add_sizing(CLI::App& command, FactoryOptions& options) {
 
 void add_workers_of(CLI::App& command, FactoryOptions& options) {
   command
-      .add_option("--worker-connect", options.worker_endpoint,
+      .add_option("--worker-connect", options.factory.worker_endpoint,
                   "The coordinator's address for workers")
       ->required();
   command.add_option("--worker-keys", options.worker_keys,

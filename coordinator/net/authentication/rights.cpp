@@ -104,8 +104,7 @@ void require_right(const Asker& asker, Right right) {
 
 void require_control(const Asker& asker, std::string_view campaign, std::string_view owner) {
   if (asker.rights.contains(Right::control)) return;
-  require_right(asker, Right::submit);
-  if (owner.empty() || owner == asker.name) return;
+  if (owner.empty() || owner == asker.name) return require_right(asker, Right::submit);
   throw Error(fmt::format("campaign = {} (belongs to {}; the key {} must have the right `control`)",
                           campaign, owner, asker.name));
 }

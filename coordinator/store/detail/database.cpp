@@ -101,10 +101,15 @@ std::string corruption(const std::filesystem::path& file, bool had_log, const ch
 constexpr std::string_view log_out_of_reach =
     "has a log that only a user who may write to its directory can read";
 
-// SQLite keeps an index beside a log; where it cannot make one, it says that it cannot open a file.
-bool is_log_out_of_reach(const std::filesystem::path& file) {
+constexpr std::string_view no_room_for_log =
+    "needs a log or a journal beside it, and its directory is not writable; use a copy in a "
+    "directory that is";
+
+// SQLite keeps a log, and an index beside it; where it cannot make them, it says that it cannot
+// open a file.
+bool is_beside_no_place(const std::filesystem::path& file) {
   const std::string directory = wire::directory_of(log_path(file)).string();
-  return has_log(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) == 0 &&
+  return ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) == 0 &&
          ::faccessat(AT_FDCWD, directory.c_str(), W_OK, AT_EACCESS) != 0;
 }
 
@@ -118,8 +123,7 @@ std::string explanation_of_readonly(int code, sqlite3* connection) {
     case SQLITE_READONLY_CANTINIT:
       return std::string(log_out_of_reach);
     case SQLITE_READONLY_DIRECTORY:
-      return "needs a log or a journal beside it, and its directory is not writable; use a copy in "
-             "a directory that is";
+      return std::string(no_room_for_log);
     default:
       return sqlite3_errmsg(connection);
   }
@@ -144,7 +148,9 @@ std::string explanation(int code, sqlite3* connection, const std::filesystem::pa
     case SQLITE_IOERR:
       return fmt::format("{}; what was committed before is safe", sqlite3_errmsg(connection));
     case SQLITE_CANTOPEN:
-      if (is_log_out_of_reach(file)) return std::string(log_out_of_reach);
+      if (is_beside_no_place(file)) {
+        return std::string(has_log(file) ? log_out_of_reach : no_room_for_log);
+      }
       return fmt::format("{}: {}", sqlite3_errmsg(connection),
                          std::strerror(sqlite3_system_errno(connection)));
     default:

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "coordinator/store/detail/file_place.hpp"
+#include "core/model.hpp"
 #include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
@@ -60,6 +61,16 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
       "lacks its log {}: results may be missing; copy both files, or make copies with `proofmass "
       "backup`; resuming the campaign computes what is missing",
       detail::log_path(file).filename().string()));
+}
+
+// Brought up to date, the file would be lost to the older program, which alone has its model.
+void require_own_model(const Database& database, const Model& model) {
+  const std::string stored = database.text("SELECT model_version FROM campaign");
+  if (stored == model.version()) return;
+  database.refuse(
+      fmt::format("is of the model {}, and this program has {}: the program that made it can go on "
+                  "with it",
+                  stored, model.version()));
 }
 
 // First everything else, then the mark alone: whenever the file says that it needs no log, all is
@@ -157,6 +168,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   detail::configure(database);
   kind = detail::check_campaign_file(database);
   // Before anything is changed: a file that cannot be served is left as it is.
+  if (detail::is_older(database)) require_own_model(database, *kind.model);
   const detail::RowCounts counts = detail::check_all_pages(database);
   check_after_unclean_end(database);
   const bool has_log = detail::has_log(file);

@@ -168,6 +168,8 @@ TEST(StatusTable, NamesTheModelsOfTheCampaigns) {
   EXPECT_EQ(first_line(status_with({ruler, scale})),
             "Proofmass 0.1.0, models balance-3, ruler-1, up 3 h 20 min");
   EXPECT_EQ(first_line(status_with({})), "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min");
+  scale.set_model_version("hardy2013-1");  // Of an older program, and finished.
+  EXPECT_EQ(first_line(status_with({scale})), "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min");
 }
 
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {

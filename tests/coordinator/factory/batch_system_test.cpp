@@ -12,7 +12,9 @@ const BatchSystem& system_of(std::string_view name) {
 
 FactoryConfig example() {
   return {.name = "fleet",
+          .queue_name = "fleet-1a2b3",
           .walltime = std::chrono::seconds(2 * 3600 + 5 * 60 + 7),
+          .worker_endpoint = "tcp://head:2",
           .worker_command = "echo \"it's $1\""};
 }
 
@@ -52,8 +54,8 @@ TEST(BatchSystem, AsksSlurmForAMachineOrForProcessors) {
   FactoryConfig config = example();
   config.submit_options = {"--partition=long"};
   EXPECT_THAT(system_of("slurm").submission(config).arguments,
-              ElementsAre("sbatch", "--parsable", "--job-name=fleet", "--nodes=1", "--ntasks=1",
-                          "--time=2:05:07", "--exclusive", "--partition=long"));
+              ElementsAre("sbatch", "--parsable", "--job-name=fleet-1a2b3", "--nodes=1",
+                          "--ntasks=1", "--time=2:05:07", "--exclusive", "--partition=long"));
   config.num_processors = 12;
   EXPECT_THAT(system_of("slurm").submission(config).arguments,
               AllOf(Contains("--cpus-per-task=12"), Not(Contains("--exclusive"))));
@@ -73,8 +75,8 @@ TEST(BatchSystem, ReadsWhatSlurmAnswers) {
 TEST(BatchSystem, AsksPbsForAMachineOrForProcessors) {
   FactoryConfig config = example();
   EXPECT_THAT(system_of("pbs").submission(config).arguments,
-              ElementsAre("qsub", "-N", "fleet", "-l", "walltime=2:05:07", "-l", "select=1", "-l",
-                          "place=excl"));
+              ElementsAre("qsub", "-N", "fleet-1a2b3", "-l", "walltime=2:05:07", "-l", "select=1",
+                          "-l", "place=excl"));
   config.num_processors = 12;
   EXPECT_THAT(system_of("pbs").submission(config).arguments,
               AllOf(Contains("select=1:ncpus=12"), Not(Contains("place=excl"))));
@@ -93,7 +95,7 @@ std::string folder_of_qselect() {
   std::filesystem::create_directories(folder);
   const std::string file = folder + "/qselect";
   std::ofstream(file) << "#!/bin/sh\n"
-                         "[ \"$1 $3 $4 $5\" = '-u -N fleet -s' ] || exit 2\n"
+                         "[ \"$1 $3 $4 $5\" = '-u -N fleet-1a2b3 -s' ] || exit 2\n"
                          "for state in B E F H M Q R S T U W X; do\n"
                          "  case $6 in *$state*) echo $state.head ;; esac\n"
                          "done\n";
@@ -122,8 +124,8 @@ TEST(BatchSystem, ListsWhatCondorHasNotEnded) {
                                   "\"; for (JobStatus = 1; JobStatus <= 7; ++JobStatus) if (" +
                                   listing.arguments.at(2) + ") print JobStatus }"}});
   };
-  EXPECT_EQ(listed("fleet"), "1\n2\n5\n7\n");
-  EXPECT_EQ(listed("other"), "");
+  EXPECT_EQ(listed("fleet-1a2b3"), "1\n2\n5\n7\n");
+  EXPECT_EQ(listed("fleet"), "");
 }
 
 // What HTCondor does with `arguments` in its new syntax: the outer double quotes go, two double
@@ -154,10 +156,11 @@ TEST(BatchSystem, ReadsWhatCondorAnswers) {
 TEST(BatchSystem, FindsLocalWorkersByNameAndProcess) {
   EXPECT_THAT(ids_and_states(allocations_of(
                   system_of("local"), example(),
-                  " 17 proofmass-worker --name fleet-17 --threads 2\n"
-                  " 18 proofmass-worker --name fleet-17 --threads 2\n"  // Its second process.
-                  " 19 proofmass-worker --name other-19\n"
-                  " 20 grep --name\n")),
+                  " 17 proofmass-worker --connect tcp://head:2 --name fleet-17 --threads 2\n"
+                  " 18 proofmass-worker --connect tcp://head:2 --name fleet-17\n"  // Its second.
+                  " 19 proofmass-worker --connect tcp://head:2 --name other-19\n"
+                  " 20 proofmass-worker --connect tcp://head:3 --name fleet-20\n"
+                  " 21 grep --name\n")),
               ElementsAre("17 runs"));
 }
 
@@ -165,14 +168,19 @@ TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifierAndALog) {
   FactoryConfig config = example();
   const std::string file = testing::TempDir() + "/started-by-factory";
   config.workers_log = file + ".log";
-  config.worker_command = "echo here >&2; echo \"$1\" $$ > " + wire::shell_word(file + ".new") +
-                          " && mv " + wire::shell_word(file + ".new") + " " +
-                          wire::shell_word(file);
+  std::ofstream(config.workers_log).close();
+  std::filesystem::resize_file(config.workers_log, 17 << 20);
+  config.worker_command = "source /dev/null; echo here >&2; echo \"$1\" $$ > " +
+                          wire::shell_word(file + ".new") + " && mv " +
+                          wire::shell_word(file + ".new") + " " + wire::shell_word(file);
   const BatchSystem& local = system_of("local");
   const std::string id = id_in(output_of(local.submission(config)), "sh");
-  const std::string seen = output_of(
-      {{"sh", "-c", "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\"*; rm \"$0\"*", file}});
-  EXPECT_EQ(seen, id + " " + id + "\nhere\n");
+  const std::string seen =
+      output_of({{"sh", "-c",
+                  "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\" \"$0.log\"; stat -c %s "
+                  "\"$0.log.1\"; rm \"$0\"*",
+                  file}});
+  EXPECT_EQ(seen, id + " " + id + "\nhere\n17825792\n") << "an old log made room";
 }
 
 TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {

@@ -181,5 +181,16 @@ TEST_F(AnswersTest, DoNotCopyADatabaseForWhichTheDiskHasNoRoom) {
               HasSubstr("(must be " + std::to_string(2 * size) + ", twice the size of the"));
 }
 
+// Nothing is written yet of the first copy when the second is asked for.
+TEST_F(AnswersTest, KeepTheRoomOfCopiesThatAreBeingMade) {
+  answer_with("sleep 3600");
+  const std::uintmax_t available = std::filesystem::space(directory_ / "").available;
+  std::filesystem::resize_file(directory_ / "a.db", available / 3);
+  std::filesystem::create_directory(config_.answer_directory);
+  ask("anna", proto::QUESTION_DATABASE);
+  EXPECT_THAT(test::message_of<Error>([&] { ask("ben", proto::QUESTION_DATABASE); }),
+              HasSubstr("of those that are being copied; try again later)"));
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator

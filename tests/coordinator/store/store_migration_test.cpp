@@ -34,7 +34,8 @@ void make_older(const std::filesystem::path& path) {
   old.execute(detail::migrations(model(), test::schema())[0]);
   old.execute(
       "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
-      " VALUES (7, 'old', '42', 5, 'text', 'hardy2013-3', 'b')");
+      " VALUES (7, 'old', '42', 5, 'text', '" +
+      std::string(model().version()) + "', 'b')");
   for (const test::ParameterInfo& info : test::parameter_infos()) {
     old.execute("INSERT INTO parameter VALUES (" + std::to_string(index(info.parameter) + 1) +
                 ", '" + std::string(info.name) + "', '', '', 1, 0, 0, 0)");
@@ -217,6 +218,17 @@ TEST_F(StoreMigration, IsNotPossibleFromBeforeTheFirstVersion) {
             "campaign database = " + file().string() +
                 " (was made before the first release: its user_version is 7, the oldest known one "
                 "8)");
+}
+
+// Its own program could not read it afterwards.
+TEST_F(StoreMigration, LeavesACampaignToTheProgramThatHasItsModel) {
+  make_older_file();
+  change("UPDATE campaign SET model_version = 'hardy2013-3'");
+  const std::string before = test::content_of(file());
+  EXPECT_THAT(test::store_error_of([&] { Store::open(file()); }),
+              HasSubstr("(is of the model hardy2013-3, and this program has "));
+  EXPECT_TRUE(test::content_of(file()) == before);
+  EXPECT_EQ(Store::open_read_only(file()).model_version(), "hardy2013-3");
 }
 
 /// While it lives, temporary files are made in another directory.

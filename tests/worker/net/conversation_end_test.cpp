@@ -50,7 +50,7 @@ TEST_F(ConversationTest, GivesBackRunsOfEachCampaign) {
   EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 2));
   EXPECT_EQ(take_sent<proto::GiveBack>().runs(0).campaign(), campaign_2.value);
   (void)take_sent<proto::Bye>();
-  expect_ending(Ending::Kind::done, "nothing left to do");
+  expect_ending(Ending::Kind::done, "asked to end");
 }
 
 TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
@@ -58,7 +58,7 @@ TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
   (void)take_sent<proto::Hello>();
   conversation->on_drain_request(now);
   EXPECT_TRUE(sent.empty()) << "nobody knows it";
-  expect_ending(Ending::Kind::done, "nothing left to do");
+  expect_ending(Ending::Kind::done, "asked to end");
 }
 
 TEST_F(ConversationTest, LeavesAtOnceWhenAskedAgain) {
@@ -96,7 +96,7 @@ TEST_F(ConversationTest, GivesBackBatchesThatDoNotFitIntoTheTime) {
   EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(0, 1));
   EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 1));
   EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  expect_ending(Ending::Kind::done, "nothing left to do");
+  expect_ending(Ending::Kind::done, "asked to end");
 }
 
 TEST_F(ConversationTest, EndsWhenTheDrainTakesTooLong) {
@@ -204,7 +204,7 @@ TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenDrainedByTheCoordinator) {
   (void)take_sent<proto::Heartbeat>();
   EXPECT_EQ(take_sent<proto::GiveBack>().reason(), proto::LOSS_REASON_WALLTIME);
   (void)take_sent<proto::Bye>();
-  expect_ending(Ending::Kind::done, "nothing left to do");
+  expect_ending(Ending::Kind::done, "its time is up");
 }
 
 // The batch system kills it at 30 s, whatever it was asked before: its results must be kept by

@@ -143,18 +143,32 @@ TEST_F(SpoolTest, BelongsToOneWorker) {
   EXPECT_EQ(error_of_opening(), "spool = " + path.string() + " (used by another worker)");
 }
 
-TEST_F(SpoolTest, DoesNotDeliverResultsOfAnotherModel) {
+TEST_F(SpoolTest, SetsResultsOfAnotherModelAside) {
   store({result(1)});
-  const std::string expected =
-      "spool = " + path.string() + " (must be a spool of the same model, or not exist)";
-  EXPECT_EQ(error_of_opening("model-2"), expected);
+  const std::string before = content();
+  {
+    Spool spool(path, "model-2");
+    EXPECT_TRUE(spool.former_results().empty());
+    EXPECT_EQ(spool.former_spool(), path.string() + ".model");
+    EXPECT_EQ(spool.append(std::vector{result(2)}), std::nullopt);
+  }
+  EXPECT_EQ(runs_of(Spool(path, "model-2").former_results()), std::vector<std::uint64_t>{2});
+  std::filesystem::rename(path.string() + ".model", path);
+  EXPECT_EQ(content(), before);
+}
+
+TEST_F(SpoolTest, OverwritesNothingWhenItSetsAside) {
+  store({result(1)});
+  std::ofstream(path.string() + ".model") << "kept";
+  EXPECT_EQ(error_of_opening("model-2"), "spool = " + path.string() +
+                                             " (of the model model; cannot become " +
+                                             path.string() + ".model: File exists)");
   EXPECT_EQ(stored_runs(), std::vector<std::uint64_t>{1}) << "it is as it was";
 }
 
 TEST_F(SpoolTest, LeavesOtherFilesAlone) {
   replace_content("something that is no spool, and longer than its first line");
-  EXPECT_EQ(error_of_opening(),
-            "spool = " + path.string() + " (must be a spool of the same model, or not exist)");
+  EXPECT_EQ(error_of_opening(), "spool = " + path.string() + " (must be a spool, or not exist)");
   EXPECT_TRUE(content().starts_with("something"));
 }
 
