@@ -134,6 +134,9 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
     }
     if (!have_ratio_errors) table.notes.emplace_back("from, to: 95 % interval from replicates");
   }
+  const bool have_ratios = std::ranges::all_of(
+      statistics.quantities, [](const auto& of) { return of.squared_ratio.has_value(); });
+  if (!have_ratios) table.notes.emplace_back("where σ is 0, there is no ratio and no error within");
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
     const Quantity& quantity = schema.quantities[statistic.quantity];
     Row row{quantity.symbol, unit_cell(quantity),
