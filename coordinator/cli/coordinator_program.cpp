@@ -33,6 +33,7 @@
 #include "proto/link/log.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"
+#include "proto/model_program/program_model.hpp"
 
 extern char** environ;
 
@@ -267,6 +268,7 @@ int serve_campaigns(const ServeOptions& options) {
   Service service(campaigns_of(options, folder), config, log);
   std::optional<Page> page;
   if (page_config) page.emplace(*page_config, log);
+  wire::end_fresh_programs();  // Workers have their own.
   log_start(service, log);
   wire::ServiceNotices notices;
   notices.ready();

@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -29,6 +30,7 @@
 #include "core/random/stream.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
+#include "proto/model_program/json_line.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
@@ -86,7 +88,7 @@ void ErrorOutput::end(std::string_view program) {
 }
 
 ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
-    : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
+    : name_(program.string()) {
   auto [questions, its_input] = connected_pair();
   auto [answers, its_output] = connected_pair();
   auto [errors, its_errors] = new_pipe();
@@ -98,7 +100,11 @@ ProgramProcess::ProgramProcess(const std::filesystem::path& program, const Progr
                                  .environment = environment_without_settings(),
                                  .has_own_group = true});
   } catch (const Error& error) {
-    throw ModelProgramError(fmt::format("model program = {}", error.what()));
+    const std::string_view what = error.what();
+    const bool is_no_program = what.ends_with(std::generic_category().message(ENOEXEC));
+    throw ModelProgramError(
+        fmt::format("model program = {}{}", what,
+                    is_no_program ? "; a script begins with #! and what runs it" : ""));
   }
   kill_at_end_of(its_lifeline.number(), process_id_);
   questions_ = std::move(questions);
@@ -106,8 +112,15 @@ ProgramProcess::ProgramProcess(const std::filesystem::path& program, const Progr
   errors_ = std::move(errors);
   lifeline_ = std::move(lifeline);
   fcntl(errors_.number(), F_SETFL, O_NONBLOCK);
-  const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
-  const rlimit memory{memory_max, memory_max};
+  limit(limits);
+}
+
+void ProgramProcess::limit(const ProgramLimits& limits) {
+  answer_time_max_ = std::chrono::seconds(limits.answer_time_max_s);
+  rlimit memory{};
+  prlimit(process_id_, RLIMIT_DATA, nullptr, &memory);
+  // The hard one stays: nobody could raise it again.
+  memory.rlim_cur = std::min(memory.rlim_max, rlim_t{limits.memory_max_mib} << 20);
   prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
 }
 
@@ -137,6 +150,10 @@ void ProgramProcess::fail(std::string_view reason) const {
   throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
 }
 
+void ProgramProcess::fail_unasked(std::string_view text) const {
+  fail("answers what it was not asked: " + excerpt_of(text.substr(0, text.find('\n'))));
+}
+
 void ProgramProcess::write_some(std::string_view& text) const {
   const ssize_t size =
       send(questions_.number(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -148,10 +165,9 @@ void ProgramProcess::write_some(std::string_view& text) const {
 }
 
 void ProgramProcess::expect_silence() const {
-  char letter = 0;
-  if (recv(answers_.number(), &letter, 1, MSG_DONTWAIT | MSG_PEEK) > 0) {
-    fail("answers what it was not asked");
-  }
+  std::array<char, 81> part;  // NOLINT: recv() fills it.
+  const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT | MSG_PEEK);
+  if (size > 0) fail_unasked({part.data(), static_cast<std::size_t>(size)});
 }
 
 void ProgramProcess::read_some() {
@@ -173,23 +189,27 @@ void ProgramProcess::pass_on_errors() {
 }
 
 void ProgramProcess::ask(const std::vector<std::string>& questions,
-                         const std::function<void(std::string_view answer)>& on_answer) {
+                         const std::function<void(std::string_view answer)>& on_answer,
+                         std::function<void()> on_silence) {
   using Clock = std::chrono::steady_clock;
   expect_silence();
   std::string all;
   for (const std::string& question : questions) all += question + '\n';
   std::string_view unsent = all;
   std::size_t num_answered = 0;
-  Clock::time_point deadline = Clock::now() + answer_time_max_;
+  Clock::time_point asked_at = Clock::now();
   while (num_answered < questions.size()) {
     std::array<pollfd, 3> ends{{{answers_.number(), POLLIN, 0},
                                 {errors_.number(), POLLIN, 0},
                                 {questions_.number(), POLLOUT, 0}}};
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    if (left.count() <= 0) {
-      fail(fmt::format("no answer within {} s", answer_time_max_.count()));
+    const Clock::duration waited = Clock::now() - asked_at, most = answer_time_max_;
+    if (waited >= most) {
+      fail(fmt::format("no answer within {} s{}", answer_time_max_.count(),
+                       has_answered_ ? "" : "; it must flush each answer"));
     }
+    if (on_silence && waited >= most / 12) std::exchange(on_silence, nullptr)();
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>((on_silence ? most / 12 : most) - waited);
     poll(ends.data(), unsent.empty() ? 2 : 3, static_cast<int>(left.count()));
     if (ends[2].revents != 0) write_some(unsent);
     if (ends[1].revents != 0) pass_on_errors();
@@ -200,33 +220,38 @@ void ProgramProcess::ask(const std::vector<std::string>& questions,
       on_answer(std::string_view(received_).substr(begin, end - begin));
       begin = end + 1;
       ++num_answered;
-      deadline = Clock::now() + answer_time_max_;
+      has_answered_ = true;
+      asked_at = Clock::now();
     }
     received_.erase(0, begin);
     if (received_.size() > answer_size_max) {
       fail(fmt::format("answers with a line of more than {} bytes", answer_size_max));
     }
   }
-  if (!received_.empty()) fail("answers what it was not asked");
+  if (!received_.empty()) fail_unasked(received_);
 }
 
 namespace {
 
 using Json = nlohmann::json;
 
-/// With an answer of its own where something is wrong with the parameters.
-void expect_accepted(std::string_view answer, const std::filesystem::path& program) {
-  const Json json = Json::parse(answer, nullptr, false);
-  if (json.is_object() && json.contains("refused") && json["refused"].is_string() &&
-      json.contains("rule") && json["rule"].is_string()) {
-    const std::string name = json["refused"];
-    const double value = json.value("value", 0.0);
-    throw ConfigError("parameters." + name, detail::number_text(value),
-                      json["rule"].get<std::string>());
-  }
+/// @throws ConfigError about the parameter that the program refuses, if it does.
+void expect_accepted(std::string_view answer, const std::filesystem::path& program,
+                     const DescribedCampaign& campaign) {
+  Json json = Json::parse(answer, nullptr, false);
   if (json.is_object() && json.empty()) return;
-  throw ModelProgramError(fmt::format(
-      "model program = {} (must answer prepare with {{}} or what it refuses)", program.string()));
+  if (!json.is_object()) json = Json::object();
+  const Json refused = json.value("refused", Json()), rule = json.value("rule", Json());
+  for (std::size_t i = 0; i < campaign.parameters.size(); ++i) {
+    const std::string& name = campaign.description().parameters[i].name;
+    if (refused != name || !rule.is_string()) continue;
+    throw ConfigError("parameters." + name, detail::number_text(campaign.parameters[i]),
+                      rule.get<std::string>());
+  }
+  throw ModelProgramError(
+      fmt::format("model program = {} (must answer prepare with {{}}, or with a parameter that it "
+                  "refuses and the rule: {})",
+                  program.string(), excerpt_of(answer)));
 }
 
 /// The file may have been replaced since the model was loaded, and then other runs would be
@@ -242,20 +267,66 @@ void expect_same(std::string_view answer, const ProgramDescription& loaded,
       program.string(), now.version, loaded.version));
 }
 
-/// A process of the program that has accepted the parameters of a campaign.
+std::string describe_question() { return Json{{"ask", "describe"}}.dump(); }
+
+std::string prepare_question(const DescribedCampaign& campaign) {
+  Json question{{"ask", "prepare"}, {"parameters", Json::object()}};
+  for (std::size_t i = 0; i < campaign.parameters.size(); ++i) {
+    question["parameters"][campaign.description().parameters[i].name] = campaign.parameters[i];
+  }
+  return question.dump();
+}
+
+/// A process that has said what it is, and has computed nothing yet.
+struct FreshProcess {
+  std::unique_ptr<ProgramProcess> process;
+  std::string prepared;  // By this question; empty: not yet.
+};
+
+/// One of each program, for whoever needs one next: some take long to start.
+class FreshProcesses {
+ public:
+  static FreshProcesses& instance() {
+    static FreshProcesses all;
+    return all;
+  }
+
+  void keep(const std::filesystem::path& program, FreshProcess fresh) {
+    const std::lock_guard lock(mutex_);
+    processes_[program] = std::move(fresh);
+  }
+  /// Null if there is none.
+  FreshProcess take(const std::filesystem::path& program) {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(processes_[program], {});
+  }
+  void end() {
+    const std::lock_guard lock(mutex_);
+    processes_.clear();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::filesystem::path, FreshProcess> processes_;
+};
+
+/// A process of the program that has accepted the parameters of a campaign. None is asked to accept
+/// others after its first ones.
 std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& program,
                                                  const DescribedCampaign& campaign) {
   const ProgramDescription& of = campaign.description();
-  Json question{{"ask", "prepare"}, {"parameters", Json::object()}};
-  for (std::size_t i = 0; i < of.parameters.size(); ++i) {
-    question["parameters"][of.parameters[i].name] = campaign.parameters[i];
+  const std::string question = prepare_question(campaign);
+  FreshProcess fresh = FreshProcesses::instance().take(program);
+  if (fresh.process && fresh.prepared == question) return std::move(fresh.process);
+  if (!fresh.process || !fresh.prepared.empty()) {
+    fresh.process = std::make_unique<ProgramProcess>(program, of.limits);
+    fresh.process->ask({describe_question()},
+                       [&](std::string_view answer) { expect_same(answer, of, program); });
   }
-  auto process = std::make_unique<ProgramProcess>(program, of.limits);
-  process->ask({Json{{"ask", "describe"}}.dump()},
-               [&](std::string_view answer) { expect_same(answer, of, program); });
-  process->ask({question.dump()},
-               [&](std::string_view answer) { expect_accepted(answer, program); });
-  return process;
+  fresh.process->limit(of.limits);
+  fresh.process->ask({question},
+                     [&](std::string_view answer) { expect_accepted(answer, program, campaign); });
+  return std::move(fresh.process);
 }
 
 /// Processes of a program that have been told the parameters, each for one thread at a time.
@@ -263,6 +334,13 @@ class ProgramPlan final : public Plan {
  public:
   ProgramPlan(std::filesystem::path program, const DescribedCampaign& campaign)
       : program_(std::move(program)), campaign_(campaign) {}
+  ~ProgramPlan() override {
+    if (has_computed_ || idle_.empty()) return;
+    FreshProcesses::instance().keep(
+        program_, {.process = std::move(idle_.back()), .prepared = prepare_question(campaign_)});
+  }
+  ProgramPlan(const ProgramPlan&) = delete;
+  ProgramPlan& operator=(const ProgramPlan&) = delete;
 
   [[nodiscard]] std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet,
@@ -284,6 +362,7 @@ class ProgramPlan final : public Plan {
   const Recording recording_;
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<ProgramProcess>> idle_;
+  mutable bool has_computed_ = false;
 };
 
 std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
@@ -333,13 +412,17 @@ std::vector<double> numbers_in(const Json& object, const std::vector<std::string
 
 void ProgramPlan::read(std::string_view answer, RunResult& result) const {
   const auto refuse_as = [&](std::string_view what) {
-    return [this, run = result.run.value, what](std::string_view rule) {
-      throw ModelProgramError(
-          fmt::format("model program = {} (run {}: {} {})", program_.string(), run, what, rule));
+    return [this, answer, run = result.run.value, what](std::string_view rule) {
+      throw ModelProgramError(fmt::format("model program = {} (run {}: {} {}: {})",
+                                          program_.string(), run, what, rule, excerpt_of(answer)));
     };
   };
-  const Json json = Json::parse(answer, nullptr, false);
-  if (!json.is_object()) refuse_as("the answer")("must be an object of JSON");
+  Json json;
+  try {
+    json = object_in(answer);
+  } catch (const InvalidArgument& error) {
+    refuse_as("the answer")(error.what());
+  }
   if (json.value("run", Json()) != result.run.value) {
     refuse_as("the answer")(fmt::format("must be of this run, with \"run\": {}", result.run.value));
   }
@@ -387,26 +470,40 @@ std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> r
   if (progress) progress(num_steps());
   const std::lock_guard lock(mutex_);
   idle_.push_back(std::move(process));
+  if (!questions.empty()) has_computed_ = true;
   return results;
 }
 
 }  // namespace
 
-std::unique_ptr<const Model> model_of(const std::filesystem::path& path) {
+std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
+                                      std::function<void()> on_silence) {
   constexpr ProgramLimits while_describing{.answer_time_max_s = 60};
   const std::filesystem::path program = std::filesystem::absolute(path);
   const std::string source = program.string() + ": description";
   ProgramDescription description;
-  ProgramProcess(program, while_describing)
-      .ask({Json{{"ask", "describe"}}.dump()},
-           [&](std::string_view answer) { description = description_in(answer, source); });
+  auto process = std::make_unique<ProgramProcess>(program, while_describing);
+  process->ask(
+      {describe_question()},
+      [&](std::string_view answer) { description = description_in(answer, source); },
+      std::move(on_silence));
   if (!description.imported_from.empty()) {
     throw DefinitionError(source + ": imported_from (must not be there: a program computes)");
   }
+  // Databases hold descriptions from before this rule.
+  for (const ProgramQuantity& quantity : description.quantities) {
+    if (quantity.has_display_scale || quantity.display_unit == quantity.unit) continue;
+    throw DefinitionError(
+        fmt::format("{}: {}: display_unit = {} (needs display_scale, its size in units of {})",
+                    source, quantity.name, quantity.display_unit, quantity.unit));
+  }
+  FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
   return std::make_unique<DescribedModel>(
       std::move(description), std::nullopt, [program](const DescribedCampaign& campaign) {
         return std::make_unique<const ProgramPlan>(program, campaign);
       });
 }
+
+void end_fresh_programs() { FreshProcesses::instance().end(); }
 
 }  // namespace proofmass::wire

@@ -44,10 +44,15 @@ class ProgramProcess {
   /// Asks all questions and passes each answer on, without its end of line. Questions and answers
   /// pass one another, so that neither side waits for the other with more than one of them.
   ///
-  /// @param on_answer  What it throws leaves answers behind: the process is of no further use.
+  /// @param on_answer   What it throws leaves answers behind: the process is of no further use.
+  /// @param on_silence  Called once if there is no answer for a twelfth of the time that it has.
   /// @throws ModelProgramError, after which the process is of no further use either.
   void ask(const std::vector<std::string>& questions,
-           const std::function<void(std::string_view answer)>& on_answer);
+           const std::function<void(std::string_view answer)>& on_answer,
+           std::function<void()> on_silence = {});
+
+  /// Puts other limits in place of those that it was started with.
+  void limit(const ProgramLimits& limits);
 
  private:
   void write_some(std::string_view& text) const;
@@ -56,22 +61,30 @@ class ProgramProcess {
   void expect_silence() const;
   [[nodiscard]] std::string how_it_ended();
   [[noreturn]] void fail(std::string_view reason) const;
+  [[noreturn]] void fail_unasked(std::string_view text) const;
 
   std::string name_;
-  std::chrono::seconds answer_time_max_;
+  std::chrono::seconds answer_time_max_{};
   pid_t process_id_ = 0;  // 0 once it has ended.
   Descriptor questions_;
   Descriptor answers_;
   Descriptor errors_;
   Descriptor lifeline_;
   std::string received_;  // Behind the last line that was taken.
+  bool has_answered_ = false;
   ErrorOutput error_output_;
 };
 
-/// The model of a program in any language, which is asked what it is and then not kept.
-/// README.md has what is asked and answered.
+/// The model of a program in any language, which is asked what it is, and kept for what it is asked
+/// next. README.md has what is asked and answered.
+/// @param on_silence  Called once if the program takes long to say what it is.
 /// @throws ModelProgramError if it cannot be started or does not answer; DefinitionError naming the
 ///         program if its description breaks a rule.
-[[nodiscard]] std::unique_ptr<const Model> model_of(const std::filesystem::path& program);
+[[nodiscard]] std::unique_ptr<const Model> model_of(const std::filesystem::path& program,
+                                                    std::function<void()> on_silence = {});
+
+/// Ends the programs that model_of(), and plans that computed no run, have kept: before what may
+/// take long and does not need them, and before a fork, after which two would talk to them.
+void end_fresh_programs();
 
 }  // namespace proofmass::wire
