@@ -1,26 +1,13 @@
 #include "proto/model_program/program_model.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstdio>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -28,209 +15,11 @@
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/random/stream.hpp"
-#include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/json_line.hpp"
-#include "proto/text/visible_text.hpp"
+#include "proto/model_program/program_process.hpp"
 
 namespace proofmass::wire {
-namespace {
-
-/// Two connected sockets, which are closed in programs that are started, but for what they are
-/// given.
-std::pair<Descriptor, Descriptor> connected_pair() {
-  std::array<int, 2> ends{};
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) {
-    return {Descriptor(ends[0]), Descriptor(ends[1])};
-  }
-  throw ModelProgramError(
-      fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
-}
-
-/// A pipe: its first end is told what the second one writes, and when that is closed.
-std::pair<Descriptor, Descriptor> new_pipe() {
-  std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_CLOEXEC) == 0) return {Descriptor(ends[0]), Descriptor(ends[1])};
-  throw ModelProgramError(
-      fmt::format("model program: no pipe: {}", std::generic_category().message(errno)));
-}
-
-/// Has the kernel kill the group of processes as soon as nobody has the other end of the pipe: it
-/// then signals that there is something to read. A parent-death signal (PR_SET_PDEATHSIG) would
-/// come when the thread that started the program ends, and other threads go on using it.
-void kill_at_end_of(int pipe, pid_t group) {
-  fcntl(pipe, F_SETSIG, SIGKILL);
-  fcntl(pipe, F_SETOWN, -group);
-  fcntl(pipe, F_SETFL, O_ASYNC);
-}
-
-constexpr std::size_t first_errors_size_max = 65536;
-constexpr std::size_t last_errors_size_max = 4096;
-
-}  // namespace
-
-void ErrorOutput::take(std::string_view text) {
-  const std::size_t shown =
-      std::min(text.size(), first_errors_size_max - std::min(first_errors_size_max, size_));
-  say_on(stderr, text.substr(0, shown));
-  size_ += text.size();
-  last_ += text.substr(shown);
-  if (last_.size() > last_errors_size_max) last_.erase(0, last_.size() - last_errors_size_max);
-}
-
-void ErrorOutput::end(std::string_view program) {
-  const std::size_t shown = first_errors_size_max + last_.size();
-  if (size_ > shown) {
-    say(fmt::format("\n{}: {} bytes of its standard error are left out here\n", program,
-                    size_ - shown));
-  }
-  say_on(stderr, last_);
-}
-
-ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
-    : name_(program.string()) {
-  auto [questions, its_input] = connected_pair();
-  auto [answers, its_output] = connected_pair();
-  auto [errors, its_errors] = new_pipe();
-  auto [its_lifeline, lifeline] = new_pipe();
-  try {
-    process_id_ = start_program({.arguments = {name_},
-                                 .descriptors = {its_input.number(), its_output.number(),
-                                                 its_errors.number(), its_lifeline.number()},
-                                 .environment = environment_without_settings(),
-                                 .has_own_group = true});
-  } catch (const Error& error) {
-    const std::string_view what = error.what();
-    const bool is_no_program = what.ends_with(std::generic_category().message(ENOEXEC));
-    throw ModelProgramError(
-        fmt::format("model program = {}{}", what,
-                    is_no_program ? "; a script begins with #! and what runs it" : ""));
-  }
-  kill_at_end_of(its_lifeline.number(), process_id_);
-  questions_ = std::move(questions);
-  answers_ = std::move(answers);
-  errors_ = std::move(errors);
-  lifeline_ = std::move(lifeline);
-  fcntl(errors_.number(), F_SETFL, O_NONBLOCK);
-  limit(limits);
-}
-
-void ProgramProcess::limit(const ProgramLimits& limits) {
-  answer_time_max_ = std::chrono::seconds(limits.answer_time_max_s);
-  rlimit memory{};
-  prlimit(process_id_, RLIMIT_DATA, nullptr, &memory);
-  // The hard one stays: nobody could raise it again.
-  memory.rlim_cur = std::min(memory.rlim_max, rlim_t{limits.memory_max_mib} << 20);
-  prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
-}
-
-ProgramProcess::~ProgramProcess() {
-  if (process_id_ != 0) {
-    kill(process_id_, SIGKILL);
-    (void)wait_for_end(process_id_);
-  }
-  pass_on_errors();
-  error_output_.end(name_);
-}
-
-std::string ProgramProcess::how_it_ended() {
-  // It has closed its output, which it does just before it ends unless it means to stay.
-  constexpr int attempts_max = 100;
-  for (int i = 0; i < attempts_max; ++i) {
-    if (const std::optional<int> status = status_if_ended(process_id_)) {
-      process_id_ = 0;
-      return end_text(*status);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return "it closed its output";
-}
-
-void ProgramProcess::fail(std::string_view reason) const {
-  throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
-}
-
-void ProgramProcess::fail_unasked(std::string_view text) const {
-  fail("answers what it was not asked: " + excerpt_of(text.substr(0, text.find('\n'))));
-}
-
-void ProgramProcess::write_some(std::string_view& text) const {
-  const ssize_t size =
-      send(questions_.number(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  if (size >= 0) {
-    text.remove_prefix(static_cast<std::size_t>(size));
-  } else if (errno != EAGAIN && errno != EINTR) {
-    text = {};  // It has closed its input; that it has ended is seen where it should answer.
-  }
-}
-
-void ProgramProcess::expect_silence() const {
-  std::array<char, 81> part;  // NOLINT: recv() fills it.
-  const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT | MSG_PEEK);
-  if (size > 0) fail_unasked({part.data(), static_cast<std::size_t>(size)});
-}
-
-void ProgramProcess::read_some() {
-  std::array<char, 65536> part;  // NOLINT: recv() fills it.
-  const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT);
-  if (size > 0) {
-    received_.append(part.data(), static_cast<std::size_t>(size));
-  } else if (size == 0 || (errno != EAGAIN && errno != EINTR)) {
-    fail(fmt::format("gave no answer: {}", how_it_ended()));
-  }
-}
-
-void ProgramProcess::pass_on_errors() {
-  std::array<char, 65536> part;  // NOLINT: read() fills it.
-  // No more than once what a pipe holds: a program may print without an end.
-  const ssize_t size = read(errors_.number(), part.data(), part.size());
-  if (size > 0) error_output_.take({part.data(), static_cast<std::size_t>(size)});
-  if (size == 0) errors_ = Descriptor();  // It has closed it.
-}
-
-void ProgramProcess::ask(const std::vector<std::string>& questions,
-                         const std::function<void(std::string_view answer)>& on_answer,
-                         std::function<void()> on_silence) {
-  using Clock = std::chrono::steady_clock;
-  expect_silence();
-  std::string all;
-  for (const std::string& question : questions) all += question + '\n';
-  std::string_view unsent = all;
-  std::size_t num_answered = 0;
-  Clock::time_point asked_at = Clock::now();
-  while (num_answered < questions.size()) {
-    std::array<pollfd, 3> ends{{{answers_.number(), POLLIN, 0},
-                                {errors_.number(), POLLIN, 0},
-                                {questions_.number(), POLLOUT, 0}}};
-    const Clock::duration waited = Clock::now() - asked_at, most = answer_time_max_;
-    if (waited >= most) {
-      fail(fmt::format("no answer within {} s{}", answer_time_max_.count(),
-                       has_answered_ ? "" : "; it must flush each answer"));
-    }
-    if (on_silence && waited >= most / 12) std::exchange(on_silence, nullptr)();
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>((on_silence ? most / 12 : most) - waited);
-    poll(ends.data(), unsent.empty() ? 2 : 3, static_cast<int>(left.count()));
-    if (ends[2].revents != 0) write_some(unsent);
-    if (ends[1].revents != 0) pass_on_errors();
-    if (ends[0].revents != 0) read_some();
-    std::size_t begin = 0;
-    for (std::size_t end = 0; (end = received_.find('\n', begin)) != std::string::npos;) {
-      if (num_answered == questions.size()) break;
-      on_answer(std::string_view(received_).substr(begin, end - begin));
-      begin = end + 1;
-      ++num_answered;
-      has_answered_ = true;
-      asked_at = Clock::now();
-    }
-    received_.erase(0, begin);
-    if (received_.size() > answer_size_max) {
-      fail(fmt::format("answers with a line of more than {} bytes", answer_size_max));
-    }
-  }
-  if (!received_.empty()) fail_unasked(received_);
-}
-
 namespace {
 
 using Json = nlohmann::json;

@@ -1,3 +1,5 @@
+#include "proto/model_program/program_process.hpp"
+
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -6,7 +8,6 @@
 
 #include <thread>
 
-#include "proto/model_program/program_model.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
 
