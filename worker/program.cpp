@@ -25,7 +25,9 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/model_program/model_choice.hpp"
+#include "proto/model_program/program_model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/messages.hpp"
@@ -209,8 +211,9 @@ Cards open_cards(const Options& options, std::uint64_t reference_digest, const w
   return cards;
 }
 
-/// One whose program cannot compute its reference runs is left out, unless there is no other.
-void add_models(proto::Hello& hello, const wire::Log& log) {
+/// One whose program cannot compute its reference runs, or not the same again, is left out, unless
+/// there is no other.
+void add_models(const Options& options, proto::Hello& hello, const wire::Log& log) {
   std::string failure;
   for (const Model* const model : models()) {
     const std::string version(model->version());
@@ -219,6 +222,7 @@ void add_models(proto::Hello& hello, const wire::Log& log) {
     std::uint64_t digest = 0;
     try {
       digest = model->reference_digest(best_instruction_set());
+      if (!options.parent) wire::require_repeatable(*model);  // Else the campaign has done so.
     } catch (const Error& error) {
       failure = error.what();
       log({.severity = wire::Severity::warning,
@@ -248,7 +252,7 @@ proto::Hello hello_for(const Options& options, const ChildStart& start, const wi
                             : options.name);
   hello.set_process_id(process_id);
   hello.set_build(PROOFMASS_VERSION);
-  add_models(hello, log);
+  add_models(options, hello, log);
   if (start.former) *hello.mutable_former() = *start.former;
   if (!wire::is_name(hello.worker_name())) {
     throw InvalidArgument(fmt::format("name = {} ({})", hello.worker_name(), is_name_rule));
@@ -409,6 +413,7 @@ int run(const Options& options, const Program& program, std::span<const std::str
   if (signal_source(options) != SignalSource::supervisor) {
     return work_from({.session = {wire::random_number()}, .former = std::nullopt});
   }
+  wire::end_fresh_programs();
   return supervise(
       [&](const ChildStart& start) {
         return reporting_errors(program, [&] { return work_from(start); });
@@ -437,7 +442,8 @@ int run_worker(int argc, char** argv, const Program& program) {
       "--version", fmt::format("{} {} ({})", program.name, PROOFMASS_VERSION, model().version()));
   return reporting_errors(program, [&] {
     wire::settle_surroundings();
-    const auto left_out = wire::choose_models(argc, argv, wire::Broken::left_out);
+    const auto left_out =
+        wire::choose_models(argc, argv, wire::Broken::left_out, [](const std::string&) {});
     // Without any of its programs it is not the worker that somebody meant.
     if (!left_out.empty() && models().front() == &built_in_model()) throw Error(left_out.front());
     try {

@@ -91,6 +91,9 @@ void read_quantity(Document& document, const std::string& path, ImportSchema& sc
   for (const char* const key : {"objective", "display_scale"}) {
     copy_key<double>(document, path, key, quantity);
   }
+  if (quantity.contains("display_unit") && !quantity.contains("display_scale")) {
+    document.refuse_absence(path + ".display_scale", "display_unit needs it");
+  }
   schema.description["quantities"].push_back(std::move(quantity));
 }
 

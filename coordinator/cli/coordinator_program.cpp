@@ -32,6 +32,7 @@
 #include "proto/link/log.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"
+#include "proto/model_program/program_model.hpp"
 
 extern char** environ;
 
@@ -253,6 +254,7 @@ int serve_campaigns(const ServeOptions& options) {
   Service service(campaigns_of(options, folder), config, log);
   std::optional<Page> page;
   if (options.page.is_wanted()) page.emplace(options.page, log);
+  wire::end_fresh_programs();  // Workers have their own.
   log({.kind = "coordinator_started",
        .fields = {{"bind", service.workers_endpoint()},
                   {"bind_clients", service.clients_endpoint()},

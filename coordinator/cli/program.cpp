@@ -40,6 +40,7 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/whole_file.hpp"
+#include "proto/model_program/program_model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -116,7 +117,10 @@ void let_stop_signals_kill() {
 std::optional<int> refused_model(int argc, char** argv, std::string_view program,
                                  wire::Broken broken) {
   try {
-    for (const std::string& why : wire::choose_models(argc, argv, broken)) {
+    const auto say = [&](const std::string& what) {
+      wire::say(fmt::format("{}: {}\n", program, wire::visible_text(what)));
+    };
+    for (const std::string& why : wire::choose_models(argc, argv, broken, say)) {
       wire::say(fmt::format("{}: warning: {}; it is left out\n", program, wire::visible_text(why)));
     }
     return std::nullopt;
@@ -148,6 +152,7 @@ int run_proofmass(int argc, char** argv) {
   end_at_stop_signals();  // A program may take a while to say what its model is.
   const wire::Broken broken = broken_programs({argv, static_cast<std::size_t>(argc)});
   if (const auto refused = refused_model(argc, argv, "proofmass", broken)) return *refused;
+  if (broken == wire::Broken::left_out) wire::end_fresh_programs();  // It computes nothing.
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version",

@@ -41,8 +41,8 @@ std::string difference(const ModelIdentity& model, const ModelIdentity& wanted) 
         model.version);
   }
   return fmt::format(
-      "reference_digest of {} = {:016x} (must be {:016x}, where its campaign began, "
-      "unless that has tolerate_digest = true)",
+      "reference_digest of {} = {:016x} (must be {:016x}, where its campaign began; a model that "
+      "has changed needs another version, machines that differ need tolerate_digest = true)",
       model.version, model.reference_digest, wanted.reference_digest);
 }
 

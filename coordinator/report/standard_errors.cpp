@@ -164,7 +164,13 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
   }
   add_column(table, {"runs", false, have_intervals ? 9U : 18U, within, true},
              [&](auto i) { return figure_cell(share_within(all[i]), percent_scale); });
-  if (!have_intervals) return table;
+  const bool have_ratios =
+      std::ranges::all_of(all, [](const auto& of) { return of.squared_ratio.has_value(); });
+  const auto with_remark = [&]() -> Table& {
+    if (!have_ratios) table.notes.emplace_back("where σ is 0, there is no ratio and no error within");
+    return table;
+  };
+  if (!have_intervals) return with_remark();
   add_ends(table, {"from", false, 9, within}, {"to", false, 9, within},
            [&](auto i) { return IntervalAndScale(all[i].within, percent_scale); });
   if (have_ratio_errors) {

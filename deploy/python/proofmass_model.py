@@ -109,8 +109,7 @@ class Model:
         try:
             self.check(self._parameters)
         except Refused as refused:
-            value = self._parameters.get(refused.name)
-            return {"refused": refused.name, "value": value, "rule": refused.rule}
+            return {"refused": refused.name, "rule": refused.rule}
         return {}
 
     def _run(self, question):

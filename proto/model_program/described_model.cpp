@@ -211,8 +211,35 @@ std::uint64_t DescribedModel::reference_digest(InstructionSet set) const {
     for (const double value : results.front().estimate) {
       digest = fnv1a(digest, std::bit_cast<std::uint64_t>(value));
     }
+    last_reference_run_ = results.front();
   }
   return *(reference_digest_ = digest);
+}
+
+void DescribedModel::require_repeatable() const {
+  (void)reference_digest(best_instruction_set());
+  if (!last_reference_run_) return;
+  wire::require_repeatable(DescribedCampaign(*this), *last_reference_run_);
+  last_reference_run_.reset();  // Once is enough.
+}
+
+void require_repeatable(const Model& model) {
+  const auto* const described = dynamic_cast<const DescribedModel*>(&model);
+  if (described != nullptr) described->require_repeatable();
+}
+
+void require_repeatable(const Campaign& campaign, const RunResult& result) {
+  const RunRequest request{result.run, campaign.table_values(result.run)};
+  const std::vector<RunResult> again =
+      campaign.prepare()->simulate_batch({&request, 1}, best_instruction_set());
+  if (again.front().status == result.status && again.front().estimate == result.estimate &&
+      again.front().standard_error == result.standard_error) {
+    return;
+  }
+  throw ModelProgramError(fmt::format(
+      "model = {} (run {} has another result when its program is started again: an "
+      "answer must follow from its question alone, random numbers from the seeds in it)",
+      campaign.model().version(), result.run.value));
 }
 
 std::unique_ptr<Campaign> DescribedModel::campaign_of(Definition definition, TableColumns columns,

@@ -57,6 +57,7 @@ struct ProgramQuantity {
   std::string symbol;      ///< For people; the name by default.
   std::string unit = "1";  ///< SI.
   double display_scale = 1.0;
+  bool has_display_scale = false;
   std::string display_unit;  ///< `unit` by default, after a scale that is given.
   std::string truth;
   double objective = std::numeric_limits<double>::infinity();
@@ -185,6 +186,8 @@ class DescribedModel final : public Model {
   [[nodiscard]] const ProgramDescription& parts() const { return parts_; }
   /// @throws ModelProgramError that says how to name the program if it is not there.
   [[nodiscard]] std::unique_ptr<const Plan> prepare(const DescribedCampaign& campaign) const;
+  /// Has the last of the reference runs computed again, once, see below.
+  void require_repeatable() const;
 
  private:
   ProgramDescription parts_;
@@ -193,7 +196,16 @@ class DescribedModel final : public Model {
   std::string example_file_;
   mutable std::mutex digest_mutex_;
   mutable std::optional<std::uint64_t> reference_digest_;
+  mutable std::optional<RunResult> last_reference_run_;  // Until it was computed again.
 };
+
+/// Has the run computed again by a process of the program that no other run came before.
+/// @param campaign  Of a model with its program.
+/// @throws ModelProgramError if the result is another one, which follows not from its question
+///         alone: then nobody could check it.
+void require_repeatable(const Campaign& campaign, const RunResult& result);
+/// Of a reference run of the model, if that is a program.
+void require_repeatable(const Model& model);
 
 /// What a run of these models found out. Standard errors are taken as those of independent
 /// estimates.

@@ -51,7 +51,8 @@ std::vector<std::string> named_programs(int argc, const char* const* argv) {
 
 }  // namespace
 
-std::vector<std::string> choose_models(int argc, const char* const* argv, Broken broken) {
+std::vector<std::string> choose_models(int argc, const char* const* argv, Broken broken,
+                                       const std::function<void(const std::string&)>& say) {
   std::vector<ChosenModel>& chosen = chosen_models();
   std::vector<const Model*> used;
   std::vector<std::string> left_out;
@@ -62,7 +63,10 @@ std::vector<std::string> choose_models(int argc, const char* const* argv, Broken
     settle_surroundings();  // Its pipes are to be no standard descriptors.
     std::unique_ptr<const Model> model;
     try {
-      model = model_of(program);
+      model = model_of(program, [&] {
+        say(fmt::format("waiting until {} describes itself; a program must flush each answer",
+                        named));
+      });
     } catch (const Error& error) {
       if (broken == Broken::refused) throw;
       left_out.emplace_back(error.what());

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,10 +24,12 @@ enum class Broken : std::uint8_t { refused, left_out };
 /// Puts the models of the programs before the built-in one which the options `--model-program PATH`
 /// or, without any, the variable PROOFMASS_MODEL_PROGRAM name, the latter with colons between them.
 /// To be called first, by one thread: help texts and options depend on the models.
+/// @param say  Told if a program takes long to say what it is.
 /// @return Of each program that is left out, what is wrong with it.
 /// @throws What model_of() does; InvalidArgument if two have one version.
-[[nodiscard]] std::vector<std::string> choose_models(int argc, const char* const* argv,
-                                                     Broken broken);
+[[nodiscard]] std::vector<std::string> choose_models(
+    int argc, const char* const* argv, Broken broken,
+    const std::function<void(const std::string&)>& say);
 
 /// Appends the options that name the programs of choose_models(), for a program that this process
 /// starts.

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include "core/definition/document.hpp"
 #include "core/definition/law_reader.hpp"
 #include "proto/model_program/described_model.hpp"
+#include "proto/model_program/json_line.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
@@ -49,17 +49,18 @@ std::string toml_text(const Json& value, const std::string& path) {
                                     visible_text(text.substr(0, text_size_max)), text_size_max));
 }
 
-/// The object of JSON that an answer is.
-Json object_in(std::string_view answer, const std::string& source) {
+/// The object of JSON that an answer is, of questions that this program asks.
+Json json_in(std::string_view answer, const std::string& source) {
   if (answer.size() > answer_size_max) {
     throw DefinitionError(
         fmt::format("{}: {} bytes (must be at most {})", source, answer.size(), answer_size_max));
   }
-  // What is nested deeper than a list of a law is no part of it, and would have to be written by a
-  // recursive function.
-  const auto is_kept = [](int depth, Json::parse_event_t, const Json&) { return depth <= 4; };
-  Json json = Json::parse(answer, is_kept, false);
-  if (!json.is_object()) throw DefinitionError(source + ": is no object of JSON");
+  Json json;
+  try {
+    json = object_in(answer);
+  } catch (const InvalidArgument& error) {
+    throw DefinitionError(fmt::format("{}: {}: {}", source, error.what(), excerpt_of(answer)));
+  }
   const Json version = json.value("proofmass_model_program", Json());
   if (version == questions_version) return json;
   throw DefinitionError(
@@ -128,7 +129,9 @@ ProgramQuantity read_quantity(Document& document, const std::string& path,
   document.read(path + ".symbol", quantity.symbol);
   document.read(path + ".unit", quantity.unit);
   quantity.display_unit = quantity.unit;
-  if (document.read(path + ".display_scale", quantity.display_scale, range::positive)) {
+  quantity.has_display_scale =
+      document.read(path + ".display_scale", quantity.display_scale, range::positive);
+  if (quantity.has_display_scale) {
     const std::string scale = detail::number_text(quantity.display_scale);
     quantity.display_unit = quantity.unit == "1" ? scale : scale + " " + quantity.unit;
   }
@@ -178,7 +181,7 @@ std::string read_name(Document& document, const std::string& path) {
 }
 
 ProgramDescription description_in(std::string_view answer, const std::string& source) {
-  const Json json = object_in(answer, source);
+  const Json json = json_in(answer, source);
   Document document = document_of(json, source);
   (void)document.find("proofmass_model_program");
   ProgramDescription description;

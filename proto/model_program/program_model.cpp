@@ -1,24 +1,13 @@
 #include "proto/model_program/program_model.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstdio>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -26,195 +15,32 @@
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/random/stream.hpp"
-#include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
-#include "proto/text/visible_text.hpp"
+#include "proto/model_program/json_line.hpp"
+#include "proto/model_program/program_process.hpp"
 
 namespace proofmass::wire {
 namespace {
 
-/// Two connected sockets, which are closed in programs that are started, but for what they are
-/// given.
-std::pair<Descriptor, Descriptor> connected_pair() {
-  std::array<int, 2> ends{};
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) {
-    return {Descriptor(ends[0]), Descriptor(ends[1])};
-  }
-  throw ModelProgramError(
-      fmt::format("model program: no socket: {}", std::generic_category().message(errno)));
-}
-
-/// A pipe: its first end is told what the second one writes, and when that is closed.
-std::pair<Descriptor, Descriptor> new_pipe() {
-  std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_CLOEXEC) == 0) return {Descriptor(ends[0]), Descriptor(ends[1])};
-  throw ModelProgramError(
-      fmt::format("model program: no pipe: {}", std::generic_category().message(errno)));
-}
-
-/// Has the kernel kill the group of processes as soon as nobody has the other end of the pipe: it
-/// then signals that there is something to read. A parent-death signal (PR_SET_PDEATHSIG) would
-/// come when the thread that started the program ends, and other threads go on using it.
-void kill_at_end_of(int pipe, pid_t group) {
-  fcntl(pipe, F_SETSIG, SIGKILL);
-  fcntl(pipe, F_SETOWN, -group);
-  fcntl(pipe, F_SETFL, O_ASYNC);
-}
-
-constexpr std::size_t first_errors_size_max = 65536;
-constexpr std::size_t last_errors_size_max = 4096;
-
-}  // namespace
-
-ProgramProcess::ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits)
-    : name_(program.string()), answer_time_max_(limits.answer_time_max_s) {
-  auto [questions, its_input] = connected_pair();
-  auto [answers, its_output] = connected_pair();
-  auto [errors, its_errors] = new_pipe();
-  auto [its_lifeline, lifeline] = new_pipe();
-  try {
-    process_id_ = start_program({.arguments = {name_},
-                                 .descriptors = {its_input.number(), its_output.number(),
-                                                 its_errors.number(), its_lifeline.number()},
-                                 .environment = environment_without_settings(),
-                                 .has_own_group = true});
-  } catch (const Error& error) {
-    throw ModelProgramError(fmt::format("model program = {}", error.what()));
-  }
-  kill_at_end_of(its_lifeline.number(), process_id_);
-  questions_ = std::move(questions);
-  answers_ = std::move(answers);
-  errors_ = std::move(errors);
-  lifeline_ = std::move(lifeline);
-  fcntl(errors_.number(), F_SETFL, O_NONBLOCK);
-  const rlim_t memory_max = rlim_t{limits.memory_max_mib} << 20;
-  const rlimit memory{memory_max, memory_max};
-  prlimit(process_id_, RLIMIT_DATA, &memory, nullptr);
-}
-
-ProgramProcess::~ProgramProcess() {
-  if (process_id_ != 0) {
-    kill(process_id_, SIGKILL);
-    (void)wait_for_end(process_id_);
-  }
-  pass_on_errors();
-  const std::size_t shown = first_errors_size_max + last_errors_.size();
-  if (errors_size_ > shown) {
-    say(fmt::format("\n{}: {} bytes of its standard error are left out here\n", name_,
-                    errors_size_ - shown));
-  }
-  say_on(stderr, last_errors_);
-}
-
-std::string ProgramProcess::how_it_ended() {
-  // It has closed its output, which it does just before it ends unless it means to stay.
-  const std::optional<int> status =
-      status_at_end(process_id_, [num_left = 100]() mutable { return num_left-- > 0; });
-  process_id_ = 0;
-  return status ? end_text(*status) : "it closed its output";
-}
-
-void ProgramProcess::fail(std::string_view reason) const {
-  throw ModelProgramError(fmt::format("model program = {} ({})", name_, reason));
-}
-
-void ProgramProcess::write_some(std::string_view& text) const {
-  const ssize_t size =
-      send(questions_.number(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  if (size >= 0) {
-    text.remove_prefix(static_cast<std::size_t>(size));
-  } else if (errno != EAGAIN && errno != EINTR) {
-    text = {};  // It has closed its input; that it has ended is seen where it should answer.
-  }
-}
-
-void ProgramProcess::expect_silence() const {
-  char letter = 0;
-  if (recv(answers_.number(), &letter, 1, MSG_DONTWAIT | MSG_PEEK) > 0) {
-    fail("answers what it was not asked");
-  }
-}
-
-void ProgramProcess::read_some() {
-  std::array<char, 65536> part;  // NOLINT: recv() fills it.
-  const ssize_t size = recv(answers_.number(), part.data(), part.size(), MSG_DONTWAIT);
-  if (size > 0) {
-    received_.append(part.data(), static_cast<std::size_t>(size));
-  } else if (size == 0 || (errno != EAGAIN && errno != EINTR)) {
-    fail(fmt::format("gave no answer: {}", how_it_ended()));
-  }
-}
-
-void ProgramProcess::pass_on_errors() {
-  std::array<char, 65536> part;  // NOLINT: read() fills it.
-  // No more than once what a pipe holds: a program may print without an end.
-  const ssize_t size = read(errors_.number(), part.data(), part.size());
-  if (size == 0) errors_ = Descriptor();  // It has closed it.
-  if (size <= 0) return;
-  const std::string_view text(part.data(), static_cast<std::size_t>(size));
-  const std::size_t room = first_errors_size_max - std::min(first_errors_size_max, errors_size_);
-  say_on(stderr, text.substr(0, room));
-  errors_size_ += text.size();
-  last_errors_ += text.substr(std::min(room, text.size()));
-  if (last_errors_.size() <= last_errors_size_max) return;
-  last_errors_.erase(0, last_errors_.size() - last_errors_size_max);
-}
-
-void ProgramProcess::ask(const std::vector<std::string>& questions,
-                         const std::function<void(std::string_view answer)>& on_answer) {
-  using Clock = std::chrono::steady_clock;
-  expect_silence();
-  std::string all;
-  for (const std::string& question : questions) all += question + '\n';
-  std::string_view unsent = all;
-  std::size_t num_answered = 0;
-  Clock::time_point deadline = Clock::now() + answer_time_max_;
-  while (num_answered < questions.size()) {
-    std::array<pollfd, 3> ends{{{answers_.number(), POLLIN, 0},
-                                {errors_.number(), POLLIN, 0},
-                                {questions_.number(), POLLOUT, 0}}};
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    if (left.count() <= 0) {
-      fail(fmt::format("no answer within {} s", answer_time_max_.count()));
-    }
-    poll(ends.data(), unsent.empty() ? 2 : 3, static_cast<int>(left.count()));
-    if (ends[2].revents != 0) write_some(unsent);
-    if (ends[1].revents != 0) pass_on_errors();
-    if (ends[0].revents != 0) read_some();
-    std::size_t begin = 0;
-    for (std::size_t end = 0; (end = received_.find('\n', begin)) != std::string::npos;) {
-      if (num_answered == questions.size()) break;
-      on_answer(std::string_view(received_).substr(begin, end - begin));
-      begin = end + 1;
-      ++num_answered;
-      deadline = Clock::now() + answer_time_max_;
-    }
-    received_.erase(0, begin);
-    if (received_.size() > answer_size_max) {
-      fail(fmt::format("answers with a line of more than {} bytes", answer_size_max));
-    }
-  }
-  if (!received_.empty()) fail("answers what it was not asked");
-}
-
-namespace {
-
 using Json = nlohmann::json;
 
-/// With an answer of its own where something is wrong with the parameters.
-void expect_accepted(std::string_view answer, const std::filesystem::path& program) {
-  const Json json = Json::parse(answer, nullptr, false);
-  if (json.is_object() && json.contains("refused") && json["refused"].is_string() &&
-      json.contains("rule") && json["rule"].is_string()) {
-    const std::string name = json["refused"];
-    const double value = json.value("value", 0.0);
-    throw ConfigError("parameters." + name, detail::number_text(value),
-                      json["rule"].get<std::string>());
-  }
+/// @throws ConfigError about the parameter that the program refuses, if it does.
+void expect_accepted(std::string_view answer, const std::filesystem::path& program,
+                     const DescribedCampaign& campaign) {
+  Json json = Json::parse(answer, nullptr, false);
   if (json.is_object() && json.empty()) return;
-  throw ModelProgramError(fmt::format(
-      "model program = {} (must answer prepare with {{}} or what it refuses)", program.string()));
+  if (!json.is_object()) json = Json::object();
+  const Json refused = json.value("refused", Json()), rule = json.value("rule", Json());
+  for (std::size_t i = 0; i < campaign.parameters.size(); ++i) {
+    const std::string& name = campaign.description().parameters[i].name;
+    if (refused != name || !rule.is_string()) continue;
+    throw ConfigError("parameters." + name, detail::number_text(campaign.parameters[i]),
+                      rule.get<std::string>());
+  }
+  throw ModelProgramError(
+      fmt::format("model program = {} (must answer prepare with {{}}, or with a parameter that it "
+                  "refuses and the rule: {})",
+                  program.string(), excerpt_of(answer)));
 }
 
 /// The file may have been replaced since the model was loaded, and then other runs would be
@@ -230,20 +56,66 @@ void expect_same(std::string_view answer, const ProgramDescription& loaded,
       program.string(), now.version, loaded.version));
 }
 
-/// A process of the program that has accepted the parameters of a campaign.
+std::string describe_question() { return Json{{"ask", "describe"}}.dump(); }
+
+std::string prepare_question(const DescribedCampaign& campaign) {
+  Json question{{"ask", "prepare"}, {"parameters", Json::object()}};
+  for (std::size_t i = 0; i < campaign.parameters.size(); ++i) {
+    question["parameters"][campaign.description().parameters[i].name] = campaign.parameters[i];
+  }
+  return question.dump();
+}
+
+/// A process that has said what it is, and has computed nothing yet.
+struct FreshProcess {
+  std::unique_ptr<ProgramProcess> process;
+  std::string prepared;  // By this question; empty: not yet.
+};
+
+/// One of each program, for whoever needs one next: some take long to start.
+class FreshProcesses {
+ public:
+  static FreshProcesses& instance() {
+    static FreshProcesses all;
+    return all;
+  }
+
+  void keep(const std::filesystem::path& program, FreshProcess fresh) {
+    const std::lock_guard lock(mutex_);
+    processes_[program] = std::move(fresh);
+  }
+  /// Null if there is none.
+  FreshProcess take(const std::filesystem::path& program) {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(processes_[program], {});
+  }
+  void end() {
+    const std::lock_guard lock(mutex_);
+    processes_.clear();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::filesystem::path, FreshProcess> processes_;
+};
+
+/// A process of the program that has accepted the parameters of a campaign. None is asked to accept
+/// others after its first ones.
 std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& program,
                                                  const DescribedCampaign& campaign) {
   const ProgramDescription& of = campaign.description();
-  Json question{{"ask", "prepare"}, {"parameters", Json::object()}};
-  for (std::size_t i = 0; i < of.parameters.size(); ++i) {
-    question["parameters"][of.parameters[i].name] = campaign.parameters[i];
+  const std::string question = prepare_question(campaign);
+  FreshProcess fresh = FreshProcesses::instance().take(program);
+  if (fresh.process && fresh.prepared == question) return std::move(fresh.process);
+  if (!fresh.process || !fresh.prepared.empty()) {
+    fresh.process = std::make_unique<ProgramProcess>(program, of.limits);
+    fresh.process->ask({describe_question()},
+                       [&](std::string_view answer) { expect_same(answer, of, program); });
   }
-  auto process = std::make_unique<ProgramProcess>(program, of.limits);
-  process->ask({Json{{"ask", "describe"}}.dump()},
-               [&](std::string_view answer) { expect_same(answer, of, program); });
-  process->ask({question.dump()},
-               [&](std::string_view answer) { expect_accepted(answer, program); });
-  return process;
+  fresh.process->limit(of.limits);
+  fresh.process->ask({question},
+                     [&](std::string_view answer) { expect_accepted(answer, program, campaign); });
+  return std::move(fresh.process);
 }
 
 /// Processes of a program that have been told the parameters, each for one thread at a time.
@@ -251,6 +123,13 @@ class ProgramPlan final : public Plan {
  public:
   ProgramPlan(std::filesystem::path program, const DescribedCampaign& campaign)
       : program_(std::move(program)), campaign_(campaign) {}
+  ~ProgramPlan() override {
+    if (has_computed_ || idle_.empty()) return;
+    FreshProcesses::instance().keep(
+        program_, {.process = std::move(idle_.back()), .prepared = prepare_question(campaign_)});
+  }
+  ProgramPlan(const ProgramPlan&) = delete;
+  ProgramPlan& operator=(const ProgramPlan&) = delete;
 
   [[nodiscard]] std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet,
@@ -272,6 +151,7 @@ class ProgramPlan final : public Plan {
   const Recording recording_;
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<ProgramProcess>> idle_;
+  mutable bool has_computed_ = false;
 };
 
 std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
@@ -321,13 +201,17 @@ std::vector<double> numbers_in(const Json& object, const std::vector<std::string
 
 void ProgramPlan::read(std::string_view answer, RunResult& result) const {
   const auto refuse_as = [&](std::string_view what) {
-    return [this, run = result.run.value, what](std::string_view rule) {
-      throw ModelProgramError(
-          fmt::format("model program = {} (run {}: {} {})", program_.string(), run, what, rule));
+    return [this, answer, run = result.run.value, what](std::string_view rule) {
+      throw ModelProgramError(fmt::format("model program = {} (run {}: {} {}: {})",
+                                          program_.string(), run, what, rule, excerpt_of(answer)));
     };
   };
-  const Json json = Json::parse(answer, nullptr, false);
-  if (!json.is_object()) refuse_as("the answer")("must be an object of JSON");
+  Json json;
+  try {
+    json = object_in(answer);
+  } catch (const InvalidArgument& error) {
+    refuse_as("the answer")(error.what());
+  }
   if (json.value("run", Json()) != result.run.value) {
     refuse_as("the answer")(fmt::format("must be of this run, with \"run\": {}", result.run.value));
   }
@@ -375,26 +259,40 @@ std::vector<RunResult> ProgramPlan::simulate_batch(std::span<const RunRequest> r
   if (progress) progress(num_steps());
   const std::lock_guard lock(mutex_);
   idle_.push_back(std::move(process));
+  if (!questions.empty()) has_computed_ = true;
   return results;
 }
 
 }  // namespace
 
-std::unique_ptr<const Model> model_of(const std::filesystem::path& path) {
+std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
+                                      std::function<void()> on_silence) {
   constexpr ProgramLimits while_describing{.answer_time_max_s = 60};
   const std::filesystem::path program = std::filesystem::absolute(path);
   const std::string source = program.string() + ": description";
   ProgramDescription description;
-  ProgramProcess(program, while_describing)
-      .ask({Json{{"ask", "describe"}}.dump()},
-           [&](std::string_view answer) { description = description_in(answer, source); });
+  auto process = std::make_unique<ProgramProcess>(program, while_describing);
+  process->ask(
+      {describe_question()},
+      [&](std::string_view answer) { description = description_in(answer, source); },
+      std::move(on_silence));
   if (!description.imported_from.empty()) {
     throw DefinitionError(source + ": imported_from (must not be there: a program computes)");
   }
+  // Databases hold descriptions from before this rule.
+  for (const ProgramQuantity& quantity : description.quantities) {
+    if (quantity.has_display_scale || quantity.display_unit == quantity.unit) continue;
+    throw DefinitionError(
+        fmt::format("{}: {}: display_unit = {} (needs display_scale, its size in units of {})",
+                    source, quantity.name, quantity.display_unit, quantity.unit));
+  }
+  FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
   return std::make_unique<DescribedModel>(
       std::move(description), std::nullopt, [program](const DescribedCampaign& campaign) {
         return std::make_unique<const ProgramPlan>(program, campaign);
       });
 }
+
+void end_fresh_programs() { FreshProcesses::instance().end(); }
 
 }  // namespace proofmass::wire

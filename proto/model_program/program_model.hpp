@@ -1,68 +1,23 @@
 #pragma once
 
-#include <sys/types.h>
-
-#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "core/model.hpp"
-#include "proto/link/whole_file.hpp"
-#include "proto/model_program/described_model.hpp"
 
 namespace proofmass::wire {
 
-/// A model program that runs as a child of this process: it reads questions from its standard
-/// input, a line each, and answers each with a line, in their order. What it prints as standard
-/// error becomes that of this process, up to a limit. It does not outlive this process, however
-/// that ends.
-class ProgramProcess {
- public:
-  /// @throws ModelProgramError if it cannot be started.
-  ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits);
-  /// Kills it, and what it has started.
-  ~ProgramProcess();
-  ProgramProcess(const ProgramProcess&) = delete;
-  ProgramProcess& operator=(const ProgramProcess&) = delete;
-
-  /// Asks all questions and passes each answer on, without its end of line. Questions and answers
-  /// pass one another, so that neither side waits for the other with more than one of them.
-  ///
-  /// @param on_answer  What it throws leaves answers behind: the process is of no further use.
-  /// @throws ModelProgramError, after which the process is of no further use either.
-  void ask(const std::vector<std::string>& questions,
-           const std::function<void(std::string_view answer)>& on_answer);
-
- private:
-  void write_some(std::string_view& text) const;
-  void read_some();
-  /// The first part of what it prints as standard error is passed on as it comes, and the last part
-  /// in the end, with the number of bytes that are left out between them.
-  void pass_on_errors();
-  void expect_silence() const;
-  [[nodiscard]] std::string how_it_ended();
-  [[noreturn]] void fail(std::string_view reason) const;
-
-  std::string name_;
-  std::chrono::seconds answer_time_max_;
-  pid_t process_id_ = 0;  // 0 once it has ended.
-  Descriptor questions_;
-  Descriptor answers_;
-  Descriptor errors_;
-  Descriptor lifeline_;
-  std::string received_;         // Behind the last line that was taken.
-  std::size_t errors_size_ = 0;  // Of all that it printed as standard error.
-  std::string last_errors_;      // Behind the first part.
-};
-
-/// The model of a program in any language, which is asked what it is and then not kept.
-/// README.md has what is asked and answered.
+/// The model of a program in any language, which is asked what it is, and kept for what it is asked
+/// next. README.md has what is asked and answered.
+/// @param on_silence  Called once if the program takes long to say what it is.
 /// @throws ModelProgramError if it cannot be started or does not answer; DefinitionError naming the
 ///         program if its description breaks a rule.
-[[nodiscard]] std::unique_ptr<const Model> model_of(const std::filesystem::path& program);
+[[nodiscard]] std::unique_ptr<const Model> model_of(const std::filesystem::path& program,
+                                                    std::function<void()> on_silence = {});
+
+/// Ends the programs that model_of(), and plans that computed no run, have kept: before what may
+/// take long and does not need them, and before a fork, after which two would talk to them.
+void end_fresh_programs();
 
 }  // namespace proofmass::wire

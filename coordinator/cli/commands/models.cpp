@@ -23,6 +23,7 @@
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/model_program/model_choice.hpp"
 
 // The models that campaigns can be of, and the files that they write for campaigns.
@@ -157,9 +158,7 @@ struct CheckOptions {
 };
 
 /// A file that lacks what its author thinks is in it shows here: what is left out is nominal.
-std::string differences_text(const Campaign& campaign) {
-  const std::vector<DefinitionDifference> differences =
-      campaign.differences_from(*example_campaign(campaign.model()));
+std::string differences_text(const std::vector<DefinitionDifference>& differences) {
   if (differences.empty())
     return "Beside the number of runs, nothing differs from what `proofmass init` writes.\n";
   std::string text = "Beside the number of runs, these differ from what `proofmass init` writes:\n";
@@ -177,6 +176,7 @@ struct Outlook {
   double batch_s = 0.0;
   std::size_t num_simulated = 0;  ///< Runs; 0 if they take too long.
   MissingEstimates missing;       ///< Of these.
+  std::vector<DefinitionDifference> differences = {};  ///< From the example.
 };
 
 Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
@@ -185,6 +185,10 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
   const FirstBatch batch = try_first_batch(campaign, plan);
   Outlook outlook{.batch_s = batch.time_s, .num_simulated = batch.results.size(), .missing = {}};
   for (const RunResult& result : batch.results) outlook.missing.add(result);
+  // The program that accepts the example may be the one that computes a run again.
+  outlook.differences = campaign.differences_from(*example_campaign(campaign.model()));
+  const bool is_program = !campaign.model().description().empty();
+  if (is_program) wire::require_repeatable(campaign, batch.results.back());
   const std::uint64_t each = campaign.num_realisations();
   const std::uint64_t num_instruments = (campaign.num_runs + each - 1) / each;
   for (; outlook.num_drawn < std::min(num_instruments, instruments_max) &&
@@ -251,7 +255,6 @@ Json check_json(const CheckOptions& options, const Campaign& campaign, const Pla
   const auto of_difference = [](const DefinitionDifference& of) -> Json {
     return {{"field", of.field}, {"value", of.first}, {"example", of.second}};
   };
-  const auto differences = campaign.differences_from(*example_campaign(campaign.model()));
   return {{"file", options.file.string()},
           {"campaign", campaign.name},
           {"seed", std::to_string(campaign.seed)},
@@ -268,7 +271,7 @@ Json check_json(const CheckOptions& options, const Campaign& campaign, const Pla
           {"num_without_draw", outlook.num_without_draw},
           {"num_simulated", outlook.num_simulated},
           {"num_without_estimate", outlook.missing.total()},
-          {"differences", array_of(differences, of_difference)}};
+          {"differences", array_of(outlook.differences, of_difference)}};
 }
 
 std::string check_text(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
@@ -280,7 +283,7 @@ std::string check_text(const CheckOptions& options, const Campaign& campaign, co
   return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {}{}\n{}{}\n{}\n{}",
                      options.file.string(), campaign.name, campaign.seed, campaign.num_runs, steps,
                      note_text(campaign.note()), outlook_text(options, campaign, outlook),
-                     cost_text(cost), differences_text(campaign));
+                     cost_text(cost), differences_text(outlook.differences));
 }
 
 int check_campaign_file(const CheckOptions& options) {

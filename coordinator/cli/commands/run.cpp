@@ -34,6 +34,7 @@
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -282,12 +283,12 @@ int say_cancelled(const Store& store, std::uint64_t failures_max) {
   return exit_cannot_be_done;
 }
 
-/// That of a program is needed to make or open a database, and takes as long as the program does:
-/// it is computed before signals are caught.
-void compute_reference_digest(const Model& model, const RunOptions& options) {
+/// The digest of a program is needed to make or open a database, and takes as long as the program
+/// does: it is computed before signals are caught.
+void compute_reference_runs(const Model& model, const RunOptions& options) {
   if (model.description().empty()) return;
   if (!options.is_quiet) say_reference_runs(model);
-  (void)model.reference_digest(best_instruction_set());
+  wire::require_repeatable(model);
 }
 
 /// A part must be of the campaign. With a stop rule it would not be known which runs there will be.
@@ -352,7 +353,7 @@ int run_campaign(const RunOptions& options) {
   options.page.validate();  // Before any file is made.
   const std::filesystem::path database = database_of(options);
   const std::uint64_t num_runs = campaign->num_runs;
-  compute_reference_digest(campaign->model(), options);
+  compute_reference_runs(campaign->model(), options);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   std::unique_ptr<RunStart> start;

@@ -24,6 +24,7 @@
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
@@ -61,6 +62,7 @@ proto::RequestEnvelope submit_request(const SubmitOptions& options, const Campai
   const Model& model = campaign.model();
   if (!model.description().empty()) {
     say_reference_runs(model);
+    wire::require_repeatable(model);
     submit.set_model_description(std::string(model.description()));
     submit.set_reference_digest(model.reference_digest(best_instruction_set()));
   }

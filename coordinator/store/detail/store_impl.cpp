@@ -63,6 +63,10 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
       detail::log_path(file).filename().string()));
 }
 
+bool is_older(const Database& database) {
+  return database.integer("PRAGMA user_version") < detail::schema_version();
+}
+
 // Brought up to date, the file would be lost to the older program, which alone has its model.
 void require_own_model(const Database& database, const Model& model) {
   const std::string stored = database.text("SELECT model_version FROM campaign");
@@ -145,7 +149,7 @@ void copy_whole(Database& database, const std::filesystem::path& file,
 StoredKind prepare_reader(Database& database, const std::filesystem::path& file) {
   configure(database);
   StoredKind kind = check_campaign_file(database);
-  if (database.integer("PRAGMA user_version") < schema_version()) {
+  if (is_older(database)) {
     migrate_privately(database, kind);
   } else {
     check_that_log_is_there(database, file);
@@ -168,7 +172,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   detail::configure(database);
   kind = detail::check_campaign_file(database);
   // Before anything is changed: a file that cannot be served is left as it is.
-  if (detail::is_older(database)) require_own_model(database, *kind.model);
+  if (is_older(database)) require_own_model(database, *kind.model);
   const detail::RowCounts counts = detail::check_all_pages(database);
   check_after_unclean_end(database);
   const bool has_log = detail::has_log(file);

@@ -12,8 +12,10 @@
 namespace proofmass::detail {
 namespace {
 
+/// Symbols of quantities may have letters beyond ASCII: whoever types one is told the names.
 bool is_word_part(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+         (c & 0x80) != 0;
 }
 
 std::string_view without_blanks_in_front(std::string_view text) {

@@ -56,9 +56,11 @@ TEST_F(ModelsTest, MustComputeWhatTheyDidWhereTheCampaignBegan) {
   say_hello(first, hello_with_other(1, 0x123));
   const auto reject = outbox.take_sent<proto::Reject>(first);
   EXPECT_EQ(reject.reason(), proto::REJECT_REASON_INCOMPATIBLE);
-  EXPECT_EQ(reject.text(), "reference_digest of " + std::string(model_version) +
-                               " = 0000000000000123 (must be 0000000000abcdef, where its campaign "
-                               "began, unless that has tolerate_digest = true)");
+  EXPECT_EQ(reject.text(),
+            "reference_digest of " + std::string(model_version) +
+                " = 0000000000000123 (must be 0000000000abcdef, where its campaign "
+                "began; a model that has changed needs another version, machines that "
+                "differ need tolerate_digest = true)");
   EXPECT_FALSE(state.workers.contains(first));
   (void)outbox.take_events();
   // The other campaign of this version began with it.

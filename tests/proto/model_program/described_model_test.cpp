@@ -18,12 +18,19 @@ using ::testing::ThrowsMessage;
 
 /// A description of `ruler-1` in which one key is another one.
 std::string description(const std::string& instead = {}) {
-  std::string text =
-      R"("proofmass_model_program": 1, "name": "ruler", "version": "1",)"
-      R"( "parameters": [{"name": "offset_m", "value": 0.5}],)"
-      R"( "drawn": [{"name": "scale", "law": "fixed", "value": 3}],)"
-      R"( "quantities": [{"name": "length", "truth": "2 * scale + offset_m", "unit": "m"}])";
-  return "{" + text + (instead.empty() ? "" : ", ") + instead + "}";
+  std::string text;
+  const auto add = [&text](const std::string& part) {
+    if (!part.empty()) text += (text.empty() ? "" : ", ") + part;
+  };
+  for (const std::string part :
+       {R"("proofmass_model_program": 1)", R"("name": "ruler")", R"("version": "1")",
+        R"("parameters": [{"name": "offset_m", "value": 0.5}])",
+        R"("drawn": [{"name": "scale", "law": "fixed", "value": 3}])",
+        R"("quantities": [{"name": "length", "truth": "2 * scale + offset_m", "unit": "m"}])"}) {
+    if (part.substr(0, part.find(':')) != instead.substr(0, instead.find(':'))) add(part);
+  }
+  add(instead);
+  return "{" + text + "}";
 }
 
 const Model& ruler(const std::string& description, std::uint64_t reference_digest = 0) {
@@ -173,6 +180,7 @@ TEST(RecordedModel, IsRefusedIfItsDescriptionBreaksARule) {
   } const cases[] = {
       {"DROP TABLE campaign", "description: is no object of JSON"},
       {"[]", "description: is no object of JSON"},
+      {description(R"("name": "ruler", "name": "ruler")"), "has the key \"name\" twice: {"},
       {description(R"("version": "2")"), "description: of ruler-2"},
       {description(R"("version": "1\u001b[2J")"), "(must be a text of one line"},
       {description(R"("version": "1\u202e")"), "(must be a text of one line"},

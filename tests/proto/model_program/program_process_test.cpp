@@ -1,3 +1,5 @@
+#include "proto/model_program/program_process.hpp"
+
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -6,7 +8,6 @@
 
 #include <thread>
 
-#include "proto/model_program/program_model.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+using ::testing::ThrowsMessage;
 
 constexpr int inherited = 9;  // A descriptor that programs have of whoever starts them.
 
@@ -46,9 +48,10 @@ class SignOfLife {
 class ProgramProcessTest : public testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path program(const std::string& lines) const {
-    test::write_text(directory_ / "program", "#!/bin/sh\n" + lines, 0755);
-    return directory_ / "program";
+    test::write_text(program_file(), "#!/bin/sh\n" + lines, 0755);
+    return program_file();
   }
+  [[nodiscard]] std::filesystem::path program_file() const { return directory_ / "program"; }
 
  private:
   const test::ScratchDirectory directory_;
@@ -94,6 +97,35 @@ TEST_F(ProgramProcessTest, PassesOnTheFirstAndTheLastOfWhatAProgramPrints) {
       printed,
       HasSubstr("/program: 330368 bytes of its standard error are left out here\n1049488\n"));
   EXPECT_THAT(printed, EndsWith("\n1049998\n1049999\n"));
+}
+
+// A program that is asked a thing may buffer its answer, as C does on a pipe, or just be slow.
+TEST_F(ProgramProcessTest, TellsOfSilenceAndWhatItMayBe) {
+  ProgramProcess slow(program("while [ ! -e \"$0\".go ]; do sleep 0.01; done\nread -r question\n"
+                              "echo there\nexec sleep 1000\n"),
+                      {.answer_time_max_s = 12});
+  std::string answered;
+  slow.ask(
+      {"?"}, [&](std::string_view answer) { answered = answer; },
+      [&] { test::write_text(program_file().string() + ".go", "", 0644); });
+  EXPECT_EQ(answered, "there");
+  const auto fails_with = [](const std::string& what) {
+    return ThrowsMessage<ModelProgramError>(EndsWith("(no answer within 1 s" + what + ")"));
+  };
+  slow.limit({.answer_time_max_s = 1});
+  EXPECT_THAT([&] { slow.ask({"?"}, [](std::string_view) {}); }, fails_with(""));
+
+  ProgramProcess silent(program("exec sleep 1000\n"), {.answer_time_max_s = 1});
+
+  EXPECT_THAT([&] { silent.ask({"?"}, [](std::string_view) {}); },
+              fails_with("; it must flush each answer"));
+}
+
+TEST_F(ProgramProcessTest, SaysWhatAScriptThatCannotBeStartedLacks) {
+  test::write_text(program_file(), "print('hello')\n", 0755);
+  EXPECT_THAT([&] { const ProgramProcess process(program_file(), {}); },
+              ThrowsMessage<ModelProgramError>(
+                  EndsWith("Exec format error; a script begins with #! and what runs it")));
 }
 
 // Threads hand programs on to one another.

@@ -150,7 +150,7 @@ TEST_F(SpoolTest, SetsResultsOfAnotherModelAside) {
     Spool spool(path, "model-2");
     EXPECT_TRUE(spool.former_results().empty());
     EXPECT_EQ(spool.former_spool(), path.string() + ".model");
-    EXPECT_EQ(spool.append(std::vector{result(2)}), std::nullopt);
+    EXPECT_EQ(spool.finish({result(2)}), std::nullopt);
   }
   EXPECT_EQ(runs_of(Spool(path, "model-2").former_results()), std::vector<std::uint64_t>{2});
   std::filesystem::rename(path.string() + ".model", path);
