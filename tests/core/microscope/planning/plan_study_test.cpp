@@ -298,6 +298,40 @@ TEST(PlanStudy, NamesWhatLosesRunsBesideTheRange) {
   EXPECT_EQ(bound.losses[0].detail, "may move the estimate of a_c12 beyond its objective");
 }
 
+/// The largest acceleration that a sensor measures in a run.
+double largest_m_s2(const RunRecord& record) {
+  return std::ranges::max(record.health, {}, &SessionHealth::acceleration_m_s2).acceleration_m_s2;
+}
+
+// A slow controller leaves of a push and of drag what the paper's takes away: where that is beyond
+// the range, runs are lost, and so are probed ones. Biases that drift leave the range of any loop.
+TEST(PlanStudy, ProbesTheLoopsOfTheCampaign) {
+  MicroscopeCampaign campaign = fixed_campaign();
+  campaign.num_runs = 1;
+  MicroscopeCampaign slow = campaign;
+  slow.scenario.controllers.push_back({.loop = ControlLoop::drag_free,
+                                       .axis = Axis::x,
+                                       .gain = 1e-4,
+                                       .zeros_rad_s = {},
+                                       .poles_rad_s = {0.0}});
+  const double nominal_m_s2 = largest_m_s2(RunPlan(campaign).record(RunIndex{0}, {}));
+  const double slow_m_s2 = largest_m_s2(RunPlan(slow).record(RunIndex{0}, {}));
+  ASSERT_GT(slow_m_s2, 1.2 * nominal_m_s2);
+  MicroscopeCampaign drifting = campaign;
+  drifting.scenario.realism.emplace().bias_drift_m_s3 = {1e-11, 1e-11};
+  for (MicroscopeCampaign* of : {&campaign, &slow, &drifting}) {
+    of->scenario.sensor.range_m_s2 = std::sqrt(nominal_m_s2 * slow_m_s2);
+    const auto study = study_plan(*of);
+    const std::vector<PlanLoss> losses = study->bound(study->scope().num_steps).losses;
+    const bool is_lost = RunPlan(*of).simulate(RunIndex{0}, {}).status == RunStatus::lost;
+    EXPECT_EQ(is_lost, of != &campaign);
+    ASSERT_EQ(losses.size(), is_lost ? 1U : 0U);
+    if (is_lost) {
+      EXPECT_EQ(losses[0].num_runs, batch_lanes);
+    }
+  }
+}
+
 TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
   const auto study = study_plan(MicroscopeCampaign{});
   const PlanBound bound = study->bound(std::vector<int>(study->scope().num_steps.size(), 0));
