@@ -326,8 +326,10 @@ TEST(PlanStudy, ProbesTheLoopsOfTheCampaign) {
     const Loss loss = RunPlan(*of).simulate(RunIndex{0}, {}).loss;
     const bool is_lost = loss.cause == static_cast<std::uint32_t>(LossCause::saturation);
     EXPECT_EQ(is_lost, of != &slow);
-    EXPECT_EQ(std::ranges::count(losses, "saturation", &PlanLoss::cause), is_lost ? 1 : 0)
-        << (losses.empty() ? "" : losses[0].cause + ": " + losses[0].detail);
+    // Noise takes some of the probed runs beyond it, and all where this run is.
+    const auto saturation = std::ranges::find(losses, "saturation", &PlanLoss::cause);
+    const std::size_t num_lost = saturation == losses.end() ? 0 : saturation->num_runs;
+    EXPECT_EQ(num_lost == batch_lanes, is_lost) << num_lost;
   }
 }
 
