@@ -25,6 +25,12 @@ struct DrawnQuantity {
   std::string_view unit;  ///< For people: `m`.
 };
 
+/// A file that follows from physics.
+struct EnvironmentFile {
+  std::string text;
+  std::string note;  ///< Why it may not be right, for people; empty if nothing is known.
+};
+
 /// Reads the data files that a campaign file names.
 class DataFiles {
  public:
@@ -128,10 +134,11 @@ class Model {
   /// @param campaign  The campaign file; the data files that it names are not read.
   /// @param physics   What differs from the nominal physics.
   /// @param session   The session that the file is for; empty: all of them.
-  /// @return Empty if the model has no such file.
+  /// @return Without text if the model has no such file.
   /// @throws DefinitionError, or ConfigError about `session`
-  [[nodiscard]] virtual std::string environment_file(Document& /*campaign*/, Document& /*physics*/,
-                                                     const std::string& /*session*/) const {
+  [[nodiscard]] virtual EnvironmentFile environment_file(Document& /*campaign*/,
+                                                         Document& /*physics*/,
+                                                         const std::string& /*session*/) const {
     return {};
   }
 

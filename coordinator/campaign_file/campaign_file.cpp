@@ -201,8 +201,8 @@ std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
   return campaign;
 }
 
-std::string environment_file(const std::filesystem::path& file, const Overrides& overrides,
-                             const EnvironmentRequest& request) {
+EnvironmentFile environment_file(const std::filesystem::path& file, const Overrides& overrides,
+                                 const EnvironmentRequest& request) {
   Document campaign(file.string(), read_campaign_text(file), assignments_of(overrides));
   std::string text;
   if (!request.physics.empty()) {

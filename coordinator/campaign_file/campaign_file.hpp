@@ -12,6 +12,7 @@
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 
@@ -71,11 +72,11 @@ struct EnvironmentRequest {
   std::string session = {};            ///< As in Model::environment_file().
 };
 
-/// The text of Model::environment_file() for a campaign file, whose data files need not exist.
+/// Model::environment_file() for a campaign file, whose data files need not exist.
 /// @throws DefinitionError or ConfigError
-[[nodiscard]] std::string environment_file(const std::filesystem::path& file,
-                                           const Overrides& overrides,
-                                           const EnvironmentRequest& request);
+[[nodiscard]] EnvironmentFile environment_file(const std::filesystem::path& file,
+                                               const Overrides& overrides,
+                                               const EnvironmentRequest& request);
 
 /// The campaign of Model::example().
 [[nodiscard]] std::unique_ptr<Campaign> example_campaign(const Model& of);

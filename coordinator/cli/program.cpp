@@ -70,7 +70,7 @@ std::string exit_codes_text(std::initializer_list<ExitCode> further) {
       "  1    cannot be done: disk, database, address, workers that crash, time limit\n"
       "  2    wrong usage, campaign file or query";
   if (may_be(exit_not_met))
-    text += "\n  3    a requirement or stop rule is not met, or audits contradict";
+    text += "\n  3    a requirement or stop rule is not met, audits contradict, or a plan fails";
   if (may_be(exit_interrupted)) {
     text += "\n  130  interrupted by SIGINT or SIGTERM; what is stored stands";
   }

@@ -27,8 +27,9 @@ enum ExitCode : int {
   exit_done = 0,
   exit_cannot_be_done = 1,  ///< Disk, database, address, workers that crash, time limits.
   exit_wrong_usage = 2,     ///< Arguments, campaign file or query.
-  exit_not_met = 3,        ///< A requirement or stop rule is not met, or audits contradict results.
-  exit_interrupted = 130,  ///< SIGINT or SIGTERM; what is stored stands.
+  exit_not_met = 3,         ///< A requirement or stop rule is not met, audits contradict results,
+                            ///< or runs that a plan probes are lost or do not fit.
+  exit_interrupted = 130,   ///< SIGINT or SIGTERM; what is stored stands.
 };
 
 /// The end of `--help`.

@@ -106,14 +106,16 @@ std::string loops_note(const Scenario& scenario) {
   if (scenario.has_plain_loops()) return {};
   const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
   const auto axis_text = [](const AxisMargins& of) {
-    return fmt::format("{} {}", name_of(of.loop), name_of(of.axis));
+    const std::string_view in = of.resonator_of.empty() ? "" : " in ";
+    return fmt::format("{} {}{}{}", name_of(of.loop), name_of(of.axis), in, of.resonator_of);
   };
   const auto by_gain = [](const AxisMargins& of) { return of.margins.gain; };
   const auto by_phase = [](const AxisMargins& of) { return of.margins.phase_rad; };
   const AxisMargins gain = *std::ranges::min_element(of_axes, {}, by_gain);
   const AxisMargins phase = *std::ranges::min_element(of_axes, {}, by_phase);
   const std::string_view of_realism =
-      scenario.realism ? "; errors have what [realism] adds, standard errors and plans do not" : "";
+      scenario.realism ? "; errors and probes have what [realism] adds, standard errors do not"
+                       : "";
   return fmt::format(
       "loops that are not the paper's: with a perfect instrument, the least margin of gain is a "
       "factor of {:.3g} ({}), that of phase {:.3g}° ({}); each run has its own, gain_margin and "
@@ -170,9 +172,14 @@ std::string environment_note(const MicroscopeCampaign& campaign) {
 std::string gaps_note(const Scenario& scenario) {
   const GapsConfig& gaps = scenario.gaps;
   if (!scenario.has_tests() || !gaps.lose_data()) return {};
-  const double kept = exponential(-gaps.glitch_rate_hz * gaps.glitch_duration_s -
-                                  gaps.telemetry_rate_hz * gaps.telemetry_duration_s);
-  return fmt::format("[gaps] takes about {:.2g} % of the data of tests", 100.0 * (1.0 - kept));
+  double num_orbits = 0.0, num_lost = 0.0;
+  for (const Session& session : scenario.sessions) {
+    if (!is_test(session)) continue;
+    num_orbits += session.num_orbits;
+    num_lost += session.num_orbits * (1.0 - kept_part(gaps, session, scenario.orbit.period_s));
+  }
+  return fmt::format("[gaps] takes about {:.2g} % of the samples of tests",
+                     100.0 * num_lost / num_orbits);
 }
 
 }  // namespace
@@ -312,9 +319,10 @@ class MicroscopeModel final : public Model {
     return study_plan(*own);
   }
 
-  [[nodiscard]] std::string environment_file(Document& campaign, Document& physics,
-                                             const std::string& session) const override {
-    return csv_text(made_environment(campaign, physics, session));
+  [[nodiscard]] EnvironmentFile environment_file(Document& campaign, Document& physics,
+                                                 const std::string& session) const override {
+    auto [table, note] = made_environment(campaign, physics, session);
+    return {csv_text(table), std::move(note)};
   }
 
   [[nodiscard]] std::string example() const override {

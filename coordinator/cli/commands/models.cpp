@@ -53,13 +53,14 @@ struct EnvironmentOptions {
 
 int write_environment(const EnvironmentOptions& options) {
   check_document(options.output, options.if_there);
-  const std::string text = environment_file(options.file, options.overrides, options.request);
+  const auto [text, note] = environment_file(options.file, options.overrides, options.request);
   if (text.empty()) {
     throw UsageError(
         fmt::format("{}: campaigns of this model have no environment file", options.file.string()));
   }
   write_document(options.output, options.if_there, text);
   if (options.output != "-") fmt::print("wrote {}\n", options.output.string());
+  if (!note.empty()) wire::say(fmt::format("proofmass: warning: {}\n", note));
   return exit_done;
 }
 

@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "core/math/complex.hpp"
-#include "core/microscope/control/control_loops.hpp"
 
 namespace proofmass {
 namespace {
@@ -32,24 +31,35 @@ ComplexDouble actuator_response(const Scenario& scenario, ComplexDouble z_invers
   return (1.0 - memory) / (1.0 - memory * z_inverse);
 }
 
+/// What a Resonator multiplies the loop's input by.
+ComplexDouble response(const ResonatorGains& gains, ComplexDouble z_inverse) {
+  const ComplexDouble turned = gains.cosine * z_inverse;
+  return 1.0 + gains.input * (1.0 - turned) / (1.0 - 2.0 * turned + z_inverse * z_inverse);
+}
+
 AxisMargins drag_free_margins(const Scenario& scenario, const Instrument& instrument,
-                              DragFreeSource source, Axis axis) {
+                              const Session& session, Axis axis) {
   const auto a = static_cast<Eigen::Index>(index(axis));
   const DragFreeGains gains =
       drag_free_gains(scenario.drag_free, scenario.simulation.sample_period_s);
   const auto own = controller_of(scenario, ControlLoop::drag_free, axis);
+  const ResonatorGains resonator = resonator_in(scenario, session);
   double factor = 0.0;
   for (std::size_t k = 0; k < 2; ++k) {
-    factor += drag_free_weights(source)[k] * instrument.sensors[k].sensitivity_KS()(a, a);
+    factor +=
+        drag_free_weights(session.drag_free)[k] * instrument.sensors[k].sensitivity_KS()(a, a);
   }
   factor *= instrument.thrust_matrix(a, a);
   const auto open_loop = [&](ComplexDouble z_inverse) {
     const ComplexDouble sum = 1.0 / (1.0 - z_inverse);
     const ComplexDouble controller =
         own ? own->response(z_inverse) : gains.proportional * sum * (1.0 + gains.integral * sum);
-    return factor * z_inverse * controller * actuator_response(scenario, z_inverse);
+    const ComplexDouble loop =
+        factor * z_inverse * controller * actuator_response(scenario, z_inverse);
+    return resonator.input == 0.0 ? loop : loop * response(resonator, z_inverse);
   };
-  return {ControlLoop::drag_free, axis, margins_of(open_loop)};
+  return {ControlLoop::drag_free, axis, margins_of(open_loop, {resonator.cosine, resonator.sine}),
+          resonator.input == 0.0 ? "" : session.name};
 }
 
 /// What AttitudeEstimator makes of an angular acceleration α, over α.
@@ -119,24 +129,34 @@ AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
   };
   std::vector<AxisMargins> of_modes;
   for (const double factor : extreme_mode_gains(realism)) {
-    of_modes.push_back({ControlLoop::attitude, axis, margins_of([&](ComplexDouble z_inverse) {
-                          return factor * open_loop(z_inverse);
-                        })});
+    const auto of_mode = [&](ComplexDouble z_inverse) { return factor * open_loop(z_inverse); };
+    of_modes.push_back({ControlLoop::attitude, axis, margins_of(of_mode), {}});
   }
-  return {ControlLoop::attitude, axis, least(of_modes)};
+  return {ControlLoop::attitude, axis, least(of_modes), {}};
 }
 
 }  // namespace
+
+ResonatorGains resonator_in(const Scenario& scenario, const Session& session) {
+  const double damping = scenario.drag_free.resonator_damping;
+  if (!is_test(session) || damping == 0.0) return {};
+  return resonator_gains(damping, test_frequency_hz(session, scenario.orbit.period_s),
+                         scenario.simulation.sample_period_s);
+}
 
 std::vector<AxisMargins> loop_margins(const Scenario& scenario, const Instrument& instrument) {
   std::vector<AxisMargins> all;
   for (const Axis axis : axes) all.push_back(attitude_margins(scenario, axis));
   for (const auto source :
        {DragFreeSource::common, DragFreeSource::sensor_1, DragFreeSource::sensor_2}) {
-    const auto has_it = [&](const Session& session) { return session.drag_free == source; };
-    if (std::ranges::none_of(scenario.sessions, has_it)) continue;
-    for (const Axis axis : axes) {
-      all.push_back(drag_free_margins(scenario, instrument, source, axis));
+    std::vector<double> sines;  // Of the resonators that the loop has; 0: none.
+    for (const Session& session : scenario.sessions) {
+      const double sine = resonator_in(scenario, session).sine;
+      if (session.drag_free != source || std::ranges::count(sines, sine) > 0) continue;
+      sines.push_back(sine);
+      for (const Axis axis : axes) {
+        all.push_back(drag_free_margins(scenario, instrument, session, axis));
+      }
     }
   }
   return all;

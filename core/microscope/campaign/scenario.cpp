@@ -161,10 +161,13 @@ void check_test(const Scenario& scenario) {
                     "must leave f_EP = |f_orb + f_spin| a tenth of f_orb or more");
 }
 
-// Up to there the loop stays a third or more away from −1, whatever its corners.
+// Up to there the nominal loop stays a third or more away from −1, whatever its corners;
+// check_stability() judges others.
 void check_resonator(const Scenario& scenario) {
   const DragFreeConfig& config = scenario.drag_free;
-  if (config.resonator_damping == 0.0) return;
+  const auto num_others =
+      std::ranges::count(scenario.controllers, ControlLoop::drag_free, &ControllerConfig::loop);
+  if (config.resonator_damping == 0.0 || num_others == 3) return;
   for (const Session& session : scenario.sessions) {
     if (!is_test(session)) continue;
     const double frequency_hz = test_frequency_hz(session, scenario.orbit.period_s);
@@ -208,6 +211,12 @@ void check_stability(const Scenario& scenario) {
       path = "realism.star_tracker_latency_samples";
       value = static_cast<double>(realism.star_tracker_latency_samples);
     }
+    std::string with;
+    if (!of.resonator_of.empty()) {
+      path = "drag_free.resonator_damping";
+      value = scenario.drag_free.resonator_damping;
+      with = fmt::format(" with the resonator of session {}", of.resonator_of);
+    }
     for (std::size_t i = 0; i < scenario.controllers.size(); ++i) {
       const ControllerConfig& controller = scenario.controllers[i];
       if (controller.loop != of.loop || controller.axis != of.axis) continue;
@@ -215,9 +224,9 @@ void check_stability(const Scenario& scenario) {
       value = controller.gain;
     }
     throw ConfigError(path, fmt::format("{}", value),
-                      fmt::format("{} the {} loop of axis {}{}, even with a perfect instrument",
+                      fmt::format("{} the {} loop of axis {}{}{}, even with a perfect instrument",
                                   is_open ? "does not close" : "makes", name_of(of.loop),
-                                  name_of(of.axis), is_open ? "" : " unstable"));
+                                  name_of(of.axis), with, is_open ? "" : " unstable"));
   }
 }
 

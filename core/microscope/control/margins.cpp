@@ -63,7 +63,8 @@ double quadrant(ComplexDouble number) {
 /// The turns of 1 + L about 0 along half of a circle, of which the other half is the mirror image.
 class Winding {
  public:
-  explicit Winding(const OpenLoop& loop) : loop_(loop) {}
+  /// @param sum  1 + L, or what turns as often.
+  explicit Winding(const OpenLoop& sum) : sum_(sum) {}
 
   /// It begins and ends on the real axis. A zero outside makes it turn by half a turn at least.
   [[nodiscard]] bool is_none() {
@@ -83,12 +84,12 @@ class Winding {
   static constexpr int halvings_max = 40;
 
   [[nodiscard]] double on_axis(double angle) const {
-    return 1.0 + at(loop_, angle, radius).real() >= 0.0 ? 0.0 : 2.0;
+    return at(sum_, angle, radius).real() >= 0.0 ? 0.0 : 2.0;
   }
 
   /// Where it may have passed on either side of 0, its way is looked at more closely.
   void turn_to(double low, const GridPoint& high, int num_halvings) {
-    const ComplexDouble there = 1.0 + at(loop_, high.turn, radius);
+    const ComplexDouble there = at(sum_, high.turn, radius);
     const double step = quadrant(there) - last_;
     const double turned = step - 4.0 * std::round(step / 4.0);
     if (!std::isfinite(norm(there)) || (std::abs(turned) > 1.0 && num_halvings == 0)) {
@@ -103,7 +104,7 @@ class Winding {
     }
   }
 
-  const OpenLoop& loop_;
+  const OpenLoop& sum_;
   double last_ = 0.0;  ///< Quadrant.
   double num_quarters_ = 0.0;
   bool is_known_ = true;  ///< False if a zero is on the circle, or L is no number.
@@ -111,8 +112,14 @@ class Winding {
 
 }  // namespace
 
-Margins margins_of(const OpenLoop& open_loop) {
-  if (!Winding(open_loop).is_none()) return {};
+Margins margins_of(const OpenLoop& open_loop, ComplexDouble resonance) {
+  const OpenLoop sum = [&](ComplexDouble z_inverse) {
+    const ComplexDouble whole = 1.0 + open_loop(z_inverse);
+    if (resonance.imag() == 0.0) return whole;
+    // Beside a pole 1 + L makes half a turn at once, in either direction: without it none.
+    return (z_inverse - resonance) * (z_inverse - conjugate(resonance)) * whole;
+  };
+  if (!Winding(sum).is_none()) return {};
   const auto excess = [&](double angle) { return norm(at(open_loop, angle)) - 1.0; };
   const auto height = [&](double angle) { return at(open_loop, angle).imag(); };
   Margins margins{std::numeric_limits<double>::infinity(), pi};

@@ -22,6 +22,8 @@ struct Margins {
 /// Margins from L along the unit circle, from 1e-8 of a turn on, where loops with an integral are
 /// far above 1. A closed loop counts as unstable if 1 + L has a zero at |z| > 1 + 1e-6, that is, if
 /// something grows by e within some days; 1 + L then winds about 0 along that circle.
-[[nodiscard]] Margins margins_of(const OpenLoop& open_loop);
+///
+/// @param resonance  z⁻¹ of a pole of L on the unit circle, that of a resonator; real: it has none.
+[[nodiscard]] Margins margins_of(const OpenLoop& open_loop, ComplexDouble resonance = 0.0);
 
 }  // namespace proofmass

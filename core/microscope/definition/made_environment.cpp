@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <numbers>
 #include <string_view>
@@ -57,9 +58,9 @@ std::vector<Session> chosen_sessions(const std::vector<Session>& sessions,
     return session.spin_rate_rad_s < rate || session.spin_rate_rad_s > rate;
   });
   if (other == chosen.end()) return chosen;
-  throw DefinitionError(
-      fmt::format("session = (must be given: {} and {} differ in their spin, and a file has one)",
-                  chosen.front().name, other->name));
+  throw DefinitionError(fmt::format(
+      "session = (must be given by --session: {} and {} differ in their spin, and a file has one)",
+      chosen.front().name, other->name));
 }
 
 EnvironmentSpan span_of(const Scenario& scenario, const std::string& name) {
@@ -81,6 +82,16 @@ void check_perigee(const OrbitConfig& orbit) {
   throw ConfigError("orbit.eccentricity", fmt::format("{}", orbit.eccentricity),
                     fmt::format("perigee must be at least {:.0f} km high, not {:.0f} km",
                                 1e-3 * lowest_perigee_m, 1e-3 * altitude_m));
+}
+
+/// Where drag is largest the density is to be good (air_density()).
+std::string air_note(const Atmosphere& air, const OrbitConfig& orbit) {
+  const double altitude_m = perigee_altitude_m(orbit);
+  if (std::abs(altitude_m - air.reference_altitude_m) <= air.scale_height_m) return {};
+  return fmt::format(
+      "the perigee is {:.0f} km high, more than atmosphere.scale_height_m = {:.0f} km from "
+      "atmosphere.reference_altitude_m = {:.0f} km: densities there may be wrong by factors",
+      1e-3 * altitude_m, 1e-3 * air.scale_height_m, 1e-3 * air.reference_altitude_m);
 }
 
 /// Of every body: y² + z² of its mass, for one, is not above x² + y² and x² + z² together.
@@ -127,8 +138,8 @@ EnvironmentPhysics read_physics(Document& settings) {
   return physics;
 }
 
-EnvironmentTable made_environment(Document& campaign, Document& settings,
-                                  const std::string& session) {
+MadeEnvironment made_environment(Document& campaign, Document& settings,
+                                 const std::string& session) {
   const Scenario scenario = read_definition(campaign).scenario;
   campaign.check();
   const EnvironmentPhysics physics = read_physics(settings);
@@ -146,7 +157,8 @@ EnvironmentTable made_environment(Document& campaign, Document& settings,
     throw campaign.located(error);
   }
   const EnvironmentSpan span = span_of(scenario, session);
-  return table_of(PhysicalEnvironment(physics, scenario.orbit), span, scenario.orbit);
+  return {table_of(PhysicalEnvironment(physics, scenario.orbit), span, scenario.orbit),
+          air_note(physics.atmosphere, scenario.orbit)};
 }
 
 }  // namespace proofmass

@@ -17,6 +17,11 @@ class Document;
 /// bits.
 [[nodiscard]] std::string csv_text(const EnvironmentTable& table);
 
+struct MadeEnvironment {
+  EnvironmentTable table;
+  std::string note;  ///< Why it may not be right, for people; empty if nothing is known.
+};
+
 /// Rows of an environment file for the sessions of a campaign, of the orbit that it has. Whether
 /// the file exists that the campaign names, or another one, does not matter.
 ///
@@ -25,7 +30,7 @@ class Document;
 /// @param session   Name of the one whose attitude and length the file is for; empty: of all.
 /// @throws DefinitionError naming file, line, field, value and rule; ConfigError naming `session`
 ///         if there is none of that name, several attitudes and no name, or too many rows.
-[[nodiscard]] EnvironmentTable made_environment(Document& campaign, Document& settings,
-                                                const std::string& session);
+[[nodiscard]] MadeEnvironment made_environment(Document& campaign, Document& settings,
+                                               const std::string& session);
 
 }  // namespace proofmass

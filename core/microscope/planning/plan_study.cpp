@@ -97,10 +97,9 @@ struct Probe {
   bool is_misfit = false;  ///< Its data do not fit the model, beyond chance.
 };
 
-/// The first runs that have an instrument, with noise and the paper's loops.
-std::vector<Probe> probes_of(MicroscopeCampaign campaign, const std::vector<RunIndex>& runs) {
-  campaign.scenario.realism.reset();
-  campaign.scenario.controllers.clear();
+/// The first runs that have an instrument, with noise and the loops of the campaign.
+std::vector<Probe> probes_of(const MicroscopeCampaign& campaign,
+                             const std::vector<RunIndex>& runs) {
   std::vector<RunRequest> requests;
   for (std::size_t i = 0; i < std::min(runs.size(), batch_lanes); ++i) {
     requests.push_back({runs[i], campaign.table_values(runs[i])});

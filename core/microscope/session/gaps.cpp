@@ -38,6 +38,22 @@ void lose_after_events(const RandomStream& stream, double highest_hz, const Rate
   }
 }
 
+/// λ(t)/λ0, or its mean over a time with the middle t.
+double relative_rate(const GapsConfig& gaps, const Session& session, double orbit_period_s,
+                     double time_s, double over_s = 0.0) {
+  const auto modulation = [&](const RateModulation& of, double frequency_hz) {
+    const double turns = frequency_hz * time_s + of.phase_rad / (2.0 * std::numbers::pi);
+    const double half_rad = std::numbers::pi * frequency_hz * over_s;
+    const double smoothing = half_rad > 0.0 ? sincos(half_rad).sine / half_rad : 1.0;
+    return of.depth * sincos_turns(turns).cosine * smoothing;
+  };
+  const double spin_hz = std::abs(session.spin_rate_rad_s) / (2.0 * std::numbers::pi);
+  double relative = 1.0 + modulation(gaps.orbital, 1.0 / orbit_period_s) +
+                    modulation(gaps.test, test_frequency_hz(session, orbit_period_s));
+  if (spin_hz > 0.0) relative += modulation(gaps.spin, spin_hz);
+  return relative;
+}
+
 }  // namespace
 
 void GapsConfig::validate(double sample_period_s) const {
@@ -67,16 +83,8 @@ std::vector<bool> lost_blocks(const GapsConfig& gaps, const Session& session, st
   const auto stream = [&](std::string_view name) {
     return RandomStream(seed, run, stream_id(fmt::format("session/{}/{}", session.name, name)));
   };
-  const double spin_hz = std::abs(session.spin_rate_rad_s) / (2.0 * std::numbers::pi);
-  const auto modulation = [](const RateModulation& of, double frequency_hz, double time_s) {
-    const double turns = frequency_hz * time_s + of.phase_rad / (2.0 * std::numbers::pi);
-    return of.depth * sincos_turns(turns).cosine;
-  };
   const auto glitch_rate_hz = [&](double time_s) {
-    double relative = 1.0 + modulation(gaps.orbital, 1.0 / orbit_period_s, time_s) +
-                      modulation(gaps.test, test_frequency_hz(session, orbit_period_s), time_s);
-    if (spin_hz > 0.0) relative += modulation(gaps.spin, spin_hz, time_s);
-    return gaps.glitch_rate_hz * relative;
+    return gaps.glitch_rate_hz * relative_rate(gaps, session, orbit_period_s, time_s);
   };
   const double depth = gaps.orbital.depth + gaps.spin.depth + gaps.test.depth;
   lose_after_events(stream("glitches"), gaps.glitch_rate_hz * (1.0 + depth), glitch_rate_hz,
@@ -85,6 +93,18 @@ std::vector<bool> lost_blocks(const GapsConfig& gaps, const Session& session, st
       stream("telemetry"), gaps.telemetry_rate_hz, [&](double) { return gaps.telemetry_rate_hz; },
       gaps.telemetry_duration_s, block_s, lost);
   return lost;
+}
+
+double kept_part(const GapsConfig& gaps, const Session& session, double orbit_period_s) {
+  constexpr int num_times = 4099;  // A prime: no period of a session is one of them.
+  const double duration_s = session.num_orbits * orbit_period_s, over_s = gaps.glitch_duration_s;
+  double sum = 0.0;
+  for (int i = 0; i < num_times; ++i) {
+    const double time_s = duration_s * i / num_times;
+    sum += exponential(-gaps.glitch_rate_hz * over_s *
+                       relative_rate(gaps, session, orbit_period_s, time_s - 0.5 * over_s, over_s));
+  }
+  return sum / num_times * exponential(-gaps.telemetry_rate_hz * gaps.telemetry_duration_s);
 }
 
 }  // namespace proofmass

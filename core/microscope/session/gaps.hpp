@@ -44,4 +44,10 @@ struct GapsConfig {
                                             std::size_t num_blocks, double orbit_period_s,
                                             double sample_period_s);
 
+/// The part of a session's samples that is left, in the mean over runs. Nothing begins within the
+/// duration d before a sample with the probability exp(−∫λ dt), and the mean of a modulation over
+/// that time is m sin(πfd)/(πfd) cos(2πf(t − d/2) + φ).
+[[nodiscard]] double kept_part(const GapsConfig& gaps, const Session& session,
+                               double orbit_period_s);
+
 }  // namespace proofmass

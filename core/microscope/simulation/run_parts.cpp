@@ -140,14 +140,6 @@ bool RunParts::is_monitored_before(std::size_t i) const {
   return false;
 }
 
-ResonatorGains RunParts::resonator(const Session& session) const {
-  const Scenario& scenario = campaign.scenario;
-  if (!is_test(session)) return {};
-  return resonator_gains(scenario.drag_free.resonator_damping,
-                         test_frequency_hz(session, scenario.orbit.period_s),
-                         scenario.simulation.sample_period_s);
-}
-
 SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
   const Session& session = campaign.scenario.sessions[i];
   TestMasses masses =
@@ -162,7 +154,7 @@ SessionSetup RunParts::setup(std::size_t i, Readers& readers) const {
           .line_readers = readers.further,
           .residual_reader = readers.residual ? &*readers.residual : nullptr,
           .test = is_test(session) ? &tests[i] : nullptr,
-          .resonator = resonator(session)};
+          .resonator = resonator_in(campaign.scenario, session)};
 }
 
 RunRecord RunParts::drawn_record(RunIndex run, const AcceptedDraw& draw) const {

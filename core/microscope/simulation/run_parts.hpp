@@ -93,9 +93,6 @@ struct RunParts {
   /// The regressors of a test in the attitude that it is to have.
   [[nodiscard]] std::vector<WindowRegressors> nominal_regressors(std::size_t i) const;
 
-  /// Of the drag-free loop in a session; none unless it tests.
-  [[nodiscard]] ResonatorGains resonator(const Session& session) const;
-
   /// True if the loops of a session without excitation are those of one before, which tells enough.
   [[nodiscard]] bool is_monitored_before(std::size_t i) const;
 };

@@ -101,6 +101,78 @@ TEST(LoopMargins, AreThoseOfCoupledModes) {
   EXPECT_NEAR(margins_about_z(scenario).gain / alone, 0.5, 1e-9);
 }
 
+/// A test at V3, in a loop about X with a resonator and a controller of its own.
+Scenario scenario_with_resonator(double gain, std::vector<std::complex<double>> zeros_rad_s,
+                                 std::vector<std::complex<double>> poles_rad_s) {
+  Scenario scenario;
+  Session& test = scenario.sessions.emplace_back();
+  test.name = "v3";
+  test.target = SessionTarget::ep_test;
+  test.spin_rate_rad_s = 35.0 * std::numbers::pi / scenario.orbit.period_s;  // f_EP = 18.5 f_orb.
+  scenario.drag_free.resonator_damping = 0.5;
+  scenario.controllers.push_back({.loop = ControlLoop::drag_free,
+                                  .axis = Axis::x,
+                                  .gain = gain,
+                                  .zeros_rad_s = std::move(zeros_rad_s),
+                                  .poles_rad_s = std::move(poles_rad_s)});
+  return scenario;
+}
+
+/// By how much the command along X that a push causes grew over the second half of 5000 s.
+double drag_free_growth(const Scenario& scenario) {
+  const double period_s = scenario.simulation.sample_period_s;
+  const ResonatorGains gains = resonator_gains(scenario.drag_free.resonator_damping,
+                                               18.5 / scenario.orbit.period_s, period_s);
+  Resonator<double> resonator;
+  SampledController controller(scenario.controllers[0], period_s);
+  double command = 0.0, before = 0.0, after = 0.0;
+  constexpr int num_samples = 20'000;
+  for (int k = 0; k < num_samples; ++k) {
+    const double measured = (k == 0 ? 1.0 : 0.0) - command;
+    command = controller.advance(resonator.advance(gains, {measured, 0.0, 0.0}).x);
+    double& largest = k < num_samples / 2 ? before : after;
+    if (k > num_samples / 4) largest = std::max(largest, std::abs(command));
+  }
+  return after / before;
+}
+
+// A controller of 0.8 mHz has a phase margin of 11.59° with a resonator at 3.1 mHz: L(z) of its
+// definition, where it passes the unit circle.
+TEST(LoopMargins, AreThoseOfTheLoopWithItsResonator) {
+  const Scenario slow = scenario_with_resonator(0.005, {-0.0005}, {0.0, 0.0});
+  EXPECT_NO_THROW(slow.validate());
+  const double phase_rad = least(loop_margins(slow, make_instrument({}))).phase_rad;
+  EXPECT_NEAR(phase_rad * 180.0 / std::numbers::pi, 11.59, 0.01);
+}
+
+// With two corners the loop swings if its gain is divided by that margin.
+TEST(LoopMargins, TellWhereTheSimulatedLoopWithAResonatorBeginsToSwing) {
+  Scenario scenario = scenario_with_resonator(3e-4, {-0.003}, {0.0, 0.0, -0.1, -0.1});
+  const double margin = least(loop_margins(scenario, make_instrument({}))).gain;
+  const double gain = scenario.controllers[0].gain;
+  for (const double beyond : {0.98, 1.02}) {
+    scenario.controllers[0].gain = gain / (beyond * margin);
+    EXPECT_EQ(drag_free_growth(scenario) > 1.0, beyond > 1.0) << margin;
+    EXPECT_EQ(least(loop_margins(scenario, make_instrument({}))).gain == 0.0, beyond > 1.0);
+  }
+}
+
+TEST(LoopMargins, RefuseALoopThatItsResonatorMakesUnstable) {
+  const double corner = -0.003 * std::numbers::pi;
+  Scenario scenario =
+      scenario_with_resonator(0.006 * corner * corner, {-6e-4}, {0.0, 0.0, corner, corner});
+  EXPECT_GT(drag_free_growth(scenario), 2.0);
+  try {
+    scenario.validate();
+    ADD_FAILURE() << "it is accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.field(), "controller[0].gain");
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("with the resonator of session v3 unstable"));
+  }
+  scenario.drag_free.resonator_damping = 0.0;
+  EXPECT_NO_THROW(scenario.validate());
+}
+
 TEST(LoopMargins, RefuseAnUnstableLoop) {
   Scenario scenario = scenario_with_attitude_controller(0.3);
   scenario.sessions = Scenario().sessions;

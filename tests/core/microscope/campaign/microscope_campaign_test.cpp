@@ -181,13 +181,16 @@ TEST(MicroscopeCampaign, NotesThatNoSessionWatchesTheNoise) {
             "without excitations");
 }
 
-// 1 − e⁻⁰·³ of the data.
+// 1 − e⁻⁰·³ of the samples; in a modulation of λd = 1.2, 1 − e⁻¹·² I₀(1.2) = 58 %.
 TEST(MicroscopeCampaign, NotesHowMuchTestsLose) {
   MicroscopeCampaign campaign;
   campaign.scenario.sessions.emplace_back().target = SessionTarget::ep_test;
   campaign.scenario.gaps.glitch_rate_hz = 0.02;
   campaign.scenario.gaps.glitch_duration_s = 15.0;
-  EXPECT_EQ(campaign.note(), "[gaps] takes about 26 % of the data of tests");
+  EXPECT_EQ(campaign.note(), "[gaps] takes about 26 % of the samples of tests");
+  campaign.scenario.gaps = {.glitch_rate_hz = 0.06, .glitch_duration_s = 20.0};
+  campaign.scenario.gaps.test.depth = 1.0;
+  EXPECT_EQ(campaign.note(), "[gaps] takes about 58 % of the samples of tests");
 }
 
 // What comes from space turns with the frame: in half a turn it changes its sign.

@@ -130,6 +130,17 @@ TEST(Scenario, WantsResonatorsSlowerThanTheLoop) {
             }),
             "drag_free.resonator_damping = 0.9 (must be 0 where f_EP of a session, here 0.003111 "
             "Hz of v3, is above half of drag_free.bandwidth_hz)");
+  // That bandwidth is of no loop if all axes have controllers of their own.
+  with_resonator(scenario = {});
+  scenario.drag_free.bandwidth_hz = 6.2e-3;
+  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+    scenario.controllers.push_back({.loop = ControlLoop::drag_free,
+                                    .axis = axis,
+                                    .gain = 0.3,
+                                    .zeros_rad_s = {},
+                                    .poles_rad_s = {0.0}});
+  }
+  EXPECT_NO_THROW(scenario.validate());
 }
 
 TEST(Scenario, WantsIntegralsSlowerThanTheirLoops) {

@@ -52,7 +52,7 @@ TEST(CsvText, ReadsBackToTheSameBits) {
 EnvironmentTable made_for(const std::string& campaign, const std::string& session) {
   Document document("a.toml", campaign, {});
   Document settings("", "", {});
-  return made_environment(document, settings, session);
+  return made_environment(document, settings, session).table;
 }
 
 const std::string two_attitudes = R"(
@@ -89,6 +89,22 @@ TEST(MadeEnvironment, IsForAllSessionsWithoutAName) {
   const std::size_t second = two_attitudes.find("[[session]]", 5);
   const EnvironmentTable both = made_for(two_attitudes.substr(second), "");
   EXPECT_EQ(both, made_for(two_attitudes, "longer"));
+}
+
+// The radius is ∛(μ (P/2π)²): an orbit of 5350 s is 233 km above the equator's, one of 5950 s 719
+// km.
+TEST(MadeEnvironment, NotesThatItsAirIsThatOfAnotherAltitude) {
+  const auto note_for = [](const std::string& orbit, const std::string& physics) {
+    Document document("a.toml", orbit, {});
+    Document settings("physics.toml", physics, {});
+    return made_environment(document, settings, "").note;
+  };
+  const std::string low = "[orbit]\nperiod_s = 5350.0\neccentricity = 0.0\n";
+  EXPECT_EQ(note_for("", ""), "");
+  EXPECT_EQ(note_for(low, ""),
+            "the perigee is 233 km high, more than atmosphere.scale_height_m = 89 km from "
+            "atmosphere.reference_altitude_m = 700 km: densities there may be wrong by factors");
+  EXPECT_EQ(note_for(low, "[atmosphere]\nreference_altitude_m = 300e3\n"), "");
 }
 
 }  // namespace

@@ -54,6 +54,20 @@ TEST(EarthAxis, GivesTheLatitude) {
               1e-12 * norm(momentum));
 }
 
+// In the Earth's equator, with the Sun above the meridian of X, the node of 18 h is on Y; the
+// perigee is a quarter of a turn after it. The rules are those of deploy/campaigns/physics.toml.
+TEST(SunDirection, IsThatOfItsDeclination) {
+  const double i = OrbitalPlane{}.inclination_rad, half_turn = std::numbers::pi;
+  for (double declination = -0.409; declination < 0.41; declination += 0.0409) {
+    const Vector3<double> sun{std::cos(declination), 0.0, std::sin(declination)};
+    const Vector3<double> perigee{-std::cos(i), 0.0, std::sin(i)};
+    const Vector3<double> normal{std::sin(i), 0.0, std::cos(i)};
+    const Sunlight set{.beta_rad = std::asin(std::sin(i + declination)),
+                       .phase_rad = i + declination > 0.5 * half_turn ? 0.0 : half_turn};
+    expect_vector(sun_direction(set), {dot(sun, perigee), -dot(sun, normal), 0.0}, 1e-12);
+  }
+}
+
 TEST(SunDirection, HasItsHeightOverTheOrbitalPlane) {
   const Vector3<double> sun = sun_direction({.beta_rad = 0.4, .phase_rad = 2.0});
   const KeplerOrbit orbit(circular);

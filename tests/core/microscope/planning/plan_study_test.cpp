@@ -298,6 +298,41 @@ TEST(PlanStudy, NamesWhatLosesRunsBesideTheRange) {
   EXPECT_EQ(bound.losses[0].detail, "may move the estimate of a_c12 beyond its objective");
 }
 
+/// The largest acceleration that a sensor measures in a run.
+double largest_m_s2(const RunRecord& record) {
+  return std::ranges::max(record.health, {}, &SessionHealth::acceleration_m_s2).acceleration_m_s2;
+}
+
+// A slow controller does not follow the pushes that the paper's does, and keeps sensors within a
+// range that they leave with the paper's loops, or if biases drift: in runs, and so in probed ones.
+TEST(PlanStudy, ProbesTheLoopsOfTheCampaign) {
+  MicroscopeCampaign campaign = fixed_campaign();
+  campaign.num_runs = 1;
+  MicroscopeCampaign slow = campaign;
+  slow.scenario.controllers.push_back({.loop = ControlLoop::drag_free,
+                                       .axis = Axis::x,
+                                       .gain = 1e-4,
+                                       .zeros_rad_s = {},
+                                       .poles_rad_s = {0.0}});
+  const double nominal_m_s2 = largest_m_s2(RunPlan(campaign).record(RunIndex{0}, {}));
+  const double slow_m_s2 = largest_m_s2(RunPlan(slow).record(RunIndex{0}, {}));
+  ASSERT_GT(nominal_m_s2, 1.05 * slow_m_s2);
+  MicroscopeCampaign drifting = slow;
+  drifting.scenario.realism.emplace().bias_drift_m_s3 = {1e-11, 1e-11};
+  for (MicroscopeCampaign* of : {&campaign, &slow, &drifting}) {
+    of->scenario.sensor.range_m_s2 = std::sqrt(nominal_m_s2 * slow_m_s2);
+    const auto study = study_plan(*of);
+    const std::vector<PlanLoss> losses = study->bound(study->scope().num_steps).losses;
+    const Loss loss = RunPlan(*of).simulate(RunIndex{0}, {}).loss;
+    const bool is_lost = loss.cause == static_cast<std::uint32_t>(LossCause::saturation);
+    EXPECT_EQ(is_lost, of != &slow);
+    // Noise takes some of the probed runs beyond it, and all where this run is.
+    const auto saturation = std::ranges::find(losses, "saturation", &PlanLoss::cause);
+    const std::size_t num_lost = saturation == losses.end() ? 0 : saturation->num_runs;
+    EXPECT_EQ(num_lost == batch_lanes, is_lost) << num_lost;
+  }
+}
+
 TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
   const auto study = study_plan(MicroscopeCampaign{});
   const PlanBound bound = study->bound(std::vector<int>(study->scope().num_steps.size(), 0));

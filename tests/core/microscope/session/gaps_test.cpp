@@ -44,6 +44,31 @@ TEST(Gaps, LoseThePartThatAPoissonProcessDoes) {
   }
 }
 
+// e^(−λd (1 + a cos x)) has the mean e^(−λd) I₀(λd a), and I₀ of two modulations of unrelated
+// phases is a product; f_EP and the spin are both whole multiples of half of f_orb. What is lost is
+// counted, too.
+TEST(Gaps, KeepThePartThatBesselsFunctionTells) {
+  GapsConfig gaps;
+  gaps.glitch_rate_hz = 0.06;
+  gaps.glitch_duration_s = 20.0;
+  Session session = spinning_test();
+  session.num_orbits = 10;
+  const auto amplitude = [](double depth, double frequency_hz) {
+    const double half_rad = std::numbers::pi * frequency_hz * 20.0;
+    return 1.2 * depth * std::sin(half_rad) / half_rad;
+  };
+  EXPECT_NEAR(kept_part(gaps, session, orbit_s), std::exp(-1.2), 1e-12);
+  gaps.test.depth = 0.5;
+  double expected = std::exp(-1.2) * std::cyl_bessel_i(0.0, amplitude(0.5, 5.5 / orbit_s));
+  EXPECT_NEAR(kept_part(gaps, session, orbit_s), expected, 1e-3);
+  gaps.spin.depth = 0.5;
+  expected *= std::cyl_bessel_i(0.0, amplitude(0.5, 4.5 / orbit_s));
+  EXPECT_NEAR(kept_part(gaps, session, orbit_s), expected, 1e-3);
+  gaps.telemetry_rate_hz = 1e-3;
+  gaps.telemetry_duration_s = 100.0;
+  EXPECT_NEAR(kept_part(gaps, session, orbit_s), expected * std::exp(-0.1), 1e-3);
+}
+
 /// Amplitude of the lost blocks at a frequency over their mean; cosine and sine.
 std::array<double, 2> relative_amplitude(const GapsConfig& gaps, double frequency_hz,
                                          double& sigma) {
