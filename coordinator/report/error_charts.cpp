@@ -6,6 +6,7 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review_charts.hpp"
+#include "coordinator/table/figures.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -92,8 +93,9 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
   if (points.empty()) return "No run has an estimate.";
   const ConvergencePoint& last = points.back();
   const double scale = quantity_at(review, index).display_scale;
-  std::string text = fmt::format("After {} runs the worst is {}, the mean {}", last.num_runs,
-                                 figure_text(last.worst / scale), figure_text(last.mean / scale));
+  std::string text =
+      fmt::format("After {} the worst is {}, the mean {}", counted(last.num_runs, "run"),
+                  figure_text(last.worst / scale), figure_text(last.mean / scale));
   if (last.mean_interval) {
     text += fmt::format(" (95 %: {} to {})",
                         figure_text(std::max(last.mean_interval->lower, 0.0) / scale),
@@ -124,10 +126,11 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
   const Histogram& histogram = review.figures[index].magnitudes;
   Chart chart{.text = {.id = fmt::format("histogram-{}", quantity.name),
                        .title = fmt::format("|error| of {}", quantity.symbol),
-                       .description = fmt::format(
-                           "Histogram of {} runs. {} {}{}", review.results.statistics.num_estimated,
-                           objective_sentence(review, index), worst_sentence(review, index),
-                           below_sentence(histogram))},
+                       .description =
+                           fmt::format("Histogram of {}. {} {}{}",
+                                       counted(review.results.statistics.num_estimated, "run"),
+                                       objective_sentence(review, index),
+                                       worst_sentence(review, index), below_sentence(histogram))},
               .x = {.label = axis_label("|error|", quantity), .scale = Scale::logarithmic},
               .y = {.label = "runs"}};
   const double objective = review.objectives[index] / quantity.display_scale;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t num_worst_shown = 5;
 constexpr std::size_t num_convergence_points = 40;
-constexpr std::uint64_t first_convergence_count = 5;
+constexpr std::uint64_t few_convergence_runs = 5;
 
 }  // namespace
 
@@ -27,11 +27,13 @@ void keep_largest(const RunValue& candidate, std::size_t count, std::vector<RunV
 std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs) {
   std::vector<std::uint64_t> counts;
   if (num_runs == 0) return counts;
-  const double ratio = static_cast<double>(num_runs) / static_cast<double>(first_convergence_count);
-  for (std::size_t i = 0; i < num_convergence_points && num_runs > first_convergence_count; ++i) {
+  // Of few runs all: one point is no line.
+  const double first =
+      num_runs > few_convergence_runs ? static_cast<double>(few_convergence_runs) : 1.0;
+  const double ratio = static_cast<double>(num_runs) / first;
+  for (std::size_t i = 0; i < num_convergence_points; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(num_convergence_points);
-    const auto count = static_cast<std::uint64_t>(
-        std::round(static_cast<double>(first_convergence_count) * std::pow(ratio, part)));
+    const auto count = static_cast<std::uint64_t>(std::round(first * std::pow(ratio, part)));
     if (counts.empty() || counts.back() < count) counts.push_back(count);
   }
   if (counts.empty() || counts.back() < num_runs) counts.push_back(num_runs);

@@ -8,6 +8,7 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
@@ -57,7 +58,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
   const RequirementCheck& check = first.check;
   const double end = largest_shown(review, tolerance);
   constexpr int num_points = 120;
-  Curve line{.name = fmt::format("{} draws", check.num_runs)};
+  Curve line{.name = counted(check.num_runs, "draw")};
   for (int i = 0; i <= num_points; ++i) {
     const double probability = end * i / num_points;
     line.points.push_back({100.0 * probability, 100.0 * probability_to_meet(check, probability)});
@@ -69,11 +70,11 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                    fmt::format("Requirements for {} with {}", given_percent(tolerance.coverage),
                                given_percent(tolerance.confidence)),
                .description = fmt::format(
-                   "Probability that {} draws meet such a requirement, against the probability "
+                   "Probability that {} meet such a requirement, against the probability "
                    "with which a draw exceeds its limit. {} Where {} of all draws exceed it, the "
                    "requirement is called met with a probability of {} %, the consumer's risk; "
                    "where fewer do, what lacks to 100 % is the producer's risk.",
-                   check.num_runs,
+                   counted(check.num_runs, "draw"),
                    check.bound_order == 0
                        ? "So few draws never meet it."
                        : fmt::format("At most {} of them may exceed it.", check.bound_order - 1),
