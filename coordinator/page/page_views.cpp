@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <set>
 #include <string>
@@ -125,6 +126,11 @@ std::vector<Column> worker_columns_of(const WorkerChoice& choice) {
           {"process"}};
 }
 
+std::string rate_figure(double rate) {
+  return rate < 1000.0 ? measured_figure(rate)
+                       : grouped(static_cast<std::uint64_t>(std::round(rate)));
+}
+
 Row worker_row(const RegisteredWorker& worker) {
   const proto::WorkerStatus& status = worker.status;
   return {status.name(),
@@ -133,7 +139,7 @@ Row worker_row(const RegisteredWorker& worker) {
           grouped(status.num_slots()),
           grouped(status.num_lent()),
           grouped(status.num_results()),
-          measured_figure(results_per_h(worker)),
+          rate_figure(results_per_h(worker)),
           fmt::format("{} ago", duration_text(status.silent_s())),
           std::to_string(status.process_id())};
 }

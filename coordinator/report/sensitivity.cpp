@@ -118,12 +118,17 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
   return table;
 }
 
+/// `one of 10 errors`; of a single one, `the error`.
+std::string one_of(std::size_t count, std::string_view thing) {
+  return count == 1 ? fmt::format("the {}", thing) : fmt::format("one of {} {}s", count, thing);
+}
+
 /// The note about p below the tables of drivers.
 std::string note_of_p(std::size_t num_inputs, std::size_t num_quantities) {
   return fmt::format(
-      "p: that chance alone makes one of {} inputs look so influential on one of {} errors or "
-      "their magnitudes (Kruskal-Wallis, Holm)",
-      num_inputs, num_quantities);
+      "p: that chance alone makes {} look so influential on {} or {} (Kruskal-Wallis, Holm)",
+      one_of(num_inputs, "input"), one_of(num_quantities, "error"),
+      num_quantities == 1 ? "its magnitude" : "their magnitudes");
 }
 
 /// Names the drivers whose values go together; empty if there are none.
@@ -177,12 +182,12 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
   table.notes = {
       fmt::format("{}; of variance: R², beyond that of the terms above; p: that chance "
                   "alone makes one of all quantities, or of products of two beyond their "
-                  "factors, look so in one of {} errors",
+                  "factors, look so in {}",
                   position ? fmt::format("of this run: what the term, less its mean, "
                                          "adds to the error, {}",
                                          info.display_unit)
                            : "slope: in SI units",
-                  drawn.errors.size())};
+                  one_of(drawn.errors.size(), "error"))};
   for (const ExplanatoryTerm& term : terms) {
     double figure = term.slope;
     if (position) {
@@ -218,8 +223,8 @@ RunIndex worst_run_of(const DrawnRuns& drawn, std::size_t quantity) {
 std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity, bool has_rows) {
   const std::uint64_t run = worst_run_of(drawn, quantity).value;
   if (!has_rows) return fmt::format("Largest |error|: run {}\n", run);
-  return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n", run,
-                     drawn.quantities[quantity].name);
+  return fitted(fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n", run,
+                            drawn.quantities[quantity].name));
 }
 
 /// The rows to name: as many as were asked for, else the first five, but none where no quantity has
