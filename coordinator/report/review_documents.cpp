@@ -150,11 +150,8 @@ std::string spectra_markup(const Review& review, Tables) {
   if (spectra.sessions.empty()) return html;
   html += fmt::format(
       "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
-      "bit "
-      "for bit. Without the fitted lines, noise is left, if there is any, and lines that the "
-      "session "
-      "does not fit. "
-      "{}</p>\n",
+      "bit for bit. Without the fitted lines, noise is left, if there is any, and lines that the "
+      "session does not fit. {}</p>\n",
       spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
   std::string figures;
   for (const Chart& chart : spectrum_charts(review)) figures += figure_of(chart);
@@ -424,8 +421,7 @@ std::string driver_of(const Review& review, std::size_t quantity) {
   if (is_mostly_bias(review, quantity)) {
     return fmt::format(
         "most of it is a bias that all runs share, {} with a standard deviation of {}, which "
-        "follows "
-        "from the campaign and not from its draws",
+        "follows from the campaign and not from its draws",
         quantity_text(accuracy.error.bias, review.schema.quantities[quantity]),
         quantity_text(accuracy.error.standard_deviation, review.schema.quantities[quantity]));
   }

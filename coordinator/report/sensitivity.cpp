@@ -123,14 +123,6 @@ std::string one_of(std::size_t count, std::string_view thing) {
   return count == 1 ? fmt::format("the {}", thing) : fmt::format("one of {} {}s", count, thing);
 }
 
-/// The note about p below the tables of drivers.
-std::string note_of_p(std::size_t num_inputs, std::size_t num_quantities) {
-  return fmt::format(
-      "p: that chance alone makes {} look so influential on {} or {} (Kruskal-Wallis, Holm)",
-      one_of(num_inputs, "input"), one_of(num_quantities, "error"),
-      num_quantities == 1 ? "its magnitude" : "their magnitudes");
-}
-
 /// Names the drivers whose values go together; empty if there are none.
 std::string dependence_note(const DrawnRuns& drawn, std::span<const Sensitivity> of_error,
                             std::span<const Sensitivity> of_magnitude) {
@@ -350,10 +342,12 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
   if (!position && !has_rows && terms.empty()) return {};
   Table drivers = driver_table(drawn, of_error, "error", position);
   if (has_rows) {
-    drivers.notes.push_back(
-        (position ? "% below: of the runs; "
-                  : "% of variance: with its 95 % interval; rank: rank correlation; ") +
-        note_of_p(both[1].size(), drawn.errors.size()));
+    drivers.notes.push_back(fmt::format(
+        "{}; p: that chance alone makes {} look so influential on {} or {} (Kruskal-Wallis, Holm)",
+        position ? "% below: of the runs"
+                 : "% of variance: with its 95 % interval; rank: rank correlation",
+        one_of(both[1].size(), "input"), one_of(drawn.errors.size(), "error"),
+        drawn.errors.size() == 1 ? "its magnitude" : "their magnitudes"));
     const std::string dependence = dependence_note(drawn, of_error, of_magnitude);
     if (!dependence.empty()) drivers.notes.push_back(dependence);
   }
