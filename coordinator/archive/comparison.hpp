@@ -14,7 +14,7 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/error_change.hpp"

@@ -10,7 +10,7 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/report/json.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"

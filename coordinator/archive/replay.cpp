@@ -16,7 +16,7 @@
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
-#include "coordinator/report/error_figures.hpp"
+#include "coordinator/report/review.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "core/campaign/recording.hpp"
 #include "core/model.hpp"

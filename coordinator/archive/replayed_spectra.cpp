@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "coordinator/archive/replay.hpp"
-#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/report.hpp"
 #include "core/math/elementary.hpp"
 #include "core/signal/band_pass.hpp"
 #include "core/signal/line_weights.hpp"

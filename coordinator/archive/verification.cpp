@@ -16,7 +16,6 @@
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/summarise.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"

@@ -12,7 +12,7 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"
 #include "proto/link/whole_file.hpp"

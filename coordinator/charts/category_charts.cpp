@@ -162,25 +162,16 @@ constexpr double label_width = 170.0;
 constexpr double lane_height = 16.0;
 constexpr std::size_t label_columns_max = 24;
 
-void draw_bars(const TimelineLane& lane, const AxisMap& x, double top, SvgWriter& writer) {
-  constexpr double width_min = 1.0;
-  for (const TimelineBar& bar : lane.bars) {
+void draw_bars(std::span<const TimelineBar> bars, Ink ink, const AxisMap& x, double top,
+               SvgWriter& writer) {
+  constexpr double width_min = 2.0;
+  for (const TimelineBar& bar : bars) {
     if (!(bar.end >= x.range.from) || !(bar.begin <= x.range.to)) continue;
     const double begin = std::clamp(x.at(bar.begin), x.begin, x.end);
     const double end = std::clamp(x.at(bar.end), x.begin, x.end);
     writer.begin_group(bar.tooltip);
     writer.rectangle({begin, top + 3.0, std::max(width_min, end - begin), lane_height - 6.0},
-                     writer.colour(Ink::first));
-    writer.end_group();
-  }
-}
-
-void draw_marks(const TimelineLane& lane, const AxisMap& x, double top, SvgWriter& writer) {
-  for (const TimelineMark& mark : lane.marks) {
-    if (!x.contains(mark.time)) continue;
-    writer.begin_group(mark.tooltip);
-    writer.line({x.at(mark.time), top + 1.0}, {x.at(mark.time), top + lane_height - 1.0},
-                {.colour = writer.colour(Ink::second), .width = 2.0});
+                     writer.colour(ink));
     writer.end_group();
   }
 }
@@ -203,8 +194,8 @@ double draw_chart(const Timeline& timeline, Point corner, double width, SvgWrite
     const double top = box.top + lane_height * static_cast<double>(i);
     writer.text({corner.x, top + lane_height - 4.0},
                 wire::shortened(lane.label, label_columns_max));
-    draw_bars(lane, x, top, writer);
-    draw_marks(lane, x, top, writer);
+    draw_bars(lane.bars, Ink::first, x, top, writer);
+    draw_bars(lane.marks, Ink::second, x, top, writer);
   }
   return box.bottom() + x_axis_height - corner.y;
 }

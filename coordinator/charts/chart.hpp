@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -12,8 +15,8 @@ namespace proofmass::coordinator {
 // size of a picture does not depend on the number of runs. Texts may hold anything: they are
 // escaped where they are drawn.
 
-/// Colours by their role. A page or a theme says what they look like, see svg.hpp. Nothing is
-/// told by colour alone: layers also differ by dash, shape or label.
+/// Colours by their role. A page or a theme says what they look like, see theme_colours(). Nothing
+/// is told by colour alone: layers also differ by dash, shape or label.
 enum class Ink : std::uint8_t { first, second, third, fourth, text };
 enum class Dash : std::uint8_t { solid, dashed, dotted };
 enum class Shape : std::uint8_t { triangle, diamond };
@@ -128,23 +131,17 @@ struct ChartGrid {
   std::vector<Chart> charts = {};  ///< Row by row.
 };
 
-/// Something that took a time: a bar of a timeline, as wide as a pixel at least.
+/// Something that took a time, or none: a bar of a timeline, two pixels wide at least.
 struct TimelineBar {
   double begin = 0.0;
   double end = 0.0;
   std::string tooltip = {};  ///< Shown under the pointer.
 };
 
-/// Something that happened: a line across its lane.
-struct TimelineMark {
-  double time = 0.0;
-  std::string tooltip = {};
-};
-
 struct TimelineLane {
   std::string label = {};  ///< Empty: the lane belongs to the one above.
   std::vector<TimelineBar> bars = {};
-  std::vector<TimelineMark> marks = {};
+  std::vector<TimelineBar> marks = {};  ///< In another ink.
 };
 
 /// Lanes over one axis of time, which is linear and gives both of its ends. What is outside of them
@@ -158,5 +155,76 @@ struct Timeline {
 using Picture = std::variant<Chart, BarChart, HeatMap, ChartGrid, Timeline>;
 
 [[nodiscard]] const ChartText& text_of(const Picture& picture);
+
+/// Where a picture is shown.
+enum class SvgUse : std::uint8_t {
+  /// In an HTML page, which sets the colours with light_colours() and dark_colours(). Without them,
+  /// they are the light ones.
+  embedded,
+  /// As a file: with its namespace, its style and its ground. It follows `prefers-color-scheme`.
+  standalone,
+  /// As a file for programs that know neither custom properties nor media queries, such as those
+  /// that make a bitmap of it: the light colours stand at each element.
+  plain,
+};
+
+/// The picture as SVG, the same bytes for the same picture. All texts of all pictures have one
+/// size. In a page, a picture 480 wide takes 440 pixels; texts are still readable at 360. For
+/// screen readers it is one image with title and description.
+///
+/// Data that are not finite, or not above 0 on a logarithmic axis, are left out. Without data the
+/// axes are drawn with `no data` between them.
+[[nodiscard]] std::string svg_of(const Picture& picture, SvgUse use);
+
+/// A colour of charts, as custom property of CSS and as what it is on a light and a dark ground.
+struct ThemeColour {
+  std::string_view property;  ///< `--chart-first`.
+  std::string_view light;     ///< `#0072b2`.
+  std::string_view dark;
+};
+
+/// Ground, text, grid, and the four inks [Okabe and Ito 2008]. Text has a contrast of 7:1 against
+/// its ground at least, the inks 3:1; the grid is only for the eye and may be fainter.
+[[nodiscard]] std::span<const ThemeColour> theme_colours();
+
+/// Declarations `--chart-ground:#ffffff;...` for the rule of a page that embeds charts.
+[[nodiscard]] std::string light_colours();
+[[nodiscard]] std::string dark_colours();
+
+/// A number as people write it: at most three significant digits, or all of a whole number, U+2212
+/// as its minus sign, and powers of ten in superscripts outside of 0.001 to 99,999: `−0.25`,
+/// `1244`, `2.5×10⁻⁹`, `10⁶`.
+[[nodiscard]] std::string figure_text(double value);
+
+/// A unit in the same spelling: `10⁻⁴ rad` for `1e-4 rad`.
+[[nodiscard]] std::string unit_text(std::string_view unit);
+
+/// A place on an axis that has a line and a label.
+struct Tick {
+  double value = 0.0;
+  std::string label;  ///< With as many digits as it takes to tell it from its neighbours.
+};
+
+/// Where an axis begins and ends, and its ticks, which are not outside.
+struct AxisRange {
+  double from = 0.0;
+  double to = 1.0;
+  std::vector<Tick> ticks = {};
+};
+
+/// Steps are 1, 2 or 5 times a power of ten, the smallest with `num_ticks_max` ticks at most.
+/// @param axis      Of a linear scale. An end that it does not give is moved outwards to a tick.
+/// @param from, to  Of the data. If they are equal, the range is made wider.
+/// @param num_ticks_max  2 or more.
+[[nodiscard]] AxisRange linear_range(const ChartAxis& axis, double from, double to,
+                                     std::size_t num_ticks_max);
+
+/// Ticks are 1, 2 and 5 times powers of ten over less than two of these, and if they are few
+/// enough; else powers of ten, every k-th of them with the smallest k for which they are.
+/// @param axis      Of a logarithmic scale. An end that it does not give is moved outwards to 1, 2
+///                  or 5 times a power of ten.
+/// @param from, to  Of the data, above 0.
+[[nodiscard]] AxisRange logarithmic_range(const ChartAxis& axis, double from, double to,
+                                          std::size_t num_ticks_max);
 
 }  // namespace proofmass::coordinator

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -113,24 +114,102 @@ double label_margin(const AxisRange& range) {
   return width + 10.0;
 }
 
+/// Grid lines and labels of ticks on the left of the box; the label is not drawn.
+void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
+  for (const Tick& tick : y.range.ticks) {
+    const double at = y.at(tick.value);
+    writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour("--chart-grid")});
+    writer.text({box.left - 6.0, at + 4.5}, tick.label, {.anchor = Anchor::end});
+  }
+  writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
+}
+
+struct PlotArea {
+  AxisMap x;
+  AxisMap y;
+  Box box;
+};
+
+std::string place_text(char command, double x, double y) {
+  return command + coordinate(x) + " " + coordinate(y);
+}
+
+void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
+  const std::size_t count =
+      std::min(bars.heights.size(), bars.edges.empty() ? 0 : bars.edges.size() - 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(bars.heights[i] > 0.0) || !area.y.has(bars.heights[i])) continue;
+    const double left = std::max(area.x.at(bars.edges[i]), area.box.left);
+    const double right = std::min(area.x.at(bars.edges[i + 1]), area.box.right());
+    const double top = std::max(area.y.at(bars.heights[i]), area.box.top);
+    if (!(right > left)) continue;
+    // A gap between neighbours, which else would look like one bar.
+    const double gap = right - left > 3.0 ? 1.0 : 0.0;
+    writer.rectangle({left, top, right - left - gap, area.box.bottom() - top},
+                     writer.colour(bars.ink));
+  }
+}
+
+void draw(const Curve& curve, const PlotArea& area, SvgWriter& writer) {
+  const auto* const shape = std::get_if<Shape>(&curve.look);
+  std::string path;
+  bool is_begun = false;
+  for (const Point& point : curve.points) {
+    const bool has_place = area.x.has(point.x) && area.y.has(point.y);
+    if (shape != nullptr) {
+      if (!area.x.contains(point.x) || !area.y.contains(point.y)) continue;
+      writer.marker({area.x.at(point.x), area.y.at(point.y)}, *shape, curve.ink);
+    } else if (has_place) {
+      path += place_text(is_begun ? 'L' : 'M', area.x.at(point.x), area.y.at(point.y));
+    }
+    is_begun = has_place;
+  }
+  if (path.empty()) return;
+  writer.outline(
+      path, {.colour = writer.colour(curve.ink), .width = 2.0, .dash = std::get<Dash>(curve.look)});
+}
+
+void draw(const Band& band, const PlotArea& area, SvgWriter& writer) {
+  std::string upper;
+  std::string lower;
+  for (const BandPoint& point : band.points) {
+    const bool is_finite = std::isfinite(point.lower) && std::isfinite(point.upper);
+    if (!area.x.has(point.x) || !is_finite) continue;
+    const double x = area.x.at(point.x);
+    upper += place_text(upper.empty() ? 'M' : 'L', x, area.y.at(point.upper));
+    lower = place_text('L', x, area.y.at(point.lower)) + lower;
+  }
+  if (upper.empty()) return;
+  writer.area(upper + lower + "Z", writer.colour(band.ink), 0.25);
+}
+
+/// draw_chart() writes the label above the box.
+void draw(const LimitLine& limit, const PlotArea& area, SvgWriter& writer) {
+  if (!area.x.contains(limit.value)) return;
+  const double x = area.x.at(limit.value);
+  writer.line({x, area.box.top}, {x, area.box.bottom()},
+              {.colour = writer.colour(limit.ink), .width = 2.0, .dash = limit.dash});
+}
+
 bool is_marked(const Layer& layer) {
   const auto* const curve = std::get_if<Curve>(&layer);
   return curve != nullptr && std::holds_alternative<Shape>(curve->look);
 }
 
 void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
+  const auto draw_it = [&](const auto& layer) { draw(layer, area, writer); };
   writer.raw(fmt::format(
       "<clipPath id=\"{}-clip\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath>\n"
       "<g clip-path=\"url(#{}-clip)\">\n",
       chart.text.id, coordinate(area.box.left), coordinate(area.box.top),
       coordinate(area.box.width), coordinate(area.box.height), chart.text.id));
   for (const Layer& layer : chart.layers) {
-    if (!is_marked(layer)) draw_layer(layer, area, writer);
+    if (!is_marked(layer)) std::visit(draw_it, layer);
   }
   writer.raw("</g>\n");
   // Half of a marker, and its label, may be outside of the axes.
   for (const Layer& layer : chart.layers) {
-    if (is_marked(layer)) draw_layer(layer, area, writer);
+    if (is_marked(layer)) std::visit(draw_it, layer);
   }
 }
 
@@ -194,22 +273,14 @@ namespace {
 constexpr double line_height = 19.0;
 
 /// Lines of whole words, as far as words fit; at most three.
-std::vector<std::string> wrapped_lines(std::string_view text, double width) {
+std::vector<std::string> title_lines(std::string_view text, double width) {
   constexpr std::size_t num_lines_max = 3;
   const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
-  std::vector<std::string> lines{""};
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string word(text.substr(begin, end - begin));
-    const std::string longer = lines.back().empty() ? word : lines.back() + " " + word;
-    if (lines.back().empty() || wire::display_width(longer) <= num_columns ||
-        lines.size() == num_lines_max) {
-      lines.back() = longer;
-    } else {
-      lines.push_back(word);
-    }
-    begin = end + 1;
+  std::vector<std::string> lines = lines_of(std::string(text), num_columns, num_columns);
+  for (std::size_t i = num_lines_max; i < lines.size(); ++i) {
+    lines[num_lines_max - 1] += " " + lines[i];
   }
+  lines.resize(std::min(lines.size(), num_lines_max));
   for (std::string& line : lines) line = wire::shortened(line, num_columns);
   return lines;
 }
@@ -229,19 +300,6 @@ void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
                               std::get<double>(entry.look), {.colour = colour, .width = 1.0});
   }
 }
-
-/// Labels that would touch the one before them are left out.
-class FreeSpace {
- public:
-  [[nodiscard]] bool take(double from, double to) {
-    if (from < end_) return false;
-    end_ = to;
-    return true;
-  }
-
- private:
-  double end_ = -1e9;
-};
 
 }  // namespace
 
@@ -265,7 +323,7 @@ bool AxisMap::has(double value) const {
 
 double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
   double height = 0.0;
-  for (const std::string& line : wrapped_lines(title, width)) {
+  for (const std::string& line : title_lines(title, width)) {
     height += line_height;
     writer.text({corner.x, corner.y + height - 4.0}, line, {.is_bold = true});
   }
@@ -303,96 +361,19 @@ AxisRange range_of(const ChartAxis& axis, const Extent& data, std::size_t num_ti
 }
 
 void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer) {
-  FreeSpace space;
+  double taken_to = -1e9;
   for (const Tick& tick : x.range.ticks) {
     const double at = x.at(tick.value);
     writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
     const double half = half_width(tick.label);
-    if (!space.take(at - half, at + half + 3.0)) continue;
+    if (at - half < taken_to) continue;  // It would touch the label before it.
+    taken_to = at + half + 3.0;
     writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});
   }
   writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
               {.colour = writer.colour(Ink::text)});
   writer.text({box.left + box.width / 2.0, box.bottom() + 34.0}, axis.label,
               {.anchor = Anchor::middle});
-}
-
-void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
-  for (const Tick& tick : y.range.ticks) {
-    const double at = y.at(tick.value);
-    writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour("--chart-grid")});
-    writer.text({box.left - 6.0, at + 4.5}, tick.label, {.anchor = Anchor::end});
-  }
-  writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
-}
-
-namespace {
-
-std::string place_text(char command, double x, double y) {
-  return command + coordinate(x) + " " + coordinate(y);
-}
-
-void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
-  const std::size_t count =
-      std::min(bars.heights.size(), bars.edges.empty() ? 0 : bars.edges.size() - 1);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(bars.heights[i] > 0.0) || !area.y.has(bars.heights[i])) continue;
-    const double left = std::max(area.x.at(bars.edges[i]), area.box.left);
-    const double right = std::min(area.x.at(bars.edges[i + 1]), area.box.right());
-    const double top = std::max(area.y.at(bars.heights[i]), area.box.top);
-    if (!(right > left)) continue;
-    // A gap between neighbours, which else would look like one bar.
-    const double gap = right - left > 3.0 ? 1.0 : 0.0;
-    writer.rectangle({left, top, right - left - gap, area.box.bottom() - top},
-                     writer.colour(bars.ink));
-  }
-}
-
-void draw(const Curve& curve, const PlotArea& area, SvgWriter& writer) {
-  const auto* const shape = std::get_if<Shape>(&curve.look);
-  std::string path;
-  bool is_begun = false;
-  for (const Point& point : curve.points) {
-    const bool has_place = area.x.has(point.x) && area.y.has(point.y);
-    if (shape != nullptr) {
-      if (!area.x.contains(point.x) || !area.y.contains(point.y)) continue;
-      writer.marker({area.x.at(point.x), area.y.at(point.y)}, *shape, curve.ink);
-    } else if (has_place) {
-      path += place_text(is_begun ? 'L' : 'M', area.x.at(point.x), area.y.at(point.y));
-    }
-    is_begun = has_place;
-  }
-  if (path.empty()) return;
-  writer.outline(
-      path, {.colour = writer.colour(curve.ink), .width = 2.0, .dash = std::get<Dash>(curve.look)});
-}
-
-void draw(const Band& band, const PlotArea& area, SvgWriter& writer) {
-  std::string upper;
-  std::string lower;
-  for (const BandPoint& point : band.points) {
-    const bool is_finite = std::isfinite(point.lower) && std::isfinite(point.upper);
-    if (!area.x.has(point.x) || !is_finite) continue;
-    const double x = area.x.at(point.x);
-    upper += place_text(upper.empty() ? 'M' : 'L', x, area.y.at(point.upper));
-    lower = place_text('L', x, area.y.at(point.lower)) + lower;
-  }
-  if (upper.empty()) return;
-  writer.area(upper + lower + "Z", writer.colour(band.ink), 0.25);
-}
-
-/// draw_chart() writes the label above the box.
-void draw(const LimitLine& limit, const PlotArea& area, SvgWriter& writer) {
-  if (!area.x.contains(limit.value)) return;
-  const double x = area.x.at(limit.value);
-  writer.line({x, area.box.top}, {x, area.box.bottom()},
-              {.colour = writer.colour(limit.ink), .width = 2.0, .dash = limit.dash});
-}
-
-}  // namespace
-
-void draw_layer(const Layer& layer, const PlotArea& area, SvgWriter& writer) {
-  std::visit([&](const auto& shown) { draw(shown, area, writer); }, layer);
 }
 
 }  // namespace proofmass::coordinator

@@ -7,8 +7,6 @@
 #include <variant>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/charts/svg.hpp"
-#include "coordinator/charts/ticks.hpp"
 
 namespace proofmass::coordinator {
 
@@ -49,8 +47,6 @@ struct Stroke {
 /// Elements of SVG, one after the other. Coordinates are those of the picture, y downwards.
 class SvgWriter {
  public:
-  explicit SvgWriter(SvgUse use) : use_(use) {}
-
   /// As a value of `fill` or `stroke`.
   [[nodiscard]] std::string colour(std::string_view property) const;
   [[nodiscard]] std::string colour(Ink ink) const;
@@ -74,7 +70,6 @@ class SvgWriter {
   [[nodiscard]] const std::string& markup() const { return markup_; }
 
  private:
-  SvgUse use_;
   std::string markup_;
 };
 
@@ -123,8 +118,6 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
 
 /// Grid lines and labels of ticks below the box, and the axis' label.
 void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer);
-/// Grid lines and labels of ticks on the left of the box; the label is not drawn.
-void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer);
 
 inline constexpr double x_axis_height = 42.0;  ///< Of the ticks and label below a plot.
 
@@ -140,13 +133,5 @@ struct Extent {
 /// The axis between the ends of the data; a range of its own if there is none.
 [[nodiscard]] AxisRange range_of(const ChartAxis& axis, const Extent& data,
                                  std::size_t num_ticks_max);
-
-/// Draws a layer into the box between the axes.
-struct PlotArea {
-  AxisMap x;
-  AxisMap y;
-  Box box;
-};
-void draw_layer(const Layer& layer, const PlotArea& area, SvgWriter& writer);
 
 }  // namespace proofmass::coordinator

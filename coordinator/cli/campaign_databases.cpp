@@ -18,7 +18,6 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/summarise.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"

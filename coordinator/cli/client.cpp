@@ -14,14 +14,13 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/progress_display.hpp"
 #include "coordinator/net/answers.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/store/sha256.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -186,13 +185,12 @@ std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer) {
 }
 
 int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
-                 AnswerText text) {
+                 void (*print)(std::string_view)) {
   return with_connection({.connection = connection}, [&](const Ask& ask) {
     const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
     const proto::AnswerReply& answer = reply.answer();
     const std::string bytes = answer_bytes(ask, answer);
-    if (text == AnswerText::lines) print_lines(bytes);
-    if (text == AnswerText::bytes) write_standard_output(bytes);
+    print(bytes);
     flush_standard_output();
     if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
     return static_cast<int>(answer.exit_code());
@@ -203,15 +201,6 @@ namespace {
 
 using proto::CampaignStatus;
 
-std::string time_left(const CampaignStatus& campaign) {
-  const bool is_known = campaign.has_remaining_s() && !is_over(campaign);
-  return is_known ? duration_text(campaign.remaining_s()) : "-";
-}
-
-std::string rate(const CampaignStatus& campaign) {
-  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "-";
-}
-
 void add_further(std::uint64_t count, int num_shown, std::string_view thing,
                  std::vector<Remark>& remarks) {
   const std::string note = further_note(count, num_shown, thing);
@@ -221,16 +210,9 @@ void add_further(std::uint64_t count, int num_shown, std::string_view thing,
 Table campaigns_table(const proto::StatusReply& status) {
   Table table;
   if (status.campaigns().empty()) table.remarks.push_back({"no campaigns"});
-  if (!status.campaigns().empty()) {
-    table.columns = {{"campaign", true, 17}, {"phase", true, 10},     {"prio", false, 5},
-                     {"done", false, 11},    {"runs", false, 11},     {"%", false, 5},
-                     {"runs/s", false, 8},   {"time left", false, 12}};
-  }
+  if (!status.campaigns().empty()) table.columns = campaign_columns();
   for (const CampaignStatus& campaign : status.campaigns()) {
-    table.rows.push_back(
-        {campaign.name(), wire::phase_name(campaign), std::to_string(campaign.priority()),
-         std::to_string(campaign.num_done()), std::to_string(campaign.num_runs()),
-         std::to_string(percent_done(campaign)), rate(campaign), time_left(campaign)});
+    table.rows.push_back(campaign_row(campaign));
     for (Remark note : notes_about(campaign)) {
       note.text = fmt::format("{}: {}", campaign.name(), note.text);
       table.remarks.push_back(std::move(note));
@@ -273,11 +255,6 @@ std::string ago(double seconds) {
 }
 
 }  // namespace
-
-bool is_over(const CampaignStatus& campaign) {
-  return campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED ||
-         campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED;
-}
 
 std::string status_text(const proto::StatusReply& status, const TerminalStyle& style) {
   return service_lines(status, style.line_width_max) +
@@ -327,8 +304,8 @@ std::string campaign_line(const CampaignStatus& campaign) {
       fmt::format("{} {}: {} of {}, {} %", campaign.name(), wire::phase_name(campaign),
                   campaign.num_done(), counted(campaign.num_runs(), "run"), percent_done(campaign));
   if (!is_over(campaign)) {
-    if (campaign.rate_hz() > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
-    if (campaign.has_remaining_s()) text += fmt::format(", {} left", time_left(campaign));
+    if (campaign.rate_hz() > 0.0) text += fmt::format(", {} runs/s", rate_text(campaign));
+    if (campaign.has_remaining_s()) text += fmt::format(", {} left", time_left_text(campaign));
   }
   for (const Remark& note : notes_about(campaign)) text += "; " + note.text;
   return text;

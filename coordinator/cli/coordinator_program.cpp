@@ -20,7 +20,6 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"
@@ -143,7 +142,7 @@ struct ServeOptions {
   ServiceConfig service;                ///< As far as options set it; see config_of().
   double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
-  PageOptions page;
+  PageConfig page;
   NoticeCommands::Config commands;
   wire::LogFormat log_format = wire::LogFormat::text;
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
@@ -214,13 +213,6 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   return config;
 }
 
-void log_start(const Service& service, const Log& log) {
-  log({.kind = "coordinator_started",
-       .fields = {{"bind", service.workers_endpoint()},
-                  {"bind_clients", service.clients_endpoint()},
-                  {"campaigns", service.campaigns().size()}}});
-}
-
 /// Brings the statistics of the campaigns that are still open up to date.
 /// @return False if they could not all be written.
 bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
@@ -244,18 +236,12 @@ bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
   return is_written;
 }
 
-bool has_given_up_runs(const Service& service) {
-  const std::vector<proto::CampaignStatus> campaigns = service.campaigns();
-  return std::any_of(campaigns.begin(), campaigns.end(),
-                     [](const proto::CampaignStatus& one) { return one.num_given_up() > 0; });
-}
-
 /// Serves all campaigns of a directory to the workers that connect.
 /// @return An ExitCode.
 int serve_campaigns(const ServeOptions& options) {
   wire::ignore_broken_pipes();  // The service outlives what reads its log.
   wire::require_threads(num_service_threads);
-  const std::optional<PageConfig> page_config = page_config_of(options.page);
+  options.page.validate();
   const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
@@ -263,11 +249,14 @@ int serve_campaigns(const ServeOptions& options) {
   ServiceConfig config = config_of(options, folder);
   NoticeCommands commands(options.commands, log);
   config.on_notice = [&](const CampaignNotice& notice) { commands.take(notice); };
-  if (page_config) config.num_descriptors_reserved = page_descriptors_max();
+  if (options.page.is_wanted()) config.num_descriptors_reserved = page_descriptors_max();
   Service service(campaigns_of(options, folder), config, log);
   std::optional<Page> page;
-  if (page_config) page.emplace(*page_config, log);
-  log_start(service, log);
+  if (options.page.is_wanted()) page.emplace(options.page, log);
+  log({.kind = "coordinator_started",
+       .fields = {{"bind", service.workers_endpoint()},
+                  {"bind_clients", service.clients_endpoint()},
+                  {"campaigns", service.campaigns().size()}}});
   wire::ServiceNotices notices;
   notices.ready();
   service.run(stop, [&] {
@@ -280,10 +269,11 @@ int serve_campaigns(const ServeOptions& options) {
   page.reset();                     // It may be reading files, too.
   commands.wait(command_wait_max);  // Before the files are closed, which they may be reading.
   const bool is_done = service.is_done();
-  const bool has_given_up = has_given_up_runs(service);
-  const std::size_t num_campaigns = service.campaigns().size();
+  const std::vector<proto::CampaignStatus> campaigns = service.campaigns();
+  const bool has_given_up =
+      std::ranges::any_of(campaigns, [](const auto& one) { return one.num_given_up() > 0; });
   const bool is_written = finish(service.close(), log);
-  log({.kind = "coordinator_ended", .fields = {{"campaigns", num_campaigns}}});
+  log({.kind = "coordinator_ended", .fields = {{"campaigns", campaigns.size()}}});
   if (!is_written || service.has_storage_failed()) return exit_cannot_be_done;
   const bool is_in_order =
       options.service.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;

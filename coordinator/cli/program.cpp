@@ -2,31 +2,44 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cmath>
 #include <condition_variable>
 #include <csignal>
+#include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <iostream>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
+#include "coordinator/report/json.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/campaign/definition.hpp"
+#include "core/definition/definition_text.hpp"
+#include "core/error.hpp"
 #include "core/model.hpp"
+#include "core/result_rules.hpp"
+#include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -82,8 +95,6 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   } catch (const CLI::ParseError& error) {
     return fail(wire::refusal_of(app, error), exit_wrong_usage);
   } catch (const DefinitionError& error) {
-    return fail(error.what(), exit_wrong_usage);
-  } catch (const UsageError& error) {
     return fail(error.what(), exit_wrong_usage);
   } catch (const ConfigError& error) {
     return fail(error.what(), exit_wrong_usage);
@@ -241,6 +252,171 @@ sigset_t SignalThread::signals() {
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGHUP);
   return set;
+}
+
+void add_override_options(CLI::App& command, Overrides& overrides) {
+  command.add_option("--runs", overrides.num_runs, "Number of runs; more than before extends")
+      ->check(wire::in_range(std::uint64_t{1}, num_runs_max));
+  command.add_option("--seed", overrides.seed, "Seed of the campaign")
+      ->check(wire::in_range(std::uint64_t{0}, seed_max));
+  command
+      .add_option("--set", overrides.assignments,
+                  "Replace a value of the file: TABLE.KEY=VALUE;\nmay be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
+  command.add_flag_callback(
+      "--tolerate-digest",
+      [&overrides] { overrides.assignments.emplace_back("campaign.tolerate_digest=true"); },
+      "Accept machines where a model program computes\nother bits; the report says so");
+}
+
+std::string too_many_failures_text(std::uint64_t num_failures, std::uint64_t num_runs,
+                                   std::uint64_t failures_max) {
+  return fmt::format(
+      "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
+      "--failures); cancelled\n",
+      num_failures, num_runs, failures_max);
+}
+
+std::string example_requirement() {
+  const Quantity quantity = example_quantity(example_results());
+  const double limit =
+      std::isfinite(quantity.objective) ? quantity.objective : quantity.display_scale;
+  return fmt::format("{} < {} for 99% with 95%", quantity.name,
+                     proofmass::detail::number_text(limit));
+}
+
+void add_stop_options(CLI::App& command, StopPlan& options) {
+  command.add_option("--until", options.stop_rule,
+                     fmt::format("Stop as soon as the rule holds, as in\n\"std({}) within 5%\",\n"
+                                 "\"all objectives within 2%\" or\n\"{} decided\"",
+                                 example_quantity(example_results()).name, example_requirement()));
+  command
+      .add_option("--failures", options.failures_max,
+                  "Cancel when more runs than this lack an estimate")
+      ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
+}
+
+void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {
+  command
+      .add_option("--audit", audit_fraction,
+                  "Fraction of the runs to compute a second time,\nelsewhere, and compare")
+      ->check(wire::in_range(0.0, 1.0));
+}
+
+void add_page_options(CLI::App& app, PageConfig& page) {
+  app.add_flag("--page", page.address,
+               "Serve the live page, at 127.0.0.1:5557 or at\n--page=HOST:PORT")
+      ->envname("PROOFMASS_PAGE");
+  app.add_option("--page-token-file", page.token_file,
+                 "File with a secret that visitors of the page\nmust show; needed beyond loopback")
+      ->type_name(wire::file_type)
+      ->envname("PROOFMASS_PAGE_TOKEN_FILE");
+}
+
+namespace {
+
+[[noreturn]] void fail_to_write() {
+  throw Error(fmt::format("standard output: {}", std::strerror(errno)));
+}
+
+std::string_view value_of_variable(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? std::string_view() : value;
+}
+
+}  // namespace
+
+ScreenSize screen_size_of(std::FILE* stream) {
+  winsize size{};
+  const bool is_known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  if (!is_known) return {};
+  return {.columns = size.ws_col, .rows = size.ws_row};
+}
+
+bool takes_escapes(std::FILE* stream) {
+  const std::string_view terminal = value_of_variable("TERM");
+  return isatty(fileno(stream)) != 0 && !terminal.empty() && terminal != "dumb";
+}
+
+TerminalStyle style_of(std::FILE* stream) {
+  TerminalStyle style;
+  if (isatty(fileno(stream)) != 0) style.line_width_max = screen_size_of(stream).columns - 1;
+  const bool is_painted = takes_escapes(stream) && value_of_variable("NO_COLOR").empty();
+  style.paint = is_painted ? Paint::yes : Paint::no;
+  return style;
+}
+
+void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
+
+void say_reference_runs(const Model& model) {
+  wire::say(fmt::format("proofmass: computing the reference runs of {}\n", model.version()));
+}
+
+void print_written(const std::filesystem::path& file, OutputFormat format) {
+  if (format == OutputFormat::json) return print_json({{"file", file.string()}});
+  print_lines(fmt::format("wrote {}\n", file.string()));
+}
+
+void print_json(const nlohmann::ordered_json& json) { print_lines(dumped(json)); }
+
+void write_standard_output(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();
+}
+
+void flush_standard_output() {
+  if (std::fflush(stdout) != 0) fail_to_write();
+}
+
+// Files.
+
+void refuse_output(const std::filesystem::path& output, std::string_view why) {
+  throw UsageError(fmt::format("output = {} ({})", output.string(), why));
+}
+
+void check_output_file(const std::filesystem::path& output, wire::IfThere if_there,
+                       std::string_view remedy) {
+  std::error_code ignored;
+  if (std::filesystem::is_symlink(output, ignored)) {
+    refuse_output(output, "is a symbolic link; name the file that it leads to");
+  }
+  if (!std::filesystem::exists(output, ignored)) return;
+  if (if_there == wire::IfThere::keep) {
+    refuse_output(output, "exists already; replace it with --force");
+  }
+  if (!std::filesystem::is_regular_file(output)) {
+    refuse_output(output, fmt::format("is no file; {}", remedy));
+  }
+  if (has_campaign_mark(output)) {
+    refuse_output(output, "is a campaign, which --force does not replace");
+  }
+}
+
+void check_document(const std::filesystem::path& file, wire::IfThere if_there) {
+  if (file.empty() || file == "-") return;
+  check_output_file(file, if_there, "- writes to standard output");
+}
+
+void write_document(const std::filesystem::path& file, wire::IfThere if_there,
+                    std::string_view text) {
+  if (file == "-") return write_standard_output(text);
+  wire::write_whole_file("output", file, text, wire::public_mode, if_there);
+}
+
+void check_new_file(std::string_view argument, const std::filesystem::path& file) {
+  std::error_code error;
+  if (file == "-") {
+    throw UsageError(fmt::format("{} = - (must be a file; ./- is one of that name)", argument));
+  }
+  if (std::filesystem::exists(file, error)) {
+    throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
+  }
+  if (!file.has_filename()) {
+    throw UsageError(fmt::format("{} = \"{}\" (must name a file)", argument, file.string()));
+  }
+  const bool has_directory = std::filesystem::is_directory(wire::directory_of(file), error);
+  if (has_directory || error == std::errc::permission_denied) return;  // Making it says more.
+  throw Error(fmt::format("{} = {} (its directory does not exist)", argument, file.string()));
 }
 
 }  // namespace proofmass::coordinator

@@ -36,10 +36,7 @@ enum ExitCode : int {
 [[nodiscard]] std::string exit_codes_text(std::initializer_list<ExitCode> further);
 
 /// The user asked for something that makes no sense.
-class UsageError : public Error {
- public:
-  using Error::Error;
-};
+using UsageError = InvalidArgument;
 
 /// What is to be done once all arguments are parsed; returns an ExitCode.
 using Command = std::function<int()>;

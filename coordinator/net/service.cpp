@@ -71,14 +71,14 @@ class Service::Impl final : public Outbox {
     end(stop == StopRequest::leave);
   }
 
-  [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) {
+  [[nodiscard]] ServiceSnapshot snapshot() {
     ServiceSnapshot snapshot{.status = request_service_.service_status(),
                              .campaigns = campaign_service_.records(),
                              .workers = {},
                              .num_leases = state_.leases.size(),
                              .num_sockets_reset = sockets_.num_resets(),
                              .num_messages_unsent = worker_gateway_.num_unsent()};
-    take_workers(state_, now(), depth, snapshot);
+    take_workers(state_, now(), snapshot);
     paths_.hide_in(snapshot.status);
     for (CampaignRecord& campaign : snapshot.campaigns) paths_.hide_in(campaign.status);
     return snapshot;
@@ -373,7 +373,7 @@ std::vector<proto::CampaignStatus> Service::campaigns() const {
   return statuses;
 }
 
-ServiceSnapshot Service::snapshot(SnapshotDepth depth) const { return impl_->snapshot(depth); }
+ServiceSnapshot Service::snapshot() const { return impl_->snapshot(); }
 
 bool Service::is_done() const { return impl_->is_done(); }
 

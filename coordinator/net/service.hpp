@@ -130,7 +130,7 @@ class Service {
   /// The campaigns, in the order in which they came.
   [[nodiscard]] std::vector<proto::CampaignStatus> campaigns() const;
   /// Everything about it now, for other threads. To be called in its own thread.
-  [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) const;
+  [[nodiscard]] ServiceSnapshot snapshot() const;
   /// True if every campaign is finished or cancelled, and no file waits to be served.
   [[nodiscard]] bool is_done() const;
   /// True if results were delivered and could not be stored, or a campaign cannot store any. To be

@@ -78,14 +78,12 @@ RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker
           .registered_s = seconds(now - worker.registered_at)};
 }
 
-void take_workers(const State& state, TimePoint now, SnapshotDepth depth,
-                  ServiceSnapshot& snapshot) {
-  const bool is_listed = depth == SnapshotDepth::with_workers;
-  if (is_listed) snapshot.workers.reserve(state.workers.size());
+void take_workers(const State& state, TimePoint now, ServiceSnapshot& snapshot) {
+  snapshot.workers.reserve(state.workers.size());
   for (const auto& [id, worker] : state.workers) {
-    const WorkerActivity activity = activity_of(state, worker, now);
-    ++snapshot.num_workers_by_activity[static_cast<std::size_t>(activity)];
-    if (is_listed) snapshot.workers.push_back(record_of(state, id, worker, now));
+    const RegisteredWorker& taken =
+        snapshot.workers.emplace_back(record_of(state, id, worker, now));
+    ++snapshot.num_workers_by_activity[static_cast<std::size_t>(taken.activity)];
   }
 }
 

@@ -64,23 +64,19 @@ struct ServiceSnapshot {
   TimePoint taken_at = {};         ///< By the clock of whoever keeps it; set by SnapshotBoard.
   proto::StatusReply status = {};  ///< Without the campaigns, which are below.
   std::vector<CampaignRecord> campaigns = {};  ///< All, in the order in which they came.
-  std::vector<RegisteredWorker> workers = {};  ///< All, by number; none if they were not asked for.
-  /// Of each of worker_activities, whether or not `workers` lists them.
+  std::vector<RegisteredWorker> workers = {};  ///< All, by number.
+  /// Of each of worker_activities.
   std::array<std::uint64_t, worker_activities.size()> num_workers_by_activity{};
   std::uint64_t num_leases = 0;
   std::uint64_t num_sockets_reset = 0;    ///< How often a lack of memory closed the sockets.
   std::uint64_t num_messages_unsent = 0;  ///< To workers; dropped because they found no room.
 };
 
-/// How much a snapshot holds. A copy of 10,000 workers takes some milliseconds.
-enum class SnapshotDepth : std::uint8_t { without_workers, with_workers };
-
 /// The worker as it stands.
 [[nodiscard]] RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker,
                                          TimePoint now);
 
-/// Counts the workers by activity and, if they are asked for, copies them.
-void take_workers(const State& state, TimePoint now, SnapshotDepth depth,
-                  ServiceSnapshot& snapshot);
+/// Copies the workers, of which 10,000 take some milliseconds, and counts them by activity.
+void take_workers(const State& state, TimePoint now, ServiceSnapshot& snapshot);
 
 }  // namespace proofmass::coordinator

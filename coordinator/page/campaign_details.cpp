@@ -14,12 +14,11 @@
 #include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/net/server_paths.hpp"
-#include "coordinator/report/report_tables.hpp"
-#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/table/document_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
@@ -28,8 +27,7 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::chrono::seconds reading_interval_min(2);
-constexpr int reading_share = 150;
-constexpr int reading_share_of_all = 75;
+constexpr int reading_share = 75;
 constexpr int reading_niceness = 10;
 constexpr std::chrono::seconds pause_without_memory(2);
 
@@ -123,7 +121,7 @@ ResultsReading::ResultsReading(const Store& store, const Campaign& campaign)
               .objectives = campaign.objectives(),
               .why_not_independent = why_not_independent(campaign)},
       statistics_(review_.objectives),
-      standard_errors_(review_.schema),
+      standard_errors_(review_.schema, review_.why_not_independent.empty()),
       figures_(review_.objectives.size(), 0) {}
 
 bool ResultsReading::is_of(const Store& store) const { return campaign_ == store.id(); }
@@ -158,10 +156,8 @@ std::string ResultsReading::html() const {
   Review review = review_;
   review.results.statistics = statistics();
   review.figures = ErrorFigures(figures_).figures();
-  StandardErrorStatistics errors = standard_errors_.statistics();
-  if (!review.why_not_independent.empty()) leave_out_intervals(errors);
   std::string html = "<h3>Accuracy so far</h3>\n" + html_table(accuracy_table(review));
-  for (const Table& table : standard_error_tables(review.schema, errors)) {
+  for (const Table& table : standard_error_tables(review.schema, standard_errors_.statistics())) {
     html += table_or_nothing(table);
   }
   return html + "<h3>Errors so far</h3>\n<figure>\n" +
@@ -185,12 +181,8 @@ CampaignDetails read_details(const CampaignRecord& campaign, const CampaignDetai
   return now;
 }
 
-TimePoint next_reading(TimePoint ended_at, Duration cpu_time) {
-  return ended_at + std::max<Duration>(reading_interval_min, reading_share * cpu_time);
-}
-
 TimePoint end_of_rest(TimePoint ended_at, Duration cpu_time) {
-  return ended_at + reading_share_of_all * cpu_time;
+  return ended_at + reading_share * cpu_time;
 }
 
 DetailReader::DetailReader(ReadDetails read)
@@ -247,12 +239,11 @@ void DetailReader::read(const std::string& name, std::unique_lock<std::mutex>& l
   // What a reading that failed has is as old as before.
   if (before == nullptr || details->failure.empty()) details->read_at = began_at;
   const TimePoint ended_at = steady_now();
-  const Duration cpu_time = cpu_time_of_thread() - cpu_before;
   lock.lock();
-  rests_until_ = end_of_rest(ended_at, cpu_time);
+  rests_until_ = end_of_rest(ended_at, cpu_time_of_thread() - cpu_before);
   const auto found = watched_.find(name);
   if (found == watched_.end() || !is_same(found->second.campaign, campaign)) return;
-  found->second.due = next_reading(ended_at, cpu_time);
+  found->second.due = ended_at + reading_interval_min;
   found->second.details = std::move(details);
 }
 

@@ -91,12 +91,9 @@ using ReadDetails = std::function<CampaignDetails(const CampaignRecord&, const C
 [[nodiscard]] CampaignDetails read_details(const CampaignRecord& campaign,
                                            const CampaignDetails* before);
 
-/// When a campaign is read again whose reading ended at `ended_at` and took so much processor time:
-/// not before 2 s, nor before 150 times that time. So it takes 0.67 % of a core at most.
-[[nodiscard]] TimePoint next_reading(TimePoint ended_at, Duration cpu_time);
-
-/// When anything is read again after that, of whatever campaign: not before 75 times that time. So
-/// reading takes 1.33 % of a core at most, however many campaigns are looked at.
+/// When a campaign is read again after a reading that ended at `ended_at` and took so much
+/// processor time: not before 75 times that time. So reading takes 1.33 % of a core at most,
+/// however many campaigns are looked at.
 [[nodiscard]] TimePoint end_of_rest(TimePoint ended_at, Duration cpu_time);
 
 /// Reads the databases of those campaigns at which somebody looks, in one thread of low priority.

@@ -5,11 +5,10 @@
 #include <map>
 #include <utility>
 
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/report/status_notes.hpp"
-#include "coordinator/table/document_table.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -173,12 +172,7 @@ std::string runs_text(const RunRange& runs) {
 
 /// The part of time that the chart shows, seconds since 1970: from the first attempt to the last
 /// one, at most chart_span_s.
-struct ShownTime {
-  double begin_s;
-  double end_s;
-};
-
-ShownTime shown_time(const RecentAttempts& attempts) {
+std::pair<double, double> shown_time(const RecentAttempts& attempts) {
   double begin_s = 1e300, end_s = 0.0;
   for (const ComputedRuns& computed : attempts.computed) {
     begin_s = std::min(begin_s, begin_of(computed));
@@ -189,7 +183,7 @@ ShownTime shown_time(const RecentAttempts& attempts) {
     end_s = std::max(end_s, static_cast<double>(lost.lost_unix_s));
   }
   begin_s = std::max(begin_s, end_s - chart_span_s);
-  return {.begin_s = std::min(begin_s, end_s - 1.0), .end_s = end_s};
+  return {std::min(begin_s, end_s - 1.0), end_s};
 }
 
 }  // namespace
@@ -205,10 +199,12 @@ std::vector<TimelineLane> lanes_of(const RecentAttempts& attempts, double last_s
     return of_worker;
   };
   for (const LostAttempt& lost : attempts.lost) {
+    const double time_s = static_cast<double>(lost.lost_unix_s) - last_s;
     lanes_of_worker(lost.worker_key)
         .front()
         .marks.push_back(
-            {.time = static_cast<double>(lost.lost_unix_s) - last_s,
+            {.begin = time_s,
+             .end = time_s,
              .tooltip = fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)});
   }
   for (const ComputedRuns& computed : attempts.computed) {
@@ -237,11 +233,12 @@ std::string attempts_chart(const RecentAttempts& attempts) {
   if (attempts.computed.empty() && attempts.lost.empty()) {
     return "<p class=\"note\">none yet</p>\n";
   }
-  const ShownTime shown = shown_time(attempts);
-  std::vector<TimelineLane> lanes = lanes_of(attempts, shown.end_s);
+  const auto [begin_s, end_s] = shown_time(attempts);
+  const double span_s = end_s - begin_s;
+  std::vector<TimelineLane> lanes = lanes_of(attempts, end_s);
   // Lanes end with the span of the chart: others have nothing to show.
   std::erase_if(lanes, [&](const TimelineLane& lane) {
-    return lane.label.empty() && lane.bars.front().end < shown.begin_s - shown.end_s;
+    return lane.label.empty() && lane.bars.front().end < -span_s;
   });
   const std::size_t num_lanes = lanes.size();
   lanes.resize(std::min(num_lanes, chart_lanes_max));
@@ -250,10 +247,8 @@ std::string attempts_chart(const RecentAttempts& attempts) {
                .title = "Attempts by worker",
                .description = fmt::format("Batches: {}, losses: {}, workers: {}, within {:.0f} s.",
                                           attempts.computed.size(), attempts.lost.size(),
-                                          attempts.workers.size(), shown.end_s - shown.begin_s)},
-      .x = {.label = "time until the last result, s",
-            .from = shown.begin_s - shown.end_s,
-            .to = 0.0},
+                                          attempts.workers.size(), span_s)},
+      .x = {.label = "time until the last result, s", .from = -span_s, .to = 0.0},
       .lanes = std::move(lanes)};
   std::string html = fmt::format(
       "<div class=\"scroll attempts\" tabindex=\"0\" role=\"region\" "

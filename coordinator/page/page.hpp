@@ -29,32 +29,22 @@ class SnapshotBoard {
 
   explicit SnapshotBoard(TimePoint now) : turned_at_(now) {}
 
-  /// Asks for snapshots of this depth.
-  /// @return The newest one if it is that deep and not older than `age_max`; else null: a new one
-  ///         comes with the next turn of the service.
-  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> want(SnapshotDepth depth, TimePoint now);
-
-  /// However old it is; null before the first.
-  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> newest() const;
+  /// Asks for snapshots: of one older than `age_max`, a new one comes with the next turn of the
+  /// service.
+  /// @return The newest one, however old it is; null before the first.
+  [[nodiscard]] std::shared_ptr<const ServiceSnapshot> want(TimePoint now);
 
   /// To be called in each turn of the service's loop.
   /// @param take  Makes a snapshot; called if one is wanted.
-  void on_turn(TimePoint now, const std::function<ServiceSnapshot(SnapshotDepth)>& take);
+  void on_turn(TimePoint now, const std::function<ServiceSnapshot()>& take);
 
   /// Since the last turn, or since the board was made.
   [[nodiscard]] Duration since_turn(TimePoint now) const;
 
  private:
-  [[nodiscard]] bool is_wanted(const std::optional<TimePoint>& asked_at, TimePoint now) const {
-    return asked_at && now - *asked_at < wanted_for;
-  }
-
   mutable std::mutex mutex_;
   TimePoint turned_at_;
-  std::optional<TimePoint> asked_at_;              ///< For any snapshot.
-  std::optional<TimePoint> asked_for_workers_at_;  ///< For one with workers.
-  bool is_urgent_ = false;  ///< Somebody waits: the newest is too old or lacks the workers.
-  SnapshotDepth newest_depth_ = SnapshotDepth::without_workers;
+  std::optional<TimePoint> asked_at_;
   /// Shared with answers that are being made of it.
   std::shared_ptr<const ServiceSnapshot> newest_;
 };
@@ -62,7 +52,7 @@ class SnapshotBoard {
 /// Which address has which answer; README.md lists them. All members but the access may be used
 /// from the thread of the page only.
 struct PageSite {
-  PageAccess access{std::nullopt};
+  PageAccess access = {};
   SnapshotBoard* board = nullptr;  ///< Outlives the site; not null.
   /// As DetailReader::details().
   std::function<std::shared_ptr<const CampaignDetails>(const CampaignRecord&, TimePoint)> details;
@@ -74,39 +64,29 @@ struct PageSite {
                                                  HttpServer::Patience patience) const;
 };
 
-/// What the kernel says of this process.
-struct ProcessFigures {
-  double cpu_s = 0.0;
-  std::uint64_t resident_size = 0;  ///< Bytes.
-  std::uint64_t virtual_size = 0;   ///< Bytes.
-  std::uint64_t num_descriptors = 0;
-  std::uint64_t num_descriptors_max = 0;
-  double start_unix_s = 0.0;
-};
-
-/// The figures of this moment. What cannot be read is 0.
-[[nodiscard]] ProcessFigures process_figures();
-
 /// Campaigns that have metrics of their own, so that the number of series is bounded; how many are
 /// left out is one of the metrics.
 inline constexpr std::size_t campaigns_with_metrics_max = 200;
 
-/// All metrics in Prometheus' text format 0.0.4. README.md names those that deserve an
-/// alert.
+/// All metrics in Prometheus' text format 0.0.4, those of this process at this moment among them.
+/// README.md names those that deserve an alert.
 [[nodiscard]] std::string metrics_text(const ServiceSnapshot& snapshot, TimePoint now,
-                                       const ProcessFigures& process, const HttpCounts& page);
+                                       const HttpCounts& page);
 
 /// A label's value with backslash, quote and end of line escaped, and what is not UTF-8 visible.
 [[nodiscard]] std::string label_value(std::string_view text);
 
 /// Settings of a live page.
 struct PageConfig {
-  PageAddress address;
+  /// Of parse_page_address(); `true`: page_address_by_default; empty or `false`: there is no page.
+  /// These are the words of the command line for a flag.
+  std::string address = {};
   /// Secret that visitors must show; needed for addresses that other machines reach.
   std::optional<std::filesystem::path> token_file = {};
 
-  /// @throws InvalidArgument `page = HOST:PORT (rule)` if such an address has no token; Error if
-  ///         the token file cannot be used.
+  [[nodiscard]] bool is_wanted() const { return !address.empty() && address != "false"; }
+  /// @throws InvalidArgument `page = HOST:PORT (rule)` if the address is none, or needs a token;
+  ///         `page token file = PATH (rule)` without a page; Error if that file cannot be used.
   void validate() const;
 };
 
@@ -119,6 +99,7 @@ struct PageConfig {
 class Page {
  public:
   /// Listens. Warns if other machines can reach the address, because nothing is encrypted.
+  /// @pre The page is wanted.
   /// @throws Error as PageConfig::validate() does, or if the address cannot be used.
   Page(const PageConfig& config, const Log& log);
   Page(const Page&) = delete;

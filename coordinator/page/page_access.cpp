@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <ranges>
 #include <system_error>
 
 #include "core/error.hpp"
@@ -16,10 +17,12 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// 127.0.0.0/8.
-bool is_loopback(const in_addr& address) {
+/// Of IPv4: 127.0.0.0/8; empty if it is no address.
+std::optional<bool> is_loopback_ipv4(const std::string& address) {
   constexpr std::uint32_t loopback_network = 127;
-  return ntohl(address.s_addr) >> 24 == loopback_network;
+  in_addr ipv4{};
+  if (inet_pton(AF_INET, address.c_str(), &ipv4) != 1) return std::nullopt;
+  return ntohl(ipv4.s_addr) >> 24 == loopback_network;
 }
 
 [[noreturn]] void refuse_page_address(std::string_view text) {
@@ -51,18 +54,18 @@ TokenDigest digest_of(std::string_view text, std::string_view purpose) {
   return digest;
 }
 
-std::string hexadecimal(const TokenDigest& digest) {
-  std::string text;
-  for (const unsigned char byte : digest) text += fmt::format("{:02x}", byte);
-  return text;
+/// The parts between separators; none of an empty text.
+std::vector<std::string_view> parts_of(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (const auto part : text | std::views::split(separator)) {
+    parts.emplace_back(part.begin(), part.end());
+  }
+  return parts;
 }
 
 /// The value of our cookie in a header `a=b; c=d`; empty if it is not there.
 std::string_view cookie_in(std::string_view header) {
-  while (!header.empty()) {
-    const std::size_t end = header.find(';');
-    std::string_view part = header.substr(0, end);
-    header = end == std::string_view::npos ? std::string_view() : header.substr(end + 1);
+  for (std::string_view part : parts_of(header, ';')) {
     part.remove_prefix(std::min(part.find_first_not_of(' '), part.size()));
     if (part.starts_with(cookie_name) && part.substr(cookie_name.size()).starts_with('=')) {
       return part.substr(cookie_name.size() + 1);
@@ -91,9 +94,8 @@ PageAddress parse_page_address(std::string_view text) {
   const std::uint16_t port = port_in(text.substr(colon + 1), text);
   if (host == "localhost") host = "127.0.0.1";
   if (host == "*") host = "0.0.0.0";
-  in_addr ipv4{};
-  if (inet_pton(AF_INET, host.c_str(), &ipv4) == 1) {
-    return {.host = host, .port = port, .is_loopback = is_loopback(ipv4)};
+  if (const std::optional<bool> is_loopback = is_loopback_ipv4(host)) {
+    return {.host = host, .port = port, .is_loopback = *is_loopback};
   }
   if (!host.starts_with('[') || !host.ends_with(']')) refuse_page_address(text);
   host = host.substr(1, host.size() - 2);
@@ -108,42 +110,43 @@ std::string url_of(const PageAddress& address) {
                  : fmt::format("http://{}:{}/", address.host, address.port);
 }
 
-PageToken PageToken::read(const std::filesystem::path& file) {
+PageAccess PageAccess::read(const std::filesystem::path& token_file) {
   constexpr std::string_view what = "page token file";
   constexpr std::size_t file_size_max = 4096;  // Of one that is worth saying what a token is.
   std::string text =
-      wire::read_within_reach(what, file, wire::Reach::private_to_owner, file_size_max);
+      wire::read_within_reach(what, token_file, wire::Reach::private_to_owner, file_size_max);
   if (text.ends_with('\n')) text.pop_back();
   const bool is_visible = std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
   if (is_visible && text.size() >= token_size_min && text.size() <= token_size_max) {
-    return PageToken(text);
+    return PageAccess(text);
   }
   throw Error(fmt::format("{} = {} (must hold {} to {} visible ASCII characters and nothing else)",
-                          what, file.string(), token_size_min, token_size_max));
+                          what, token_file.string(), token_size_min, token_size_max));
 }
 
-PageToken::PageToken(std::string_view text)
-    : digest_(digest_of(text, "")), cookie_value_(hexadecimal(digest_of(text, cookie_purpose))) {}
+PageAccess::PageAccess(std::string_view token)
+    : digest_(digest_of(token, "")),
+      cookie_value_(fmt::format("{:02x}", fmt::join(digest_of(token, cookie_purpose), ""))) {}
 
-bool PageToken::is(std::string_view text) const {
+bool PageAccess::is_token(std::string_view text) const {
   const TokenDigest other = digest_of(text, "");
-  return sodium_memcmp(digest_.data(), other.data(), digest_.size()) == 0;
+  return has_token() && sodium_memcmp(digest_.data(), other.data(), digest_.size()) == 0;
 }
 
-bool PageToken::is_cookie(std::string_view value) const {
+bool PageAccess::is_cookie(std::string_view value) const {
   return value.size() == cookie_value_.size() &&
          sodium_memcmp(value.data(), cookie_value_.data(), value.size()) == 0;
 }
 
 std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) const {
-  if (!token_) {
+  if (!has_token()) {
     if (is_loopback_host(request.host)) return std::nullopt;
     return plain_answer(403,
                         "Host: must be localhost or a loopback address, unless the coordinator "
                         "has a --page-token-file");
   }
-  if (token_->is(bearer_in(request.authorization))) return std::nullopt;
-  if (token_->is_cookie(cookie_in(request.cookie))) return std::nullopt;
+  if (is_token(bearer_in(request.authorization))) return std::nullopt;
+  if (is_cookie(cookie_in(request.cookie))) return std::nullopt;
   return HttpAnswer{
       .status = 401,
       .body =
@@ -157,11 +160,11 @@ std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) con
 
 // The cookie has no path: the browser takes that of the page, also behind a proxy.
 std::optional<HttpAnswer> PageAccess::welcome(std::string_view given_token) const {
-  if (!token_ || !token_->is(given_token)) return std::nullopt;
+  if (!is_token(given_token)) return std::nullopt;
   HttpAnswer answer = plain_answer(303, "the token is right");
-  answer.headers = {{"Location", "./"},
-                    {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict", cookie_name,
-                                               token_->cookie_value())}};
+  answer.headers = {
+      {"Location", "./"},
+      {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict", cookie_name, cookie_value_)}};
   return answer;
 }
 
@@ -169,8 +172,7 @@ bool is_loopback_host(std::string_view host) {
   if (host.starts_with('[')) return host == "[::1]" || host.starts_with("[::1]:");
   const std::string name(host.substr(0, host.find(':')));
   if (strcasecmp(name.c_str(), "localhost") == 0) return true;
-  in_addr ipv4{};
-  return inet_pton(AF_INET, name.c_str(), &ipv4) == 1 && is_loopback(ipv4);
+  return is_loopback_ipv4(name).value_or(false);
 }
 
 namespace {
@@ -203,15 +205,10 @@ bool is_harmless_part(const std::string& part) {
 
 bool add_path(std::string_view path, PageRequest& request) {
   if (!path.starts_with('/')) return false;
-  path.remove_prefix(1);
-  while (!path.empty()) {
-    const std::size_t end = path.find('/');
-    const std::optional<std::string> part = percent_decoded(path.substr(0, end));
+  for (const std::string_view text : parts_of(path.substr(1), '/')) {
+    const std::optional<std::string> part = percent_decoded(text);
     if (!part || !is_harmless_part(*part)) return false;
     request.path.push_back(*part);
-    // A slash at the end begins another part, which is empty.
-    if (end != std::string_view::npos && end + 1 == path.size()) return false;
-    path = end == std::string_view::npos ? std::string_view() : path.substr(end + 1);
   }
   return true;
 }
@@ -226,11 +223,9 @@ std::optional<std::string> decoded_value(std::string_view text) {
 }
 
 bool add_parameters(std::string_view query, PageRequest& request) {
-  for (std::size_t count = 0; !query.empty(); ++count) {
-    if (count == num_parameters_max) return false;
-    const std::size_t end = query.find('&');
-    const std::string_view item = query.substr(0, end);
-    query = end == std::string_view::npos ? std::string_view() : query.substr(end + 1);
+  const std::vector<std::string_view> items = parts_of(query, '&');
+  if (items.size() > num_parameters_max) return false;
+  for (const std::string_view item : items) {
     const std::size_t sign = item.find('=');
     const auto name = decoded_value(item.substr(0, sign));
     const auto value = decoded_value(sign == std::string_view::npos ? "" : item.substr(sign + 1));

@@ -31,39 +31,24 @@ struct PageAddress {
 /// `http://127.0.0.1:5557/`
 [[nodiscard]] std::string url_of(const PageAddress& address);
 
-/// A secret that a page asks for. Only its digests are kept, so that it reaches no log.
-class PageToken {
- public:
-  /// Reads a file that holds nothing but the token: 16 to 256 visible ASCII characters.
-  /// @throws Error reading `page token file = PATH (rule)` if it cannot be read, is somebody
-  ///         else's, can be read by others than its owner, or holds no such token. No message has
-  ///         the token.
-  [[nodiscard]] static PageToken read(const std::filesystem::path& file);
-
-  /// @pre The text is as read() wants it.
-  explicit PageToken(std::string_view text);
-
-  /// Takes the same time for each text of one length.
-  [[nodiscard]] bool is(std::string_view text) const;
-  /// What a browser keeps instead of the token, which cannot be found out from it.
-  [[nodiscard]] const std::string& cookie_value() const { return cookie_value_; }
-  [[nodiscard]] bool is_cookie(std::string_view value) const;
-
- private:
-  std::array<unsigned char, 32> digest_{};
-  std::string cookie_value_;
-};
-
 /// Who may see a page.
 class PageAccess {
  public:
   /// Without a token, the page is for this machine alone: the header Host must name loopback. Else
   /// a page of the internet could have its own name point to this machine and read along (DNS
-  /// rebinding). With a token the name does not matter, as the browser sends the cookie only to the
-  /// name that set it.
-  explicit PageAccess(std::optional<PageToken> token) : token_(std::move(token)) {}
+  /// rebinding).
+  PageAccess() = default;
+  /// With a token the name does not matter, as the browser sends the cookie only to the name that
+  /// set it. Only digests of the token are kept, so that it reaches no log.
+  explicit PageAccess(std::string_view token);
 
-  [[nodiscard]] bool has_token() const { return token_.has_value(); }
+  /// Reads a file that holds nothing but the token: 16 to 256 visible ASCII characters.
+  /// @throws Error reading `page token file = PATH (rule)` if it cannot be read, is somebody
+  ///         else's, can be read by others than its owner, or holds no such token. No message has
+  ///         the token.
+  [[nodiscard]] static PageAccess read(const std::filesystem::path& token_file);
+
+  [[nodiscard]] bool has_token() const { return !cookie_value_.empty(); }
 
   /// Why a request is not answered; nothing if it is.
   [[nodiscard]] std::optional<HttpAnswer> refusal_of(const HttpRequest& request) const;
@@ -73,7 +58,12 @@ class PageAccess {
   [[nodiscard]] std::optional<HttpAnswer> welcome(std::string_view given_token) const;
 
  private:
-  std::optional<PageToken> token_;
+  /// Takes the same time for each text of one length.
+  [[nodiscard]] bool is_token(std::string_view text) const;
+  [[nodiscard]] bool is_cookie(std::string_view value) const;
+
+  std::array<unsigned char, 32> digest_{};
+  std::string cookie_value_;  ///< What a browser keeps instead of the token, which it hides.
 };
 
 /// True if the header names this machine: `localhost`, an address 127.x.x.x or `[::1]`, with a port
@@ -83,8 +73,8 @@ class PageAccess {
 /// What the target of a request says, decoded: `/campaigns/a%20b?events=2` has the path
 /// {campaigns, a b} and the parameter events.
 struct PageRequest {
-  std::vector<std::string> path =
-      {};  ///< None for `/`. No part is empty, `.` or `..`, or has a `/`.
+  /// None for `/`. No part is empty, `.` or `..`, or has a `/`.
+  std::vector<std::string> path = {};
   std::map<std::string, std::string> parameters = {};
 
   [[nodiscard]] bool has(const std::string& parameter) const {

@@ -49,15 +49,8 @@ struct PageOfList {
 [[nodiscard]] std::string progress_bar(const proto::CampaignStatus& campaign,
                                        std::string_view name);
 
-/// Runs a second, and the time until all are finished; dashes where they are not known.
-[[nodiscard]] std::string rate_text(const proto::CampaignStatus& campaign);
-[[nodiscard]] std::string time_left_text(const proto::CampaignStatus& campaign);
-
 /// A name with what it has, as a part of a `<dl>`.
 [[nodiscard]] std::string fact(std::string_view name, std::string_view value);
-
-/// `1,234,567`
-[[nodiscard]] std::string grouped(std::uint64_t count);
 
 /// A list of notes; nothing if there are none.
 [[nodiscard]] std::string notes_list(const std::vector<Remark>& notes);
@@ -78,10 +71,6 @@ struct WorkerChoice {
   std::size_t page = 1;
 };
 
-/// @return What the parameters `sort`, `filter` and `page` say; unknown values count as absent.
-[[nodiscard]] WorkerChoice worker_choice(const PageRequest& request);
-[[nodiscard]] std::string_view name_of(WorkerOrder order);
-
 /// The workers of one page.
 struct ChosenWorkers {
   PageOfList list;
@@ -92,9 +81,6 @@ struct ChosenWorkers {
 /// largest throughput first. Takes some milliseconds for 10,000 workers.
 [[nodiscard]] ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
                                            const WorkerChoice& choice);
-
-/// Results per hour since the worker registered.
-[[nodiscard]] double results_per_h(const RegisteredWorker& worker);
 
 /// The first page: all campaigns, fifty at a time.
 [[nodiscard]] PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& request,

@@ -14,7 +14,7 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/records.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

@@ -10,8 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/table/document_table.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 

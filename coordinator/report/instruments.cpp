@@ -6,10 +6,11 @@
 #include <utility>
 
 #include "coordinator/report/json.hpp"
-#include "coordinator/report/report_tables.hpp"
-#include "coordinator/report/run_groups.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -131,24 +132,8 @@ InstrumentStatistics RunningInstruments::statistics() {
 
 namespace {
 
-/// To a tenth of a per cent; two digits of less than one per cent.
-std::string percent_text(double share) {
-  const double percent = 100.0 * share;
-  return percent > 0.0 && percent < 1.0 ? fmt::format("{:.2g}", percent)
-                                        : fmt::format("{:.1f}", percent);
-}
-
-Cell percent_cell(double share) { return {percent_text(share), share}; }
-
-void add_percent_ends(const std::optional<Interval>& interval, Row& row) {
-  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
-    row.push_back(interval ? percent_cell((*interval).*end) : no_figure());
-  }
-}
-
 std::string share_text(const GroupedShare& of) {
-  return fmt::format("{} % ({} to {} %)", percent_text(of.share), percent_text(of.interval.lower),
-                     percent_text(of.interval.upper));
+  return fmt::format("{:.3g} % ({})", 100.0 * of.share, interval_percent(of.interval));
 }
 
 std::string count_text(const InstrumentStatistics& statistics) {
@@ -180,22 +165,6 @@ Table no_instruments(const InstrumentStatistics& statistics) {
                                    statistics.realisations)}}};
 }
 
-Row variance_row(const proofmass::Quantity& quantity, const InstrumentQuantity& of) {
-  Row row{quantity.symbol, unit_cell(quantity)};
-  if (of.error.num_groups == 0) {
-    row.insert(row.end(), 8, no_figure());
-    return row;
-  }
-  const double scale = quantity.display_scale;
-  row.push_back(figure_cell(of.mean_magnitude, scale));
-  add_ends(of.magnitude_interval, scale, row);
-  row.push_back(figure_cell(of.error.between_deviation, scale));
-  row.push_back(figure_cell(of.error.within_deviation, scale));
-  row.push_back(of.error.within_share ? percent_cell(*of.error.within_share) : no_figure());
-  add_percent_ends(of.error.within_share_interval, row);
-  return row;
-}
-
 std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) {
   std::vector<std::string> notes{count_text(statistics)};
   if (statistics.num_not_estimated > 0) {
@@ -224,20 +193,28 @@ Table variance_table(const ResultSchema& schema, const InstrumentStatistics& sta
   constexpr const char* noise = "noise, %";
   Table table{.id = "variance-table",
               .caption = "Variance between instruments and within",
-              .columns = {{"parameter", true, 10},
-                          {"unit", true, 9},
-                          {"mean", false, 7, mean},
-                          {"from", false, 8, mean},
-                          {"to", false, 8, mean},
-                          {"between", false, 9, deviation, true},
-                          {"within", false, 8, deviation},
-                          {"share", false, 7, noise, true},
-                          {"from", false, 6, noise},
-                          {"to", false, 6, noise}},
+              .rows = std::vector<Row>(statistics.quantities.size()),
               .notes = variance_notes(statistics)};
-  for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    table.rows.push_back(variance_row(schema.quantities[i], statistics.quantities[i]));
-  }
+  const std::vector<InstrumentQuantity>& all = statistics.quantities;
+  const auto scale = [&](std::size_t i) { return schema.quantities[i].display_scale; };
+  const auto figure = [&](std::size_t i, double value) {
+    return all[i].error.num_groups > 0 ? figure_cell(value, scale(i)) : no_figure();
+  };
+  add_column(table, {"parameter", true, 10}, [&](auto i) { return schema.quantities[i].symbol; });
+  add_column(table, {"unit", true, 9}, [&](auto i) { return unit_cell(schema.quantities[i]); });
+  add_column(table, {"mean", false, 7, mean},
+             [&](auto i) { return figure(i, all[i].mean_magnitude); });
+  add_ends(table, {"from", false, 8, mean}, {"to", false, 8, mean},
+           [&](auto i) { return IntervalAndScale(all[i].magnitude_interval, scale(i)); });
+  add_column(table, {"between", false, 9, deviation, true},
+             [&](auto i) { return figure_cell(all[i].error.between_deviation, scale(i)); });
+  add_column(table, {"within", false, 8, deviation},
+             [&](auto i) { return figure(i, all[i].error.within_deviation); });
+  add_column(table, {"share", false, 7, noise, true},
+             [&](auto i) { return figure_cell(all[i].error.within_share, percent_scale); });
+  add_ends(table, {"from", false, 6, noise}, {"to", false, 6, noise}, [&](auto i) {
+    return IntervalAndScale(all[i].error.within_share_interval, percent_scale);
+  });
   return table;
 }
 
@@ -250,18 +227,31 @@ Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& s
       statistics.quantities, [](const auto& of) { return of.standard_errors.has_value(); });
   Table table{.id = "instrument-table",
               .caption = "95 % intervals with the instrument as the unit",
-              .columns = {{"parameter", true, 10},
-                          {"from", false, 8, "bias"},
-                          {"to", false, 9, "bias"},
-                          {"from", false, 7, beyond, true},
-                          {"to", false, 7, beyond}},
+              .rows = std::vector<Row>(statistics.quantities.size()),
               .notes = {"beyond: runs whose error exceeds the objective, or without an estimate"}};
+  const std::vector<InstrumentQuantity>& all = statistics.quantities;
+  add_column(table, {"parameter", true, 10}, [&](auto i) { return schema.quantities[i].symbol; });
+  add_ends(table, {"from", false, 8, "bias"}, {"to", false, 9, "bias"}, [&](auto i) {
+    return IntervalAndScale(all[i].error.mean_interval, schema.quantities[i].display_scale);
+  });
+  add_ends(table, {"from", false, 7, beyond, true}, {"to", false, 7, beyond},
+           [&](auto i) { return IntervalAndScale(all[i].beyond.interval, percent_scale); });
   if (have_sigma) {
-    table.columns.insert(table.columns.end(), {{"from", false, 7, covered, true},
-                                               {"to", false, 7, covered},
-                                               {"s²/σ²", false, 7, within, true},
-                                               {"from", false, 7, within},
-                                               {"to", false, 7, within}});
+    const auto add_share = [&](Column from, Column to, GroupedShare GroupedStandardErrors::*share) {
+      add_ends(table, std::move(from), std::move(to), [&](auto i) {
+        const auto& sigma = all[i].standard_errors;
+        return IntervalAndScale(sigma ? std::optional(((*sigma).*share).interval) : std::nullopt,
+                                percent_scale);
+      });
+    };
+    add_share({"from", false, 7, covered, true}, {"to", false, 7, covered},
+              &GroupedStandardErrors::covered);
+    add_column(table, {"s²/σ²", false, 7, within, true}, [&](auto i) {
+      const auto& sigma = all[i].standard_errors;
+      return figure_cell(sigma ? sigma->within_ratio : std::nullopt);
+    });
+    add_share({"from", false, 7, within}, {"to", false, 7, within},
+              &GroupedStandardErrors::covered_within);
     table.notes.emplace_back(
         "within: about the mean of each instrument, whose variance there is s²; from, to in %");
   }
@@ -272,20 +262,6 @@ Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& s
                    "realisations",
                    share_text(statistics.ensemble), statistics.realisations),
        temporal_text(statistics)});
-  for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    const proofmass::Quantity& quantity = schema.quantities[i];
-    const InstrumentQuantity& of = statistics.quantities[i];
-    Row row{quantity.symbol};
-    add_ends(of.error.mean_interval, quantity.display_scale, row);
-    add_percent_ends(of.beyond.interval, row);
-    if (const auto& sigma = of.standard_errors) {
-      add_percent_ends(sigma->covered.interval, row);
-      row.push_back(figure_cell(sigma->within_ratio));
-      add_percent_ends(sigma->covered_within.interval, row);
-    }
-    row.resize(table.columns.size(), no_figure());
-    table.rows.push_back(std::move(row));
-  }
   return table;
 }
 

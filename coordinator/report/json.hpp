@@ -30,13 +30,11 @@ namespace proofmass::coordinator {
 /// Objects for programs keep the order of their keys.
 using Json = nlohmann::ordered_json;
 
-/// Object on one line or on several; ends with the end of a line.
-enum class JsonLayout : std::uint8_t { one_line, indented };
-
-/// The text of an object. Bytes of it that are not UTF-8 are replaced by U+FFFD.
-[[nodiscard]] inline std::string dumped(const Json& json, JsonLayout layout) {
-  constexpr auto replace = Json::error_handler_t::replace;
-  return json.dump(layout == JsonLayout::indented ? 2 : -1, ' ', false, replace) + "\n";
+/// The text of an object, which ends with the end of a line. Bytes of it that are not UTF-8 are
+/// replaced by U+FFFD.
+/// @param indent  Of its lines; below 0 it is one line.
+[[nodiscard]] inline std::string dumped(const Json& json, int indent = 2) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 /// What `json_of` makes of each, as an array.

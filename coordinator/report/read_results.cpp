@@ -4,14 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <concepts>
 #include <optional>
 #include <string_view>
 #include <utility>
 
-#include "coordinator/report/summarise.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/order.hpp"
@@ -218,7 +215,8 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
   ReadResults results;
   const std::vector<double> objectives = campaign.objectives();
   RunningStatistics statistics(objectives);
-  RunningStandardErrors standard_errors(store.schema());
+  const bool are_independent = why_not_independent(campaign).empty();
+  RunningStandardErrors standard_errors(store.schema(), are_independent);
   KeptErrors kept(objectives.size());
   std::vector<double> totals;
   const std::optional<ErrorBudget> budget = campaign.error_budget();
@@ -252,10 +250,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       complete(results.statistics.accuracy[i], errors);
       if (further.magnitudes) further.magnitudes(i, errors);
     }
-    if (!why_not_independent(campaign).empty()) {
-      leave_out_intervals(results.statistics);
-      leave_out_intervals(results.standard_errors);
-    }
+    if (!are_independent) leave_out_intervals(results.statistics);
     groups.finish(results);
   });
   return results;
@@ -266,7 +261,7 @@ ReadResults read_checked_results(const Store& store, const Campaign& campaign,
   ReadResults results;
   store.read_one_state([&] {
     results = read_results(store, campaign, further);
-    results.digest_check = check_digest(store, results.statistics.num_runs, results.digests);
+    results.is_digest_checked = check_digest(store, results.statistics.num_runs, results.digests);
     check_given_up(store, results);
     check_stop_checks(store, campaign.objectives());
   });
@@ -285,59 +280,36 @@ void write_statistics(Store& store, const Campaign& campaign, const ReadResults&
 
 namespace {
 
-/// Appends the bytes of numbers.
-class Layout {
- public:
-  explicit Layout(std::vector<unsigned char>& bytes) : bytes_(bytes) { bytes_.clear(); }
+/// Two numbers of 32 bits as one, whose bytes are theirs one after the other.
+std::uint64_t pair_of(std::uint32_t first, std::uint32_t second) {
+  return first | std::uint64_t{second} << 32;
+}
 
-  template <std::unsigned_integral Integer>
-  void put(Integer value) {
-    std::array<unsigned char, sizeof(value)> bytes{};
-    for (std::size_t i = 0; i < sizeof(value); ++i) {
-      bytes[i] = static_cast<unsigned char>(value >> (8 * i));
-    }
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-  }
-
-  // Adding zero takes the sign from a negative zero, which SQLite does not keep.
-  void put(double value) { put(std::bit_cast<std::uint64_t>(value + 0.0)); }
-
-  /// As many as there are; zeros where they mean nothing.
-  void put(const std::vector<double>& values, bool have_meaning, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) put(have_meaning ? values[i] : 0.0);
-  }
-
- private:
-  std::vector<unsigned char>& bytes_;
-};
+/// As many as there are; zeros where they mean nothing.
+void add_numbers(const std::vector<double>& values, bool have_meaning, std::size_t count,
+                 Sha256& hash) {
+  for (std::size_t i = 0; i < count; ++i) hash.add(have_meaning ? values[i] : 0.0);
+}
 
 }  // namespace
 
 Digest::Digest(const ResultSchema& schema) : num_quantities_(schema.quantities.size()) {}
 
 void Digest::add(const RunResult& result) {
-  Layout layout(bytes_);
-  layout.put(result.run.value);
-  layout.put(static_cast<std::uint32_t>(result.status));
-  layout.put(result.num_draws);
-  layout.put(result.num_rounds);
-  layout.put(std::uint32_t{0});
-  layout.put(result.truth, result.has_truth(), num_quantities_);
-  layout.put(result.estimate, result.has_estimate(), num_quantities_);
-  layout.put(result.standard_error, true, result.standard_error.size());
-  layout.put(result.fit, true, result.fit.size());
-  layout.put(result.correlations, true, result.correlations.size());
-  hash_.add(bytes_);
-
+  hash_.add(result.run.value);
+  hash_.add(pair_of(static_cast<std::uint32_t>(result.status), result.num_draws));
+  hash_.add(pair_of(result.num_rounds, 0));
+  add_numbers(result.truth, result.has_truth(), num_quantities_, hash_);
+  add_numbers(result.estimate, result.has_estimate(), num_quantities_, hash_);
+  for (const auto* const values : {&result.standard_error, &result.fit, &result.correlations}) {
+    add_numbers(*values, true, values->size(), hash_);
+  }
   if (result.health.empty()) return;
   has_health_ = true;
-  Layout of_health(bytes_);
-  of_health.put(result.run.value);
-  of_health.put(result.health, true, result.health.size());
+  health_hash_.add(result.run.value);
+  add_numbers(result.health, true, result.health.size(), health_hash_);
   const Loss loss = result.status == RunStatus::lost ? result.loss : Loss{};
-  of_health.put(loss.cause);
-  of_health.put(loss.session);
-  health_hash_.add(bytes_);
+  health_hash_.add(pair_of(loss.cause, loss.session));
 }
 
 ResultDigests Digest::finish() {
@@ -380,10 +352,9 @@ std::optional<Summary> summary_of_all(const Store& store, std::uint64_t num_resu
 
 }  // namespace
 
-DigestCheck check_digest(const Store& store, std::uint64_t num_results,
-                         const ResultDigests& digests) {
+bool check_digest(const Store& store, std::uint64_t num_results, const ResultDigests& digests) {
   const std::optional<Summary> summary = summary_of_all(store, num_results);
-  if (!summary) return DigestCheck::not_checked;
+  if (!summary) return false;
   const auto require_same = [&](const std::string& now, const std::string& stored,
                                 const char* what) {
     if (now == stored) return;
@@ -393,7 +364,7 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results,
   };
   require_same(digests.results, summary->digests.results, "its");
   require_same(digests.health, summary->digests.health, "the health of its");
-  return DigestCheck::holds;
+  return true;
 }
 
 WalkedResults walk_checked(const Store& store, const std::function<void(const RunResult&)>& visit) {
@@ -407,7 +378,7 @@ WalkedResults walk_checked(const Store& store, const std::function<void(const Ru
     });
     const ResultDigests digests = digest.finish();
     walked.digest = digests.results;
-    walked.check = check_digest(store, walked.num_results, digests);
+    walked.is_digest_checked = check_digest(store, walked.num_results, digests);
   });
   return walked;
 }

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "coordinator/report/json.hpp"
-#include "coordinator/report/report_tables.hpp"
-#include "coordinator/report/run_groups.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
 
@@ -181,27 +181,21 @@ Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& sta
   constexpr const char* beyond = "beyond, %";
   Table table{.id = "replicate-table",
               .caption = "95 % intervals from replicates of the design, in the units above",
-              .columns = {{"parameter", true, 10},
-                          {"from", false, 8, magnitude},
-                          {"to", false, 8, magnitude},
-                          {"from", false, 9, bias, true},
-                          {"to", false, 9, bias},
-                          {"from", false, 8, rms, true},
-                          {"to", false, 9, rms},
-                          {"from", false, 8, beyond, true},
-                          {"to", false, 8, beyond}},
+              .rows = std::vector<Row>(statistics.quantities.size()),
               .notes = replicate_notes(statistics)};
-  for (std::size_t i = 0; i < statistics.quantities.size(); ++i) {
-    const proofmass::Quantity& quantity = schema.quantities[i];
-    const ReplicatedQuantity& of = statistics.quantities[i];
-    const double scale = quantity.display_scale;
-    Row row{quantity.symbol};
-    add_ends(not_negative(of.magnitude.interval), scale, row);
-    add_ends(of.bias.interval, scale, row);
-    add_ends(root_of(of.mean_square.interval), scale, row);
-    add_ends(of.beyond.interval, 0.01, row);
-    table.rows.push_back(std::move(row));
-  }
+  const std::vector<ReplicatedQuantity>& all = statistics.quantities;
+  const auto scale = [&](std::size_t i) { return schema.quantities[i].display_scale; };
+  add_column(table, {"parameter", true, 10}, [&](auto i) { return schema.quantities[i].symbol; });
+  add_ends(table, {"from", false, 8, magnitude}, {"to", false, 8, magnitude}, [&](auto i) {
+    return IntervalAndScale(not_negative(all[i].magnitude.interval), scale(i));
+  });
+  add_ends(table, {"from", false, 9, bias, true}, {"to", false, 9, bias},
+           [&](auto i) { return IntervalAndScale(all[i].bias.interval, scale(i)); });
+  add_ends(table, {"from", false, 8, rms, true}, {"to", false, 9, rms}, [&](auto i) {
+    return IntervalAndScale(root_of(all[i].mean_square.interval), scale(i));
+  });
+  add_ends(table, {"from", false, 8, beyond, true}, {"to", false, 8, beyond},
+           [&](auto i) { return IntervalAndScale(all[i].beyond.interval, percent_scale); });
   return table;
 }
 

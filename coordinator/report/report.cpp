@@ -12,11 +12,10 @@
 #include <vector>
 
 #include "coordinator/report/json.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/report/summarise.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/model.hpp"
@@ -30,7 +29,7 @@ std::string report_text(const Review& review, Paint paint) {
                      given_up_text(results.given_up, paint) + note_text(review.note) +
                      fitted(wire::visible_lines(warnings_text(review.schema, results.warnings) +
                                                 (review.stop ? review.stop->text : "")));
-  std::vector<Table> tables = accuracy_tables(review);
+  std::vector<Table> tables{accuracy_table(review), interval_table(review), error_table(review)};
   const auto further = std::back_inserter(tables);
   std::ranges::move(standard_error_tables(review.schema, results.standard_errors), further);
   std::ranges::move(group_tables(review), further);
@@ -46,28 +45,36 @@ std::string note_text(const std::string& note) {
   return fitted("Note      " + wire::visible_text(note));
 }
 
-std::string summary_text(const Review& review) {
+std::vector<Row> summary_rows(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  std::string text = fmt::format("Campaign  {}\n", review.name);
-  if (!review.is_imported) text += fmt::format("Seed      {}\n", review.seed);
-  text += fmt::format("Digest    {}\n", review.results.digests.results);
-  if (review.results.digest_check == DigestCheck::not_checked) {
-    text += fmt::format("          (not checked: no stored one of these {} runs)\n",
-                        statistics.num_runs);
+  std::vector<Row> rows{{"Campaign", review.name}};
+  if (!review.is_imported) rows.push_back({"Seed", std::to_string(review.seed)});
+  rows.push_back({"Digest", review.results.digests.results});
+  if (!review.results.is_digest_checked) {
+    rows.push_back(
+        {"", fmt::format("(not checked: no stored one of these {} runs)", statistics.num_runs)});
   }
-  text += fmt::format("Runs      {} finished of {}, {} completed{}\n", statistics.num_runs,
-                      review.num_runs, statistics.num_estimated,
-                      review.is_cancelled ? "; the campaign was cancelled" : "");
+  rows.push_back({"Runs", fmt::format("{} finished of {}, {} completed{}", statistics.num_runs,
+                                      review.num_runs, statistics.num_estimated,
+                                      review.is_cancelled ? "; the campaign was cancelled" : "")});
   if (statistics.num_estimated < statistics.num_runs) {
     const MissingEstimates& missing = review.results.missing;
-    text += fmt::format(
-        "          {} not converged, {} not finite, {} without draw{}\n", missing.num_not_converged,
-        missing.num_not_finite, missing.num_no_draw,
-        missing.num_lost > 0 ? fmt::format(", {} lost", missing.num_lost) : std::string());
+    rows.push_back(
+        {"", fmt::format("{} not converged, {} not finite, {} without draw{}",
+                         missing.num_not_converged, missing.num_not_finite, missing.num_no_draw,
+                         missing.num_lost > 0 ? fmt::format(", {} lost", missing.num_lost) : "")});
   }
   for (const LostRuns& lost : review.results.losses) {
-    text +=
-        fmt::format("          {} lost: {}\n", lost.num_runs, loss_text(review.schema, lost.loss));
+    rows.push_back(
+        {"", fmt::format("{} lost: {}", lost.num_runs, loss_text(review.schema, lost.loss))});
+  }
+  return rows;
+}
+
+std::string summary_text(const Review& review) {
+  std::string text;
+  for (const Row& row : summary_rows(review)) {
+    text += fmt::format("{:<10}{}\n", row[0].text, row[1].text);
   }
   return text;
 }
@@ -286,7 +293,7 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
             {"seed", std::to_string(review.seed)},
             {"digest", results.digests.results},
             {"note", review.note},
-            {"is_digest_checked", results.digest_check == DigestCheck::holds},
+            {"is_digest_checked", results.is_digest_checked},
             {"num_runs", review.num_runs},
             {"num_finished", statistics.num_runs},
             {"num_with_estimate", statistics.num_estimated},
@@ -350,11 +357,9 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
                 .budget = campaign.error_budget(),
                 .why_not_independent = why_not_independent(campaign),
                 .num_contradicting = store.num_contradicting()};
-  if (depth == ReviewDepth::tables) {
-    review.results = read_checked_results(store, campaign);
-    return review;
-  }
-  ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()));
+  const bool are_independent = review.why_not_independent.empty();
+  ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()),
+                       are_independent);
   VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives,
                             num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
                             review.budget);
@@ -371,11 +376,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
   if (depth == ReviewDepth::matrix) return review;
   review.execution = store.execution();
   review.figures = figures.figures();
-  if (!review.why_not_independent.empty()) {
-    for (QuantityFigures& quantity : review.figures) leave_out_intervals(quantity);
-  } else if (depth == ReviewDepth::causes) {
-    review.causes = find_causes(store, campaign);
-  }
+  if (are_independent && depth == ReviewDepth::causes) review.causes = find_causes(store, campaign);
   return review;
 }
 

@@ -1,18 +1,15 @@
-#include "coordinator/report/report_tables.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <initializer_list>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "coordinator/charts/ticks.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/interval.hpp"
@@ -40,65 +37,11 @@ Cell count_cell(std::uint64_t count, Tone tone) {
   return cell;
 }
 
-void add_published(const Quantity& quantity, Row& row) {
-  for (const double PublishedAccuracy::*figure :
-       {&PublishedAccuracy::worst, &PublishedAccuracy::mean,
-        &PublishedAccuracy::standard_deviation}) {
-    row.push_back(quantity.published
-                      ? given_cell((*quantity.published).*figure, quantity.display_scale)
-                      : Cell(""));
-  }
-}
-
-Row accuracy_row(const Quantity& quantity, double objective, const AccuracyStatistic* accuracy,
-                 std::uint64_t num_runs) {
-  const double scale = quantity.display_scale;
-  Row row{quantity.symbol, unit_cell(quantity),
-          std::isfinite(objective) ? given_cell(objective, scale) : no_figure()};
-  if (accuracy == nullptr) {
-    row.insert(row.end(), 5, no_figure());
-  } else {
-    const std::uint64_t beyond = accuracy->num_beyond_objective;
-    row.push_back(figure_cell(accuracy->worst, scale));
-    row.push_back(count_cell(accuracy->worst_run.value, Tone::plain));
-    row.push_back(figure_cell(accuracy->mean, scale));
-    row.push_back(num_runs < 2 ? no_figure() : figure_cell(accuracy->standard_deviation, scale));
-    row.push_back(std::isfinite(objective)
-                      ? count_cell(beyond, beyond > 0 ? Tone::bad : Tone::plain)
-                      : no_figure());
-  }
-  return row;
-}
-
-void add_triple(double value, const std::optional<Interval>& interval, double scale, Row& row) {
-  row.push_back(figure_cell(value, scale));
-  add_ends(not_negative(interval), scale, row);
-}
-
 Cell skewness_cell(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
   if (num_runs < 3) return no_figure();
   Cell cell = figure_cell(accuracy.error.skewness);
   cell.text = fmt::format("{:.2f}", accuracy.error.skewness);
   return cell;
-}
-
-Row interval_row(const Quantity& quantity, const AccuracyStatistic& accuracy,
-                 std::uint64_t num_runs) {
-  const double scale = quantity.display_scale;
-  Row row{quantity.symbol};
-  add_triple(accuracy.mean, accuracy.mean_interval, scale, row);
-  if (num_runs < 2) {
-    row.insert(row.end(), 3, no_figure());
-  } else {
-    // Values that differ have a deviation: an end of 0 is that of resamples without the far ones.
-    const bool is_known = !accuracy.deviation_interval || accuracy.standard_deviation == 0.0 ||
-                          accuracy.deviation_interval->lower > 0.0;
-    add_triple(accuracy.standard_deviation, is_known ? accuracy.deviation_interval : std::nullopt,
-               scale, row);
-  }
-  row.push_back(figure_cell(accuracy.error.bias, scale));
-  row.push_back(skewness_cell(accuracy, num_runs));
-  return row;
 }
 
 /// Fewest runs from which on the bootstrap covers what it says; core/statistics/README.md.
@@ -203,28 +146,6 @@ std::string level_sentence(const Review& review) {
                      budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
 }
 
-/// What error_table() shows of a quantity.
-Row error_row(const Quantity& quantity, double objective, const AccuracyStatistic& accuracy,
-              const Review& review) {
-  const double scale = quantity.display_scale;
-  const bool has_intervals = review.why_not_independent.empty();
-  Row row{quantity.symbol};
-  if (has_intervals) {
-    add_ends(accuracy.error.bias_interval, scale, row);
-  } else {
-    row.push_back(figure_cell(accuracy.error.bias, scale));
-    row.push_back(skewness_cell(accuracy, review.results.statistics.num_estimated));
-  }
-  for (const PercentileStatistic& percentile : accuracy.percentiles) {
-    row.push_back(figure_cell(percentile.value, scale));
-  }
-  if (!has_intervals) return row;
-  for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
-    row.push_back(std::isfinite(objective) ? figure_cell(share, 0.01) : no_figure());
-  }
-  return row;
-}
-
 // Published totals, too, add up the worst errors of all parameters, which no single run has.
 std::string totals_sentence(const RunTotals& totals) {
   return fmt::format(
@@ -277,10 +198,22 @@ std::optional<Interval> not_negative(std::optional<Interval> interval) {
   return interval;
 }
 
-void add_ends(const std::optional<Interval>& interval, double scale, Row& row) {
-  for (const double Interval::*end : {&Interval::lower, &Interval::upper}) {
-    row.push_back(interval ? figure_cell((*interval).*end, scale) : no_figure());
-  }
+void add_column(Table& table, Column column,
+                const std::function<Cell(std::size_t row)>& cell_of_row) {
+  table.columns.push_back(std::move(column));
+  for (std::size_t i = 0; i < table.rows.size(); ++i) table.rows[i].push_back(cell_of_row(i));
+}
+
+void add_ends(Table& table, Column from, Column to,
+              const std::function<IntervalAndScale(std::size_t row)>& of_row) {
+  const auto add = [&](Column& column, double Interval::*end) {
+    add_column(table, std::move(column), [&](std::size_t i) {
+      const auto [interval, scale] = of_row(i);
+      return interval ? figure_cell((*interval).*end, scale) : no_figure();
+    });
+  };
+  add(from, &Interval::lower);
+  add(to, &Interval::upper);
 }
 
 Cell unit_cell(const Quantity& quantity) {
@@ -295,28 +228,46 @@ Table accuracy_table(const Review& review) {
   Table table{.id = "accuracy",
               .caption = fmt::format("Accuracy of the estimates: |estimate − truth| of {}",
                                      counted(statistics.num_estimated, "run")),
-              .columns = {{"parameter", true, 11},
-                          {"unit", true, 9},
-                          {"objective", false, 9},
-                          {"worst", false, 8, ours},
-                          {"in run", false, 8, ours, false, true},
-                          {"mean", false, 8, ours},
-                          {"std", false, 8, ours},
-                          {"beyond", false, 8, ours}},
+              .rows = std::vector<Row>(review.objectives.size()),
               .notes = {"beyond: runs whose error exceeds the objective"}};
-  const bool has_published = std::ranges::any_of(
-      schema.quantities, [](const Quantity& quantity) { return quantity.published.has_value(); });
-  if (has_published) {
-    table.columns.insert(
-        table.columns.end(),
-        {{"worst", false, 6, theirs, true}, {"mean", false, 6, theirs}, {"std", false, 6, theirs}});
-  }
-  for (std::size_t i = 0; i < review.objectives.size(); ++i) {
-    table.rows.push_back(
-        accuracy_row(schema.quantities[i], review.objectives[i],
-                     statistics.num_estimated > 0 ? &statistics.accuracy[i] : nullptr,
-                     statistics.num_estimated));
-    if (has_published) add_published(schema.quantities[i], table.rows.back());
+  const auto scale = [&](std::size_t i) { return schema.quantities[i].display_scale; };
+  const auto has_objective = [&](std::size_t i) { return std::isfinite(review.objectives[i]); };
+  const auto add_of_runs = [&](Column column, const auto& cell_of) {
+    add_column(table, std::move(column), [&](std::size_t i) {
+      return statistics.num_estimated > 0 ? cell_of(statistics.accuracy[i], i) : no_figure();
+    });
+  };
+  add_column(table, {"parameter", true, 11}, [&](auto i) { return schema.quantities[i].symbol; });
+  add_column(table, {"unit", true, 9}, [&](auto i) { return unit_cell(schema.quantities[i]); });
+  add_column(table, {"objective", false, 9}, [&](std::size_t i) {
+    return has_objective(i) ? given_cell(review.objectives[i], scale(i)) : no_figure();
+  });
+  add_of_runs({"worst", false, 8, ours},
+              [&](const auto& of, auto i) { return figure_cell(of.worst, scale(i)); });
+  add_of_runs({"in run", false, 8, ours, false, true},
+              [&](const auto& of, auto) { return count_cell(of.worst_run.value, Tone::plain); });
+  add_of_runs({"mean", false, 8, ours},
+              [&](const auto& of, auto i) { return figure_cell(of.mean, scale(i)); });
+  add_of_runs({"std", false, 8, ours}, [&](const auto& of, auto i) {
+    return statistics.num_estimated < 2 ? no_figure()
+                                        : figure_cell(of.standard_deviation, scale(i));
+  });
+  add_of_runs({"beyond", false, 8, ours}, [&](const auto& of, auto i) {
+    const std::uint64_t beyond = of.num_beyond_objective;
+    return has_objective(i) ? count_cell(beyond, beyond > 0 ? Tone::bad : Tone::plain)
+                            : no_figure();
+  });
+  const auto add_published = [&](Column column, double PublishedAccuracy::*figure) {
+    add_column(table, std::move(column), [&](std::size_t i) {
+      const auto& published = schema.quantities[i].published;
+      return published ? given_cell((*published).*figure, scale(i)) : Cell("");
+    });
+  };
+  if (std::ranges::any_of(schema.quantities,
+                          [](const Quantity& of) { return of.published.has_value(); })) {
+    add_published({"worst", false, 6, theirs, true}, &PublishedAccuracy::worst);
+    add_published({"mean", false, 6, theirs}, &PublishedAccuracy::mean);
+    add_published({"std", false, 6, theirs}, &PublishedAccuracy::standard_deviation);
   }
   if (!schema.published_source.empty()) {
     table.notes.back() += fmt::format("; {}: {}", theirs, schema.published_source);
@@ -329,21 +280,31 @@ Table interval_table(const Review& review) {
   if (statistics.num_estimated == 0 || !statistics.are_draws_independent) return {};
   constexpr const char* mean = "mean of |error|";
   constexpr const char* deviation = "std of |error|";
+  const std::vector<AccuracyStatistic>& all = statistics.accuracy;
+  const bool has_deviation = statistics.num_estimated > 1;
+  const auto scale = [&](std::size_t i) { return review.schema.quantities[i].display_scale; };
   Table table{.id = "interval-table",
               .caption = "95 % intervals, in the units above",
-              .columns = {{"parameter", true, 11},
-                          {"mean", false, 8, mean},
-                          {"from", false, 8, mean},
-                          {"to", false, 9, mean},
-                          {"std", false, 8, deviation, true},
-                          {"from", false, 8, deviation},
-                          {"to", false, 9, deviation},
-                          {"bias", false, 9, "error", true},
-                          {"skew", false, 7, "error"}}};
-  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(interval_row(review.schema.quantities[i], statistics.accuracy[i],
-                                      statistics.num_estimated));
-  }
+              .rows = std::vector<Row>(all.size())};
+  add_column(table, {"parameter", true, 11},
+             [&](auto i) { return review.schema.quantities[i].symbol; });
+  add_column(table, {"mean", false, 8, mean},
+             [&](auto i) { return figure_cell(all[i].mean, scale(i)); });
+  add_ends(table, {"from", false, 8, mean}, {"to", false, 9, mean},
+           [&](auto i) { return IntervalAndScale(not_negative(all[i].mean_interval), scale(i)); });
+  add_column(table, {"std", false, 8, deviation, true}, [&](auto i) {
+    return has_deviation ? figure_cell(all[i].standard_deviation, scale(i)) : no_figure();
+  });
+  add_ends(table, {"from", false, 8, deviation}, {"to", false, 9, deviation}, [&](auto i) {
+    // Values that differ have a deviation: an end of 0 is that of resamples without the far ones.
+    const std::optional<Interval>& interval = all[i].deviation_interval;
+    const bool is_known = !interval || all[i].standard_deviation == 0.0 || interval->lower > 0.0;
+    return IntervalAndScale(is_known ? interval : std::nullopt, scale(i));
+  });
+  add_column(table, {"bias", false, 9, "error", true},
+             [&](auto i) { return figure_cell(all[i].error.bias, scale(i)); });
+  add_column(table, {"skew", false, 7, "error"},
+             [&](auto i) { return skewness_cell(all[i], statistics.num_estimated); });
   if (statistics.num_estimated < num_runs_of_bootstrap &&
       std::ranges::any_of(statistics.accuracy, [](const AccuracyStatistic& accuracy) {
         return accuracy.deviation_interval.has_value();
@@ -366,25 +327,37 @@ Table error_table(const Review& review) {
   if (statistics.num_estimated == 0) return {};
   constexpr const char* percentiles = "percentiles of |error|";
   constexpr const char* beyond = "beyond, %";
-  static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
   const bool has_intervals = review.why_not_independent.empty();
   Table table{.id = "error-table",
               .caption = has_intervals ? "95 % intervals of bias and of draws beyond the objective"
                                        : "Errors, in the units above",
-              .columns = {{"parameter", true, 10}}};
-  const auto add = [&](std::initializer_list<Column> columns) {
-    table.columns.insert(table.columns.end(), columns);
-  };
-  if (has_intervals) add({{"from", false, 9, "bias"}, {"to", false, 10, "bias"}});
-  if (!has_intervals) add({{"bias", false, 9}, {"skew", false, 8}});
-  add({{"50 %", false, 8, percentiles, true},
-       {"90 %", false, 8, percentiles},
-       {"95 %", false, 8, percentiles},
-       {"99 %", false, 9, percentiles}});
-  if (has_intervals) add({{"from", false, 7, beyond, true}, {"to", false, 8, beyond}});
-  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
-    table.rows.push_back(error_row(review.schema.quantities[i], review.objectives[i],
-                                   statistics.accuracy[i], review));
+              .rows = std::vector<Row>(statistics.accuracy.size())};
+  const std::vector<AccuracyStatistic>& all = statistics.accuracy;
+  const auto scale = [&](std::size_t i) { return review.schema.quantities[i].display_scale; };
+  add_column(table, {"parameter", true, 10},
+             [&](auto i) { return review.schema.quantities[i].symbol; });
+  if (has_intervals) {
+    add_ends(table, {"from", false, 9, "bias"}, {"to", false, 10, "bias"},
+             [&](auto i) { return IntervalAndScale(all[i].error.bias_interval, scale(i)); });
+  } else {
+    add_column(table, {"bias", false, 9},
+               [&](auto i) { return figure_cell(all[i].error.bias, scale(i)); });
+    add_column(table, {"skew", false, 8},
+               [&](auto i) { return skewness_cell(all[i], statistics.num_estimated); });
+  }
+  for (std::size_t k = 0; k < percentile_levels.size(); ++k) {
+    const bool is_last = k + 1 == percentile_levels.size();
+    add_column(table,
+               {fmt::format("{:.0f} %", 100.0 * percentile_levels[k]), false, is_last ? 9U : 8U,
+                percentiles, k == 0},
+               [&](auto i) { return figure_cell(all[i].percentiles[k].value, scale(i)); });
+  }
+  if (has_intervals) {
+    add_ends(table, {"from", false, 7, beyond, true}, {"to", false, 8, beyond}, [&](auto i) {
+      const bool has_objective = std::isfinite(review.objectives[i]);
+      return IntervalAndScale(has_objective ? std::optional(all[i].beyond_objective) : std::nullopt,
+                              percent_scale);
+    });
   }
   table.notes.push_back(has_intervals ? bias_sentence(review)
                                       : "no intervals over runs: " + review.why_not_independent);
@@ -398,10 +371,6 @@ Table error_table(const Review& review) {
   }
   if (has_objective || !has_intervals) table.notes.push_back(joint_sentence(review));
   return table;
-}
-
-std::vector<Table> accuracy_tables(const Review& review) {
-  return {accuracy_table(review), interval_table(review), error_table(review)};
 }
 
 std::vector<Table> group_tables(const Review& review) {

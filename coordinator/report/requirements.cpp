@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/result_rules.hpp"
 #include "proto/text/visible_text.hpp"

@@ -11,7 +11,7 @@
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/stated_requirement.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/runs.hpp"

@@ -1,14 +1,12 @@
-#include "coordinator/report/review_charts.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
-#include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/report_tables.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
@@ -24,20 +22,7 @@ double probability_to_meet(const RequirementCheck& check, double exceedance_prob
 }
 
 bool is_same(const Tolerance& a, const Tolerance& b) {
-  return !(a.coverage < b.coverage || a.coverage > b.coverage || a.confidence < b.confidence ||
-           a.confidence > b.confidence);
-}
-
-/// The axis ends where nearly every campaign fails, and at what was seen at the farthest.
-double largest_shown(const Review& review, const Tolerance& tolerance) {
-  double end = std::min(4.0 * (1.0 - tolerance.coverage), 1.0);
-  for (const RequirementAnswer& row : review.matrix) {
-    const RequirementCheck& check = row.check;
-    if (!is_same(row.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
-    end = std::max(end, 1.1 * static_cast<double>(check.num_exceedances) /
-                            static_cast<double>(check.num_runs));
-  }
-  return std::min(end, 1.0);
+  return std::pair(a.coverage, a.confidence) == std::pair(b.coverage, b.confidence);
 }
 
 Curve observed_fractions(const Review& review, const Tolerance& tolerance) {
@@ -52,11 +37,19 @@ Curve observed_fractions(const Review& review, const Tolerance& tolerance) {
   return markers;
 }
 
+/// The axis ends where nearly every campaign fails, and at what was seen at the farthest.
+double largest_shown(const Curve& seen, const Tolerance& tolerance) {
+  double end = 4.0 * (1.0 - tolerance.coverage);
+  for (const Point& percents : seen.points) end = std::max(end, 1.1 * percents.x / 100.0);
+  return std::min(end, 1.0);
+}
+
 Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                            std::size_t number) {
   const Tolerance& tolerance = first.requirement.tolerance;
   const RequirementCheck& check = first.check;
-  const double end = largest_shown(review, tolerance);
+  Curve seen = observed_fractions(review, tolerance);
+  const double end = largest_shown(seen, tolerance);
   constexpr int num_points = 120;
   Curve line{.name = counted(check.num_runs, "draw")};
   for (int i = 0; i <= num_points; ++i) {
@@ -85,7 +78,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
       .layers = {std::move(line),
                  LimitLine{.label = fmt::format("allowed {}", given_percent(allowed)),
                            .value = 100.0 * allowed},
-                 observed_fractions(review, tolerance)}};
+                 std::move(seen)}};
 }
 
 std::string cell_label(double correlation) {
@@ -166,34 +159,59 @@ std::optional<HeatMap> cause_map(const Review& review) {
   return map;
 }
 
-std::vector<NamedPicture> review_pictures(const Review& review) {
-  std::vector<NamedPicture> pictures{{"errors", magnitude_overview(review)},
-                                     {"convergence", convergence_overview(review)}};
-  const std::vector<Quantity>& quantities = review.schema.quantities;
-  for (std::size_t i = 0; i < quantities.size(); ++i) {
-    const std::string& name = quantities[i].name;
-    pictures.push_back({fmt::format("histogram:{}", name), magnitude_chart(review, i)});
-    pictures.push_back({fmt::format("error:{}", name), error_chart(review, i)});
-    pictures.push_back({fmt::format("convergence:{}", name), convergence_chart(review, i)});
-  }
-  if (auto grid = pull_overview(review.schema, review.results.standard_errors)) {
-    pictures.push_back({"pulls", *std::move(grid)});
-  }
-  for (Chart& chart : characteristic_charts(review)) {
-    pictures.push_back({"characteristic", std::move(chart)});
-    break;  // Without requirements there is one: that of the default tolerance.
-  }
-  if (auto chart = budget_chart(review)) pictures.push_back({"budget", *std::move(chart)});
-  if (auto map = cause_map(review)) pictures.push_back({"causes", *std::move(map)});
-  if (!review.spectra) return pictures;
-  std::vector<Chart> spectra = spectrum_charts(review);
-  for (std::size_t i = 0; i < spectra.size(); ++i) {
-    pictures.push_back({spectrum_name(review.spectra->sessions[i].session), std::move(spectra[i])});
-  }
-  return pictures;
+std::string review_style() {
+  // The inks of the charts are for lines; text needs 4.5:1.
+  constexpr std::string_view light =
+      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;--faint:#566070;"
+      "--warn-ground:#fff3d6;";
+  constexpr std::string_view dark =
+      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;--faint:#a3adbb;"
+      "--warn-ground:#3a2e10;";
+  return fmt::format(
+             ":root{{color-scheme:light dark;{}{}}}\n"
+             "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
+             "@media print{{:root{{{}{}}}}}\n",
+             light_colours(), light, dark_colours(), dark, light_colours(), light) +
+         R"(*{box-sizing:border-box}
+body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
+body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
+a{color:inherit}
+:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
+.skip{position:absolute;left:-99rem}
+.skip:focus{position:static}
+h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
+h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
+p,li{text-wrap:pretty;overflow-wrap:anywhere}
+.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
+.scroll{background:linear-gradient(to left,var(--chart-ground) 1rem,transparent) right/2rem 100%,
+linear-gradient(to left,rgb(128 128 128/.4),transparent) right/1rem 100%}
+.scroll{background-repeat:no-repeat;background-attachment:local,scroll}
+table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
+caption{text-align:left;font-weight:600;padding:.3rem 0}
+caption{position:sticky;left:0;max-width:calc(100vw - 2rem)}
+th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
+th,td{border-bottom:1px solid var(--chart-grid)}
+thead th{vertical-align:bottom}
+thead th,thead td{background:var(--heading)}
+th[scope=colgroup]{text-align:center}
+th.words,td.words{text-align:left}
+td{white-space:nowrap}
+td.words{white-space:normal;overflow-wrap:anywhere;min-width:6rem}
+tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
+tbody th{max-width:40vw;overflow-wrap:break-word}
+.met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
+td strong{white-space:nowrap}
+.note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
+code{font-family:ui-monospace,monospace;font-size:.9em}
+figure{margin:.5rem 0;max-width:100%}
+figure svg{display:block;height:auto;max-width:100%}
+.scroll figure,.scroll svg{max-width:none}
+.flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
+.flow>div{max-width:100%}
+.flow>h3,.flow>p,.flow>ul{flex-basis:100%}
+.flow>div>.note{width:0;min-width:100%}
+)";
 }
-
-bool needs_causes(std::string_view name) { return name == "causes"; }
 
 namespace {
 

@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <span>
 #include <string_view>
+#include <utility>
+#include <variant>
 
-#include "coordinator/charts/svg.hpp"
-#include "coordinator/charts/ticks.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_charts.hpp"
-#include "coordinator/table/document_table.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -46,146 +45,159 @@ footer{break-before:avoid}
 figure,tr{break-inside:avoid}
 .flow{display:block;orphans:1;widows:1}
 .flow>*{display:inline-block;vertical-align:top;margin-right:.2rem}
+.flow>h3,.flow>p,.flow>ul{display:block}
 table{break-inside:avoid}
 figure{zoom:.62}
 }
 )";
 
-using Tables = std::span<const Table>;
+/// Text of HTML, which Markdown leaves out.
+struct Markup {
+  std::string html;
+};
+
+/// What is shown beside each other, as far as there is room. Tables without rows and notes are
+/// left out.
+using Part = std::variant<Table, NamedPicture, Markup>;
 
 struct Section {
   std::string id;
   std::string title;
-  std::vector<Table> tables;  ///< What Markdown shows, except of those without rows.
-  /// What HTML shows; nothing if the section is to be left out.
-  std::string (*markup)(const Review& review, Tables tables);
+  std::vector<Part> parts;  ///< None of which is shown: it is left out.
 };
 
-std::string figure_of(const Picture& picture) {
-  return "<figure>\n" + svg_of(picture, SvgUse::embedded) + "</figure>\n";
+bool is_shown(const Table& table) { return !table.rows.empty() || !table.notes.empty(); }
+
+std::vector<Part> parts_of(std::vector<Table> tables) {
+  return {std::move_iterator(tables.begin()), std::move_iterator(tables.end())};
 }
 
-/// A chart that is wider than a phone scrolls.
-std::string wide_figure_of(const HeatMap& map) {
-  return fmt::format(
-      "<div class=\"scroll\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{}</div>\n",
-      markup_text(map.text.title), figure_of(map));
+std::vector<Part> accuracy_parts(const Review& review) {
+  std::vector<Part> parts{accuracy_table(review)};
+  // Without requirements there is one chart: that of the default tolerance.
+  std::string name = "characteristic";
+  for (Chart& chart : characteristic_charts(review)) {
+    parts.emplace_back(NamedPicture{std::exchange(name, ""), std::move(chart)});
+  }
+  if (parts.size() > 1) {
+    parts.emplace_back(Markup{fmt::format(
+        "<p class=\"note\">How probable it is that a campaign of as many draws meets a "
+        "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
+        "good instruments from bad ones; more draws make it steeper.</p>\n",
+        name_of(review.interpretation))});
+  }
+  parts.emplace_back(interval_table(review));
+  parts.emplace_back(error_table(review));
+  return parts;
 }
 
-/// A table as a part of a flow; nothing without rows.
-std::string table_part(const Table& table) {
-  return table.rows.empty() ? "" : "<div>\n" + html_table(table) + "</div>\n";
+std::vector<Part> standard_error_parts(const Review& review) {
+  const StandardErrorStatistics& statistics = review.results.standard_errors;
+  std::vector<Part> parts = parts_of(standard_error_tables(review.schema, statistics));
+  if (auto pulls = pull_overview(review.schema, statistics)) {
+    parts.emplace_back(NamedPicture{"pulls", *std::move(pulls)});
+  }
+  return parts;
 }
 
-std::string table_parts(Tables tables) {
-  std::string html;
-  for (const Table& table : tables) html += table_part(table);
-  return html;
-}
-
-/// Figures and tables beside each other, as many as there is room for.
-std::string flow(std::string_view markup) {
-  return fmt::format("<div class=\"flow\">\n{}</div>\n", markup);
-}
-
-std::string matrix_markup(const Review&, Tables tables) { return html_table(tables.front()); }
-
-std::string error_figures_markup(const Review& review, Tables) {
-  std::string html;
+std::vector<Part> error_parts(const Review& review) {
+  std::vector<Part> parts;
   const std::vector<Quantity>& quantities = review.schema.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
-    html += fmt::format("<h3>{}</h3>\n", markup_text(quantities[i].symbol)) +
-            flow(figure_of(magnitude_chart(review, i)) + figure_of(error_chart(review, i)) +
-                 figure_of(convergence_chart(review, i)));
+    const std::string& name = quantities[i].name;
+    parts.emplace_back(Markup{fmt::format("<h3>{}</h3>\n", markup_text(quantities[i].symbol))});
+    parts.emplace_back(NamedPicture{"histogram:" + name, magnitude_chart(review, i)});
+    parts.emplace_back(NamedPicture{"error:" + name, error_chart(review, i)});
+    parts.emplace_back(NamedPicture{"convergence:" + name, convergence_chart(review, i)});
   }
-  return html;
+  return parts;
 }
 
-std::string characteristics_markup(const Review& review) {
-  std::string html;
-  for (const Chart& chart : characteristic_charts(review)) html += figure_of(chart);
-  if (html.empty()) return "";
-  return fmt::format(
-      "<div>\n{}<p class=\"note\">How probable it is that a campaign of as many draws meets a "
-      "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
-      "good instruments from bad ones; more draws make it steeper.</p>\n</div>\n",
-      html, name_of(review.interpretation));
+std::vector<Part> budget_parts(const Review& review) {
+  std::vector<Part> parts{review_budget_table(review)};
+  if (auto chart = budget_chart(review)) {
+    parts.emplace_back(NamedPicture{"budget", *std::move(chart)});
+  }
+  return parts;
 }
 
-std::string accuracy_markup(const Review& review, Tables tables) {
-  return flow(table_part(tables.front()) + characteristics_markup(review) +
-              table_parts(tables.subspan(1)));
-}
-
-std::string standard_errors_markup(const Review& review, Tables tables) {
-  const auto pulls = pull_overview(review.schema, review.results.standard_errors);
-  return pulls ? flow(table_parts(tables) + figure_of(*pulls)) : "";
-}
-
-std::string groups_markup(const Review&, Tables tables) { return table_parts(tables); }
-
-std::string budget_markup(const Review& review, Tables tables) {
-  const std::optional<BarChart> chart = budget_chart(review);
-  return chart ? flow(table_parts(tables) + figure_of(*chart)) : "";
-}
-
-std::string causes_markup(const Review& review, Tables tables) {
-  std::string html;
-  if (const std::optional<HeatMap> map = cause_map(review)) {
-    html =
+std::vector<Part> cause_parts(const Review& review) {
+  std::vector<Part> parts;
+  if (auto map = cause_map(review)) {
+    parts.emplace_back(Markup{
         "<p>Rows are drawn quantities, true parameters and products of two of them; columns are "
-        "the errors with their signs. Cells below four standard errors are empty.</p>\n" +
-        wide_figure_of(*map);
+        "the errors with their signs. Cells below four standard errors are empty.</p>\n"});
+    parts.emplace_back(NamedPicture{"causes", *std::move(map)});
   }
-  return html + table_parts(tables);
+  parts.emplace_back(cause_table(review));
+  return parts;
 }
 
-std::string spectra_markup(const Review& review, Tables) {
-  if (!review.spectra) return "";
+std::vector<Part> spectrum_parts(const Review& review) {
+  std::vector<Part> parts;
+  if (!review.spectra) return parts;
   const RunSpectra& spectra = *review.spectra;
-  std::string html;
   for (const std::string& reason : spectra.reasons) {
-    html += fmt::format("<p>{}</p>\n", markup_text(reason));
+    parts.emplace_back(Markup{fmt::format("<p>{}</p>\n", markup_text(reason))});
   }
-  if (spectra.sessions.empty()) return html;
-  html += fmt::format(
+  if (spectra.sessions.empty()) return parts;
+  parts.emplace_back(Markup{fmt::format(
       "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
       "bit for bit. Without the fitted lines, noise is left, if there is any, and lines that the "
       "session does not fit. {}</p>\n",
-      spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
-  std::string figures;
-  for (const Chart& chart : spectrum_charts(review)) figures += figure_of(chart);
-  return html + flow(figures + table_part(spectrum_table(review)));
+      spectra.run.value, markup_text(spectra.sessions.front().noise_meaning))});
+  std::vector<Chart> charts = spectrum_charts(review);
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    parts.emplace_back(
+        NamedPicture{spectrum_name(spectra.sessions[i].session), std::move(charts[i])});
+  }
+  parts.emplace_back(spectrum_table(review));
+  return parts;
 }
 
-std::string execution_markup(const Review& review, Tables tables) {
-  std::string html = flow(table_parts(tables)) + "<h3>How to reproduce it</h3>\n<ul>\n";
+std::vector<Part> run_parts(const Review& review) {
+  std::vector<Part> parts{identity_table(review)};
+  // The runs of an import were computed elsewhere.
+  if (!review.is_imported) {
+    parts.emplace_back(execution_table(review));
+    parts.emplace_back(host_table(review));
+  }
+  std::string html = "<h3>How to reproduce it</h3>\n<ul>\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
   }
-  return html + "</ul>\n";
-}
-
-std::vector<Table> run_tables(const Review& review) {
-  if (review.is_imported) return {identity_table(review)};  // Its runs were computed elsewhere.
-  return {identity_table(review), execution_table(review), host_table(review)};
+  parts.emplace_back(Markup{html + "</ul>\n"});
+  return parts;
 }
 
 std::vector<Section> sections_of(const Review& review) {
   // What intervals take for their unit instead of the run.
   const char* const groups = review.results.replicates ? "Replicates of the design" : "Instruments";
-  return {{"verification", "Verification matrix", {matrix_table(review)}, matrix_markup},
-          {"results", "Accuracy", accuracy_tables(review), accuracy_markup},
-          {"standard-errors-section", "Standard errors",
-           standard_error_tables(review.schema, review.results.standard_errors),
-           standard_errors_markup},
-          {"instruments-section", groups, group_tables(review), groups_markup},
-          {"distributions", "Errors by parameter", {}, error_figures_markup},
-          {"budget-section", "Budget", {review_budget_table(review)}, budget_markup},
-          {"causes-section", "Causes of the errors", {cause_table(review)}, causes_markup},
-          {"spectra-section", "Spectra of the worst run", {}, spectra_markup},
-          {"how", "How it was run", run_tables(review), execution_markup}};
+  return {{"verification", "Verification matrix", {matrix_table(review)}},
+          {"results", "Accuracy", accuracy_parts(review)},
+          {"standard-errors-section", "Standard errors", standard_error_parts(review)},
+          {"instruments-section", groups, parts_of(group_tables(review))},
+          {"distributions", "Errors by parameter", error_parts(review)},
+          {"budget-section", "Budget", budget_parts(review)},
+          {"causes-section", "Causes of the errors", cause_parts(review)},
+          {"spectra-section", "Spectra of the worst run", spectrum_parts(review)},
+          {"how", "How it was run", run_parts(review)}};
 }
+
+/// A chart that is wider than a phone scrolls.
+std::string html_of(const NamedPicture& named) {
+  const std::string figure = "<figure>\n" + svg_of(named.picture, SvgUse::embedded) + "</figure>\n";
+  if (!std::holds_alternative<HeatMap>(named.picture)) return figure;
+  return fmt::format(
+      "<div class=\"scroll\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{}</div>\n",
+      markup_text(text_of(named.picture).title), figure);
+}
+
+std::string html_of(const Table& table) {
+  return is_shown(table) ? "<div>\n" + html_table(table) + "</div>\n" : "";
+}
+
+std::string html_of(const Markup& markup) { return markup.html; }
 
 std::string summary_markup(const Review& review, std::span<const Section> sections) {
   std::string html =
@@ -205,12 +217,15 @@ std::string review_html(const Review& review) {
   std::string content;
   const std::vector<Section> sections = sections_of(review);
   for (const Section& section : sections) {
-    const std::string markup = section.markup(review, section.tables);
+    std::string markup;
+    for (const Part& part : section.parts) {
+      markup += std::visit([](const auto& shown) { return html_of(shown); }, part);
+    }
     if (markup.empty()) continue;
     navigation += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.id, section.title);
     content += fmt::format(
         "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n<h2 "
-        "id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
+        "id=\"{0}-title\">{1}</h2>\n<div class=\"flow\">\n{2}</div>\n</section>\n",
         section.id, section.title, markup);
   }
   return fmt::format(
@@ -226,57 +241,16 @@ std::string review_html(const Review& review) {
       summary_markup(review, sections), navigation, content, markup_text(review.database));
 }
 
-std::string review_style() {
-  // The inks of the charts are for lines; text needs 4.5:1.
-  constexpr std::string_view light =
-      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;--faint:#566070;"
-      "--warn-ground:#fff3d6;";
-  constexpr std::string_view dark =
-      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;--faint:#a3adbb;"
-      "--warn-ground:#3a2e10;";
-  return fmt::format(
-             ":root{{color-scheme:light dark;{}{}}}\n"
-             "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
-             "@media print{{:root{{{}{}}}}}\n",
-             light_colours(), light, dark_colours(), dark, light_colours(), light) +
-         R"(*{box-sizing:border-box}
-body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
-body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
-a{color:inherit}
-:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
-.skip{position:absolute;left:-99rem}
-.skip:focus{position:static}
-h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
-h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
-p,li{text-wrap:pretty;overflow-wrap:anywhere}
-.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
-.scroll{background:linear-gradient(to left,var(--chart-ground) 1rem,transparent) right/2rem 100%,
-linear-gradient(to left,rgb(128 128 128/.4),transparent) right/1rem 100%}
-.scroll{background-repeat:no-repeat;background-attachment:local,scroll}
-table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
-caption{text-align:left;font-weight:600;padding:.3rem 0}
-caption{position:sticky;left:0;max-width:calc(100vw - 2rem)}
-th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
-th,td{border-bottom:1px solid var(--chart-grid)}
-thead th{vertical-align:bottom}
-thead th,thead td{background:var(--heading)}
-th[scope=colgroup]{text-align:center}
-th.words,td.words{text-align:left}
-td{white-space:nowrap}
-td.words{white-space:normal;overflow-wrap:anywhere;min-width:6rem}
-tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
-tbody th{max-width:40vw;overflow-wrap:break-word}
-.met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
-td strong{white-space:nowrap}
-.note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
-code{font-family:ui-monospace,monospace;font-size:.9em}
-figure{margin:.5rem 0;max-width:100%}
-figure svg{display:block;height:auto;max-width:100%}
-.scroll figure,.scroll svg{max-width:none}
-.flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
-.flow>div{max-width:100%}
-.flow>div>.note{width:0;min-width:100%}
-)";
+std::vector<NamedPicture> review_pictures(const Review& review) {
+  std::vector<NamedPicture> pictures{{"errors", magnitude_overview(review)},
+                                     {"convergence", convergence_overview(review)}};
+  for (Section& section : sections_of(review)) {
+    for (Part& part : section.parts) {
+      auto* const picture = std::get_if<NamedPicture>(&part);
+      if (picture != nullptr && !picture->name.empty()) pictures.push_back(std::move(*picture));
+    }
+  }
+  return pictures;
 }
 
 namespace {
@@ -301,8 +275,9 @@ std::string review_markdown(const Review& review) {
   text += "\n";
   for (const Section& section : sections_of(review)) {
     std::string tables;
-    for (const Table& table : section.tables) {
-      if (!table.rows.empty()) tables += markdown_table(table);
+    for (const Part& part : section.parts) {
+      const auto* const table = std::get_if<Table>(&part);
+      if (table != nullptr && is_shown(*table)) tables += markdown_table(*table);
     }
     if (!tables.empty()) text += fmt::format("## {}\n\n{}", section.title, tables);
   }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <regex>
 
-#include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
@@ -20,16 +20,9 @@ Table facts(std::string id, std::string caption, std::vector<Row> rows) {
           .rows = std::move(rows)};
 }
 
-std::string digest_words(const Review& review) {
-  return review.results.digests.results +
-         (review.results.digest_check == DigestCheck::holds
-              ? " (equal to the stored one)"
-              : " (not checked: there is no stored one of these runs)");
-}
-
-/// A text of lines, the first of which begins with the name of all.
+/// A text of lines, the first of which begins with the name of all or with blanks.
 std::string in_one_line(std::string_view lines) {
-  static const std::regex end_of_line("\\n\\s*"), name("^\\S+\\s+"), gap(" {2,}");
+  static const std::regex end_of_line("(:)\\n\\s*|\\n\\s*"), name("^\\S*\\s+"), gap(" {2,}");
   std::string text(lines.substr(0, lines.find_last_not_of('\n') + 1));
   text = std::regex_replace(text, end_of_line, "; ");
   return std::regex_replace(std::regex_replace(text, name, ""), gap, " ");
@@ -72,7 +65,7 @@ Table review_budget_table(const Review& review) {
 }
 
 Table cause_table(const Review& review) {
-  if (!review.causes) return {};
+  if (!review.causes || review.causes->terms.empty()) return {};
   Table table{
       .id = "cause-table",
       .caption = "The errors as sums of draws and of products of two",
@@ -93,31 +86,24 @@ Table cause_table(const Review& review) {
 }
 
 Table identity_table(const Review& review) {
-  const CampaignStatistics& statistics = review.results.statistics;
-  const MissingEstimates& missing = review.results.missing;
-  Table table =
-      facts("identity", "The campaign",
-            {{"campaign", review.name},
-             {"seed", std::to_string(review.seed)},
-             {"runs", fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
-                                  review.num_runs, statistics.num_estimated)},
-             {"not converged", std::to_string(statistics.num_not_converged)},
-             {"with a warning", std::to_string(review.results.warnings.num_runs)},
-             {"without an estimate", missing.total() == 0 ? "none" : reasons_text(missing)},
-             {"model", review.model_version},
-             {"build", review.build},
-             {"created", review.created_utc},
-             {"SHA-256 of the results", digest_words(review)},
-             {"SHA-256 of the definition", review.definition_digest}});
-  if (review.is_imported) table.rows.erase(table.rows.begin() + 1);  // Its seed is not known.
-  if (review.stop && !review.stop->text.empty()) {
-    table.rows.push_back({"stop rule", in_one_line(review.stop->text)});
+  Table table = facts("identity", "The campaign", {});
+  for (Row& row : summary_rows(review)) {
+    if (row[0].text.empty()) {
+      table.rows.back()[1].text += "; " + row[1].text;
+    } else {
+      table.rows.push_back(std::move(row));
+    }
   }
-  for (const LostRuns& lost : review.results.losses) {
-    table.rows.push_back(
-        {"lost: " + loss_text(review.schema, lost.loss), counted(lost.num_runs, "run")});
-  }
-  if (!review.note.empty()) table.rows.push_back({"note", review.note});
+  const auto add = [&](std::string_view name, const std::string& text) {
+    if (!text.empty()) table.rows.push_back({name, text});
+  };
+  add("Warnings", in_one_line(warnings_text(review.schema, review.results.warnings)));
+  add("Model", review.model_version);
+  add("Build", review.build);
+  add("Created", review.created_utc);
+  add("Definition", review.definition_digest);
+  add("Stopping", in_one_line(review.stop ? review.stop->text : ""));
+  add("Note", review.note);
   return table;
 }
 
@@ -151,6 +137,7 @@ std::string rate_text(const HostShare& host) {
 }
 
 Table host_table(const Review& review) {
+  if (review.execution.hosts.empty()) return {};
   Table table{
       .id = "machines",
       .caption = "Machines",

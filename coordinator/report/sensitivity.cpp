@@ -9,8 +9,8 @@
 
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report_tables.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/statistics/correlation.hpp"
@@ -21,6 +21,8 @@
 namespace proofmass::coordinator {
 namespace {
 
+constexpr std::size_t num_terms_max = 3;  // Of the sum that explains an error.
+constexpr std::size_t num_rows_by_default = 5;
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
 
 std::vector<std::string> column_names(const Campaign& campaign, const ResultSchema& schema) {
@@ -118,7 +120,6 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
   return table;
 }
 
-/// `one of 10 errors`; of a single one, `the error`.
 std::string one_of(std::size_t count, std::string_view thing) {
   return count == 1 ? fmt::format("the {}", thing) : fmt::format("one of {} {}s", count, thing);
 }
@@ -161,6 +162,23 @@ std::string not_found_text(const DrawnRuns& drawn) {
       text, drawn.runs.size(), measured_figure(percent));
 }
 
+/// The values that a term has in the runs.
+std::vector<double> values_of_term(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  std::vector<double> values = drawn.columns[term.first];
+  if (!term.second) return values;
+  const std::vector<double>& other = drawn.columns[*term.second];
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] *= other[i];
+  return values;
+}
+
+/// The name of a column, of its square or of the product of two: `truth_gain × truth_offset_m`.
+std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  const std::string& first = drawn.names[term.first];
+  if (!term.second) return first;
+  return term.second == term.first ? fmt::format("({})²", first)
+                                   : fmt::format("{} × {}", first, drawn.names[*term.second]);
+}
+
 /// The sum of quantities and products of two that explains the error.
 /// @param position  Of a run: what each adds to its error, less the mean of all.
 Table term_table(const DrawnRuns& drawn, std::size_t quantity,
@@ -192,16 +210,16 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
   return table;
 }
 
-std::string left_out(const DrawnRuns& drawn) {
+/// Which runs were used, and which were not.
+std::string basis_text(const DrawnRuns& drawn) {
+  std::string text;
+  if (drawn.runs.size() < drawn.num_with_estimate) {
+    text = fmt::format("Computed from {} of {} runs with an estimate: the first {}{}\n",
+                       drawn.runs.size(), drawn.num_with_estimate, drawn.num_first,
+                       drawn.runs.size() > drawn.num_first ? " and this one" : "");
+  }
   const std::string reasons = reasons_text(drawn.missing);
-  return reasons.empty() ? "" : fmt::format("Left out, without an estimate: {}\n", reasons);
-}
-
-std::string limit_line(const DrawnRuns& drawn) {
-  if (drawn.runs.size() == drawn.num_with_estimate) return "";
-  return fmt::format("Computed from {} of {} runs with an estimate: the first {}{}\n",
-                     drawn.runs.size(), drawn.num_with_estimate, drawn.num_first,
-                     drawn.runs.size() > drawn.num_first ? " and this one" : "");
+  return reasons.empty() ? text : text + "Left out, without an estimate: " + reasons + "\n";
 }
 
 RunIndex worst_run_of(const DrawnRuns& drawn, std::size_t quantity) {
@@ -211,20 +229,11 @@ RunIndex worst_run_of(const DrawnRuns& drawn, std::size_t quantity) {
   return drawn.runs[static_cast<std::size_t>(worst - errors.begin())];
 }
 
-/// Which run is the worst, and how to ask why if there is an answer.
-std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity, bool has_rows) {
-  const std::uint64_t run = worst_run_of(drawn, quantity).value;
-  if (!has_rows) return fmt::format("Largest |error|: run {}\n", run);
-  return fitted(fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n", run,
-                            drawn.quantities[quantity].name));
-}
-
 /// The rows to name: as many as were asked for, else the first five, but none where no quantity has
 /// an influence that chance does not explain.
 std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows,
                                       std::optional<std::size_t> num_rows) {
-  const bool is_found = std::ranges::any_of(
-      rows, [](const Sensitivity& row) { return row.adjusted_p_value < 1.0 - default_confidence; });
+  const bool is_found = !rows.empty() && rows.front().adjusted_p_value < 1.0 - default_confidence;
   const std::size_t count = num_rows.value_or(is_found ? num_rows_by_default : 0);
   return std::span(rows).first(std::min(count, rows.size()));
 }
@@ -282,21 +291,6 @@ std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quanti
                            default_confidence, drawn.errors.size());
 }
 
-std::vector<double> values_of_term(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  std::vector<double> values = drawn.columns[term.first];
-  if (!term.second) return values;
-  const std::vector<double>& other = drawn.columns[*term.second];
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] *= other[i];
-  return values;
-}
-
-std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  const std::string& first = drawn.names[term.first];
-  if (!term.second) return first;
-  return term.second == term.first ? fmt::format("({})²", first)
-                                   : fmt::format("{} × {}", first, drawn.names[*term.second]);
-}
-
 DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uint64_t num_runs_max,
                           std::optional<RunIndex> also) {
   const ResultSchema& schema = store.schema();
@@ -351,16 +345,20 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
     const std::string dependence = dependence_note(drawn, of_error, of_magnitude);
     if (!dependence.empty()) drivers.notes.push_back(dependence);
   }
+  const std::uint64_t worst = worst_run_of(drawn, quantity).value;
+  const std::string why =
+      has_rows ? fmt::format("; why: --run {} --parameter {}", worst, info.name) : "";
   const std::string heading = position
                                   ? fmt::format("Run {}: error of {} {}, rank {} of {}", run->value,
                                                 info.symbol, quantity_text(errors[*position], info),
                                                 rank_of(errors, *position), errors.size())
                                   : fmt::format("{}: {} runs", info.symbol, errors.size());
-  return fmt::format("{}\n{}{}\n{}\n{}\n{}{}", heading, limit_line(drawn), left_out(drawn),
-                     terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
-                     terminal_text(drivers, style),
-                     terminal_text(term_table(drawn, quantity, terms, position), style),
-                     position ? "" : "\n" + worst_run_text(drawn, quantity, has_rows));
+  return fmt::format(
+      "{}\n{}\n{}\n{}\n{}{}", heading, basis_text(drawn),
+      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
+      terminal_text(drivers, style),
+      terminal_text(term_table(drawn, quantity, terms, position), style),
+      position ? "" : fitted(fmt::format("\nLargest |error|: run {}{}\n", worst, why)));
 }
 
 std::string unexplained_text(const DrawnRuns& drawn, std::span<const std::size_t> quantities) {
@@ -375,7 +373,7 @@ std::string unexplained_text(const DrawnRuns& drawn, std::span<const std::size_t
                             "{}",
                             fmt::join(names, ", ")),
                 not_found_text(drawn)}};
-  return limit_line(drawn) + left_out(drawn) + terminal_text(table);
+  return basis_text(drawn) + terminal_text(table);
 }
 
 std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,
@@ -433,6 +431,9 @@ Json sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quant
 namespace {
 
 constexpr std::size_t num_correlated_of_each = 3;
+
+// Shares and slopes are known to a percent from these, and the search takes seconds.
+constexpr std::uint64_t cause_runs_max = 20'000;
 
 using Correlations = std::vector<std::optional<double>>;  // With the error of each quantity.
 

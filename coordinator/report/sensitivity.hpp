@@ -10,7 +10,7 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/runs.hpp"
@@ -46,25 +46,12 @@ struct DrawnRuns {
 /// The texts say so where a campaign has more.
 inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 
-/// Parts of a sum that explain an error that are searched for at most.
-inline constexpr std::size_t num_terms_max = 3;
-
 /// The terms that explain a quantity's error.
 [[nodiscard]] std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quantity);
 
-/// The values that a term has in the runs.
-[[nodiscard]] std::vector<double> values_of_term(const DrawnRuns& drawn,
-                                                 const ExplanatoryTerm& term);
-
-/// The name of a column, of its square or of the product of two: `truth_gain × truth_offset_m`.
-[[nodiscard]] std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term);
-
-/// Quantities that are named for an error unless another number is asked for. None is where chance
-/// alone explains the influence of each.
-inline constexpr std::size_t num_rows_by_default = 5;
-
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`
-/// of sensitivities() of each, see num_rows_by_default, and the error as a sum of
+/// of sensitivities() of each, by default five or none where chance alone explains the influence
+/// of each, and the error as a sum of
 /// explanatory_terms(), and how to ask why the worst run is so. Of a run, why it is as far off as
 /// it is: the place of its |error| among the runs, its values of these quantities, each with its
 /// percentile, and what the terms add to its error. Lines have at most 80 characters. Empty without
@@ -117,10 +104,6 @@ struct Causes {
   /// of both does not vary, and below 4/√n, which chance alone exceeds in one case of 15,000.
   std::vector<std::vector<std::optional<double>>> correlations = {};
 };
-
-/// Runs that causes are computed from at most. Shares and slopes are known to a percent from these,
-/// and the search takes seconds.
-inline constexpr std::uint64_t cause_runs_max = 20'000;
 
 /// @return Nothing below 16 runs with an estimate.
 /// @throws StoreError as read_drawn_runs() does.

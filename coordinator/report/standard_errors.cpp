@@ -7,9 +7,9 @@
 #include <string>
 #include <utility>
 
-#include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/report_tables.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/charts/chart.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {
@@ -42,21 +42,15 @@ Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statist
 
 }  // namespace
 
-void leave_out_intervals(StandardErrorStatistics& statistics) {
-  for (StandardErrorStatistic& statistic : statistics.quantities) {
-    statistic.squared_ratio_error.reset();
-    statistic.within.reset();
-  }
-  for (FitStatistic& of : statistics.fit) {
-    of.ratio_error.reset();
-    of.p_value.reset();
-  }
-}
-
-RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema) : fit_(schema) {
+RunningStandardErrors::RunningStandardErrors(const ResultSchema& schema, bool are_draws_independent)
+    : are_draws_independent_(are_draws_independent), fit_tolerance_(schema.fit_tolerance) {
   for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
     if (schema.quantities[i].has_standard_error) indices_.push_back(i);
   }
+  if (schema.fit.empty()) return;
+  sessions_ = schema.fit_parts;
+  sessions_.insert(sessions_.begin(), "all");
+  fit_.resize(sessions_.size());
 }
 
 void RunningStandardErrors::add(const RunResult& result) {
@@ -74,7 +68,19 @@ void RunningStandardErrors::add(const RunResult& result) {
     if (std::abs(error) < normal_95 * sigma) ++sums.num_within;
     if (sigma > 0.0 && is_in_range(error / sigma)) sums.pulls.add(error / sigma);
   }
-  fit_.add(result);
+  add_fit(result);
+}
+
+void RunningStandardErrors::add_fit(const RunResult& result) {
+  for (std::size_t i = 0; i < fit_.size(); ++i) {
+    const double x = result.fit[2 * i], n = result.fit[2 * i + 1];
+    FitSums& sums = fit_[i];
+    sums.x += x;
+    sums.n += n;
+    sums.xx += x * x;
+    sums.xn += x * n;
+    sums.nn += n * n;
+  }
 }
 
 StandardErrorStatistics RunningStandardErrors::statistics() const {
@@ -86,19 +92,42 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
     const auto over_square = [&](double x) {
       return mean_square > 0.0 ? std::optional(x / mean_square) : std::nullopt;
     };
-    statistics.quantities.push_back(
-        {.quantity = indices_[i],
-         .num_runs = num_runs_,
-         .mean = sums.errors / n,
-         .squared_ratio = over_square(squared_error),
-         .squared_ratio_error = over_square(std::sqrt(2.0 * sums.fourth_powers) / n),
-         .num_within = sums.num_within,
-         .within =
-             probability_interval(static_cast<double>(sums.num_within), n, default_confidence),
-         .pulls = sums.pulls.histogram()});
+    StandardErrorStatistic& of = statistics.quantities.emplace_back(
+        StandardErrorStatistic{.quantity = indices_[i],
+                               .num_runs = num_runs_,
+                               .mean = sums.errors / n,
+                               .squared_ratio = over_square(squared_error),
+                               .num_within = sums.num_within,
+                               .pulls = sums.pulls.histogram()});
+    if (!are_draws_independent_) continue;
+    of.squared_ratio_error = over_square(std::sqrt(2.0 * sums.fourth_powers) / n);
+    of.within = probability_interval(static_cast<double>(sums.num_within), n, default_confidence);
   }
-  statistics.fit = fit_.statistics();
+  for (std::size_t i = 0; i < fit_.size() && num_runs_ > 0; ++i) {
+    statistics.fit.push_back(fit_of(sessions_[i], fit_[i]));
+  }
   return statistics;
+}
+
+FitStatistic RunningStandardErrors::fit_of(const std::string& session, const FitSums& sums) const {
+  const auto num_runs = static_cast<double>(num_runs_);
+  FitStatistic of{.session = session,
+                  .chi_squared = sums.x / num_runs,
+                  .degrees_of_freedom = sums.n / num_runs};
+  // With fewer, the fit adapts to all data, and what is left is rounding.
+  constexpr double degrees_min = 1e-6;
+  if (of.degrees_of_freedom < degrees_min) return of;
+  of.ratio = sums.x / sums.n;
+  if (!are_draws_independent_) return of;
+  if (num_runs_ > 1) {
+    // The delta method: residuals x − ratio·n, whose mean is 0.
+    const double scatter = sums.xx - 2.0 * of.ratio * sums.xn + of.ratio * of.ratio * sums.nn;
+    of.ratio_error = std::sqrt(std::max(scatter, 0.0) * num_runs / (num_runs - 1.0)) / sums.n;
+  }
+  const double one_sided = std::min(chi_square_above(sums.x / (1.0 + fit_tolerance_), sums.n),
+                                    chi_square_at_most(sums.x / (1.0 - fit_tolerance_), sums.n));
+  of.p_value = std::min(1.0, 2.0 * static_cast<double>(fit_.size()) * one_sided);
+  return of;
 }
 
 Table standard_error_table(const ResultSchema& schema, const StandardErrorStatistics& statistics) {
@@ -117,33 +146,34 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
   Table table{.id = "standard-error-table",
               .caption = fmt::format("Standard errors σ of the estimates of {}",
                                      counted(statistics.quantities.front().num_runs, "run")),
-              .columns = {{"parameter", true, 11},
-                          {"unit", true, 9},
-                          {"mean", false, 9},
-                          {"ratio", false, 10, ratio, true}},
+              .rows = std::vector<Row>(statistics.quantities.size()),
               .notes = {"honest ones of normal errors have a ratio of 1, and 95 % of the errors "
                         "within"}};
-  if (have_ratio_errors) table.columns.push_back({"±", false, 9, ratio});
-  table.columns.push_back({"runs", false, have_intervals ? 9U : 18U, within, true});
-  if (have_intervals) {
-    table.columns.insert(table.columns.end(),
-                         {{"from", false, 9, within}, {"to", false, 9, within}});
-    if (have_ratio_errors) {
-      table.notes.back() +=
-          "; ±: its standard deviation; from, to: 95 % interval, which one honest one in twenty "
-          "misses";
-    }
-    if (!have_ratio_errors) table.notes.emplace_back("from, to: 95 % interval from replicates");
+  const std::vector<StandardErrorStatistic>& all = statistics.quantities;
+  const auto quantity = [&](std::size_t i) -> const Quantity& {
+    return schema.quantities[all[i].quantity];
+  };
+  add_column(table, {"parameter", true, 11}, [&](auto i) { return quantity(i).symbol; });
+  add_column(table, {"unit", true, 9}, [&](auto i) { return unit_cell(quantity(i)); });
+  add_column(table, {"mean", false, 9},
+             [&](auto i) { return figure_cell(all[i].mean, quantity(i).display_scale); });
+  add_column(table, {"ratio", false, 10, ratio, true},
+             [&](auto i) { return figure_cell(all[i].squared_ratio); });
+  if (have_ratio_errors) {
+    add_column(table, {"±", false, 9, ratio},
+               [&](auto i) { return figure_cell(all[i].squared_ratio_error); });
   }
-  for (const StandardErrorStatistic& statistic : statistics.quantities) {
-    const Quantity& quantity = schema.quantities[statistic.quantity];
-    Row row{quantity.symbol, unit_cell(quantity),
-            figure_cell(statistic.mean, quantity.display_scale),
-            figure_cell(statistic.squared_ratio)};
-    if (have_ratio_errors) row.push_back(figure_cell(statistic.squared_ratio_error));
-    row.push_back(figure_cell(share_within(statistic), 0.01));
-    if (have_intervals) add_ends(statistic.within, 0.01, row);
-    table.rows.push_back(std::move(row));
+  add_column(table, {"runs", false, have_intervals ? 9U : 18U, within, true},
+             [&](auto i) { return figure_cell(share_within(all[i]), percent_scale); });
+  if (!have_intervals) return table;
+  add_ends(table, {"from", false, 9, within}, {"to", false, 9, within},
+           [&](auto i) { return IntervalAndScale(all[i].within, percent_scale); });
+  if (have_ratio_errors) {
+    table.notes.back() +=
+        "; ±: its standard deviation; from, to: 95 % interval, which one honest one in twenty "
+        "misses";
+  } else {
+    table.notes.emplace_back("from, to: 95 % interval from replicates");
   }
   return table;
 }
@@ -169,85 +199,36 @@ std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
   return grid;
 }
 
-RunningFit::RunningFit(const ResultSchema& schema)
-    : sessions_(schema.fit_parts), tolerance_(schema.fit_tolerance) {
-  if (schema.fit.empty()) return;
-  sessions_.insert(sessions_.begin(), "all");
-  sums_.resize(sessions_.size());
-}
-
-void RunningFit::add(const RunResult& result) {
-  num_runs_ += 1.0;
-  for (std::size_t i = 0; i < sums_.size(); ++i) {
-    const double x = result.fit[2 * i], n = result.fit[2 * i + 1];
-    Sums& sums = sums_[i];
-    sums.x += x;
-    sums.n += n;
-    sums.xx += x * x;
-    sums.xn += x * n;
-    sums.nn += n * n;
-  }
-}
-
-FitStatistic RunningFit::statistic_of(const std::string& session, const Sums& sums) const {
-  FitStatistic of{.session = session,
-                  .chi_squared = sums.x / num_runs_,
-                  .degrees_of_freedom = sums.n / num_runs_};
-  // With fewer, the fit adapts to all data, and what is left is rounding.
-  constexpr double degrees_min = 1e-6;
-  if (of.degrees_of_freedom < degrees_min) return of;
-  of.ratio = sums.x / sums.n;
-  if (num_runs_ > 1.0) {
-    // The delta method: residuals x − ratio·n, whose mean is 0.
-    const double scatter = sums.xx - 2.0 * of.ratio * sums.xn + of.ratio * of.ratio * sums.nn;
-    of.ratio_error = std::sqrt(std::max(scatter, 0.0) * num_runs_ / (num_runs_ - 1.0)) / sums.n;
-  }
-  const double one_sided = std::min(chi_square_above(sums.x / (1.0 + tolerance_), sums.n),
-                                    chi_square_at_most(sums.x / (1.0 - tolerance_), sums.n));
-  of.p_value = std::min(1.0, 2.0 * static_cast<double>(sums_.size()) * one_sided);
-  return of;
-}
-
-std::vector<FitStatistic> RunningFit::statistics() const {
-  std::vector<FitStatistic> fit;
-  if (num_runs_ == 0.0) return fit;
-  for (std::size_t i = 0; i < sums_.size(); ++i)
-    fit.push_back(statistic_of(sessions_[i], sums_[i]));
-  return fit;
-}
-
 Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit) {
   if (fit.empty()) return {};
   const bool has_p_values =
       std::ranges::any_of(fit, [](const auto& of) { return of.p_value.has_value(); });
   Table table{.id = "fit-table",
               .caption = "Fit of the estimates to the data of each session",
-              .columns = {{"session", true, 16},
-                          {"χ²", false, 9},
-                          {"degrees", false, 9},
-                          {"χ²/degrees", false, 12}},
+              .rows = std::vector<Row>(fit.size()),
               .notes = {"χ²: its mean over the runs; degrees of freedom: what is expected of it"}};
-  if (has_p_values) {
-    table.columns.insert(table.columns.end(), {{"±", false, 9}, {"p", false, 9}, {"", false, 14}});
-    table.notes.push_back("±: standard error of the ratio, from its scatter over the runs");
-    table.notes.push_back(fmt::format(
-        "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
-        "takes it for, to {:.2g} %",
-        fit.size(), 100.0 * schema.fit_tolerance));
-  }
-  for (const FitStatistic& of : fit) {
-    Cell session(of.session);
-    session.document = name_in_symbols(schema, of.session);
-    Row row{std::move(session), figure_cell(of.chi_squared), figure_cell(of.degrees_of_freedom),
-            of.ratio > 0.0 ? figure_cell(of.ratio) : no_figure()};
-    if (has_p_values) {
-      const bool is_by_chance = of.p_value.value_or(1.0) >= 1.0 - default_confidence;
-      row.push_back(figure_cell(of.ratio_error));
-      row.push_back(figure_cell(of.p_value));
-      row.emplace_back(is_by_chance ? "" : "does not fit", Tone::bad);
-    }
-    table.rows.push_back(std::move(row));
-  }
+  add_column(table, {"session", true, 16}, [&](auto i) {
+    Cell session(fit[i].session);
+    session.document = name_in_symbols(schema, fit[i].session);
+    return session;
+  });
+  add_column(table, {"χ²", false, 9}, [&](auto i) { return figure_cell(fit[i].chi_squared); });
+  add_column(table, {"degrees", false, 9},
+             [&](auto i) { return figure_cell(fit[i].degrees_of_freedom); });
+  add_column(table, {"χ²/degrees", false, 12},
+             [&](auto i) { return fit[i].ratio > 0.0 ? figure_cell(fit[i].ratio) : no_figure(); });
+  if (!has_p_values) return table;
+  add_column(table, {"±", false, 9}, [&](auto i) { return figure_cell(fit[i].ratio_error); });
+  add_column(table, {"p", false, 9}, [&](auto i) { return figure_cell(fit[i].p_value); });
+  add_column(table, {"", false, 14}, [&](auto i) {
+    const bool is_by_chance = fit[i].p_value.value_or(1.0) >= 1.0 - default_confidence;
+    return Cell(is_by_chance ? "" : "does not fit", Tone::bad);
+  });
+  table.notes.push_back("±: standard error of the ratio, from its scatter over the runs");
+  table.notes.push_back(fmt::format(
+      "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
+      "takes it for, to {:.2g} %",
+      fit.size(), 100.0 * schema.fit_tolerance));
   return table;
 }
 

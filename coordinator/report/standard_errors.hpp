@@ -7,12 +7,54 @@
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/report/histogram.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
+
+/// Counts of values between edges: what a histogram shows.
+struct Histogram {
+  std::vector<double> edges;  ///< Ascending; one more than there are counts. None: no value.
+  std::vector<std::uint64_t> counts;  ///< Of the values in [edges[i], edges[i + 1]).
+  std::uint64_t num_below = 0;        ///< Values below the first edge.
+};
+
+/// Counts magnitudes, ten bins a power of ten. Memory is fixed.
+class MagnitudeBins {
+ public:
+  MagnitudeBins();
+
+  /// @param value  ≥ 0, at most 1e91.
+  void add(double value);
+
+  /// From the bin that at most 1 % of the values lie below to that of the largest.
+  [[nodiscard]] Histogram histogram() const;
+
+ private:
+  std::uint64_t num_values_ = 0;
+  std::vector<std::uint64_t> counts_;
+};
+
+/// Counts values of either sign in at most 64 bins of equal width about 0. The width is the
+/// smallest power of two with which all values have a bin: it depends on the largest |value| alone,
+/// not on the order.
+class ErrorBins {
+ public:
+  ErrorBins();
+
+  /// @param value  Between -1e91 and 1e91.
+  void add(double value);
+
+  /// From the first bin with a value to the last.
+  [[nodiscard]] Histogram histogram() const;
+
+ private:
+  void double_width();
+
+  int exponent_;  ///< Bins are 2^exponent wide.
+  std::vector<std::uint64_t> counts_;
+};
 
 /// How well estimates fit the data of a session, or all data, over the completed runs of a campaign
 /// that have standard errors.
@@ -29,30 +71,6 @@ struct FitStatistic {
   std::optional<double> p_value = {};
 };
 
-/// Computes them from results that are seen once. Memory is fixed.
-class RunningFit {
- public:
-  explicit RunningFit(const ResultSchema& schema);
-
-  /// @pre The result has what the schema says of its fit.
-  void add(const RunResult& result);
-
-  /// All data first, then each session; none before the first result or without a fit.
-  [[nodiscard]] std::vector<FitStatistic> statistics() const;
-
- private:
-  /// Over the runs; x is χ² and n its degrees of freedom.
-  struct Sums {
-    double x = 0.0, n = 0.0, xx = 0.0, xn = 0.0, nn = 0.0;
-  };
-  [[nodiscard]] FitStatistic statistic_of(const std::string& session, const Sums& sums) const;
-
-  std::vector<std::string> sessions_;
-  double tolerance_;
-  double num_runs_ = 0.0;
-  std::vector<Sums> sums_;
-};
-
 /// Whether the standard errors of a quantity say how far its estimates are off: over the completed
 /// runs that have them. Of honest ones squared_ratio is 1, and 95 % of the errors are within
 /// normal_95 of them.
@@ -61,13 +79,13 @@ struct StandardErrorStatistic {
   std::uint64_t num_runs = 0;
   double mean = 0.0;  ///< Of the standard errors, SI.
   /// Mean of error² over the mean of the standard errors' squares; nothing if these are 0.
-  std::optional<double> squared_ratio;
+  std::optional<double> squared_ratio = {};
   /// Its standard deviation if the standard errors are those of normal errors, √(2 Σσ⁴)/Σσ².
-  std::optional<double> squared_ratio_error;
+  std::optional<double> squared_ratio_error = {};
   std::uint64_t num_within = 0;  ///< Runs whose |error| is within normal_95 standard errors.
   /// Of their share among all draws, 95 %; of a sampling design from its replicates.
-  std::optional<Interval> within;
-  Histogram pulls;  ///< Of error / standard error.
+  std::optional<Interval> within = {};
+  Histogram pulls = {};  ///< Of error / standard error.
 };
 
 /// Half the width of the interval, in standard deviations, that holds 95 % of a normal law.
@@ -75,17 +93,17 @@ inline constexpr double normal_95 = 1.96;
 
 struct StandardErrorStatistics {
   std::vector<StandardErrorStatistic> quantities;  ///< None if no run has standard errors.
-  std::vector<FitStatistic> fit;                   ///< Of these runs.
+  std::vector<FitStatistic> fit;  ///< Of these runs: all data first, then each session, if any.
 };
-
-/// Intervals, chances and the standard errors of ratios, for draws that are not independent.
-void leave_out_intervals(StandardErrorStatistics& statistics);
 
 /// Computes them from results that are seen once. Memory is fixed.
 class RunningStandardErrors {
  public:
-  explicit RunningStandardErrors(const ResultSchema& schema);
+  /// @param are_draws_independent  Else there are no intervals, chances and standard errors of
+  ///                               ratios.
+  explicit RunningStandardErrors(const ResultSchema& schema, bool are_draws_independent = true);
 
+  /// @pre The result has what the schema says of its fit.
   void add(const RunResult& result);
   [[nodiscard]] StandardErrorStatistics statistics() const;
 
@@ -98,10 +116,20 @@ class RunningStandardErrors {
     std::uint64_t num_within = 0;
     ErrorBins pulls;
   };
+  /// Of a session, over the runs; x is χ² and n its degrees of freedom.
+  struct FitSums {
+    double x = 0.0, n = 0.0, xx = 0.0, xn = 0.0, nn = 0.0;
+  };
+  void add_fit(const RunResult& result);
+  [[nodiscard]] FitStatistic fit_of(const std::string& session, const FitSums& sums) const;
+
+  bool are_draws_independent_;
+  double fit_tolerance_;
   std::vector<std::size_t> indices_;  ///< Of the quantities that have a standard error.
   std::uint64_t num_runs_ = 0;
-  std::vector<Sums> quantities_;  ///< Of these.
-  RunningFit fit_;
+  std::vector<Sums> quantities_;       ///< Of these.
+  std::vector<std::string> sessions_;  ///< All data first; none without a fit.
+  std::vector<FitSums> fit_;
 };
 
 /// No rows without standard errors; no columns of intervals if no quantity has one.

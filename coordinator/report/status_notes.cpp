@@ -7,7 +7,7 @@
 #include <array>
 
 #include "coordinator/report/json.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -40,6 +40,42 @@ std::span<const CampaignCounter> campaign_counters() {
 
 std::uint64_t percent_done(const proto::CampaignStatus& campaign) {
   return campaign.num_done() * 100 / std::max<std::uint64_t>(1, campaign.num_runs());
+}
+
+bool is_over(const proto::CampaignStatus& campaign) {
+  return campaign.phase() == proto::CAMPAIGN_PHASE_FINISHED ||
+         campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED;
+}
+
+std::string rate_text(const proto::CampaignStatus& campaign) {
+  return campaign.rate_hz() > 0.0 ? measured_figure(campaign.rate_hz()) : "-";
+}
+
+std::string time_left_text(const proto::CampaignStatus& campaign) {
+  const bool is_known = campaign.has_remaining_s() && !is_over(campaign);
+  return is_known ? duration_text(campaign.remaining_s()) : "-";
+}
+
+std::vector<Column> campaign_columns() {
+  return {{"campaign", true, 17}, {"phase", true, 10},     {"prio", false, 5},
+          {"done", false, 11},    {"runs", false, 11},     {"%", false, 5},
+          {"runs/s", false, 8},   {"time left", false, 12}};
+}
+
+Row campaign_row(const proto::CampaignStatus& campaign) {
+  const auto count = [](std::uint64_t number) {
+    Cell cell(std::to_string(number));
+    cell.document = grouped(number);
+    return cell;
+  };
+  return {campaign.name(),
+          wire::phase_name(campaign),
+          std::to_string(campaign.priority()),
+          count(campaign.num_done()),
+          count(campaign.num_runs()),
+          std::to_string(percent_done(campaign)),
+          rate_text(campaign),
+          time_left_text(campaign)};
 }
 
 std::string further_note(std::uint64_t count, int num_shown, std::string_view thing) {

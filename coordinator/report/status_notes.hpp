@@ -34,6 +34,17 @@ struct CampaignCounter {
 /// Of the campaign's runs.
 [[nodiscard]] std::uint64_t percent_done(const proto::CampaignStatus& campaign);
 
+/// True if it is finished or cancelled.
+[[nodiscard]] bool is_over(const proto::CampaignStatus& campaign);
+
+/// Runs a second, and the time until all are finished; a dash where it is not known.
+[[nodiscard]] std::string rate_text(const proto::CampaignStatus& campaign);
+[[nodiscard]] std::string time_left_text(const proto::CampaignStatus& campaign);
+
+/// The columns of a table of campaigns, with widths for a terminal, and one of its rows.
+[[nodiscard]] std::vector<Column> campaign_columns();
+[[nodiscard]] Row campaign_row(const proto::CampaignStatus& campaign);
+
 /// `Proofmass 0.9, models a-1, b-2, up 3 min 20 s`; the built-in model if no other is known.
 /// @param versions  Of the campaigns' models; empty for one that an older coordinator serves.
 [[nodiscard]] std::string service_line(const proto::StatusReply& status,

@@ -1,5 +1,3 @@
-#include "coordinator/report/summarise.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>

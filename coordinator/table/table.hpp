@@ -3,10 +3,14 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 
@@ -74,5 +78,89 @@ struct Table {
   std::vector<Remark> remarks = {};     ///< Below the rows.
   std::vector<std::string> notes = {};  ///< Sentences about the table, below that.
 };
+
+/// A number ≥ 0 with three significant digits: `0.361`, `7.53`, `49.2`, `1240`; from a million on
+/// and below a thousandth `1.2e+06`, which is at most seven characters below 1e99.
+[[nodiscard]] std::string measured_figure(double value);
+
+/// Any number in the spelling of measured_figure(), with a minus sign if it is below 0.
+[[nodiscard]] std::string signed_figure(double value);
+
+/// A number ≥ 0 that somebody gave, without zeros that say nothing: `7.3`, `2000`.
+[[nodiscard]] std::string given_figure(double value);
+
+/// `1,234,567`
+[[nodiscard]] std::string grouped(std::uint64_t count);
+
+/// `1 run`, `2 runs`.
+[[nodiscard]] std::string counted(std::uint64_t count, std::string_view thing);
+
+/// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
+[[nodiscard]] std::string duration_text(double seconds);
+
+using wire::display_width;
+using wire::shortened;
+
+enum class Paint : std::uint8_t { no, yes };
+
+/// What a terminal, or a file in its place, takes.
+struct TerminalStyle {
+  std::size_t line_width_max = std::numeric_limits<std::size_t>::max();
+  Paint paint = Paint::no;
+  bool cuts_remarks = false;  ///< Remarks are cut to the line, else they take what they need.
+  bool wraps_cells = false;   ///< Text that a column has no room for goes on below, else it is cut.
+};
+
+/// Of a text that nobody cuts: lines of at most 80 columns, on a terminal or not.
+[[nodiscard]] TerminalStyle document_style(Paint paint);
+
+/// Number of a tone's colour among the 256 of a terminal, or 0 for the terminal's own. Blue and
+/// orange can be told apart by colour-blind people, and have a contrast of at least 4:1 on black
+/// and on white.
+[[nodiscard]] int colour_of(Tone tone);
+
+/// Visible text between the control sequences of its tone; as it is if nothing is painted.
+[[nodiscard]] std::string in_tone(std::string_view text, Tone tone, Paint paint);
+
+/// The caption, the rows below their titles, the remarks and the notes; notes are broken to lines
+/// of 80 columns. Whatever the texts hold, they are visible.
+[[nodiscard]] std::string terminal_text(const Table& table, const TerminalStyle& style = {});
+
+/// Text filled up with spaces on the right to `width` columns of a terminal.
+[[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
+
+/// Words in lines of at most `first` columns, and then of `width`; a longer word has its own.
+[[nodiscard]] std::vector<std::string> lines_of(const std::string& text, std::size_t first,
+                                                std::size_t width);
+
+/// Text broken between words, and in longer ones, to lines of at most 80 columns, from the second
+/// one on after `indent` spaces; the first one begins at column `begin`. No end of the last line.
+[[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin);
+
+/// Lines, those of more than 80 columns broken between words. What follows of such a line stands
+/// below what it has behind its label, as in `Note      text`, else two columns further right.
+[[nodiscard]] std::string fitted(std::string_view text);
+
+/// The table as markup, in a region that scrolls by itself where the window is narrow, and its
+/// lines and notes as paragraphs. With an id the caption is shown; without, only screen readers
+/// tell it.
+[[nodiscard]] std::string html_table(const Table& table);
+
+/// Sentences as markup; what stands between backticks is code.
+[[nodiscard]] std::string sentence_markup(std::string_view text);
+
+/// A table as html_table() writes it; empty if it has no rows.
+[[nodiscard]] std::string table_or_nothing(const Table& table);
+
+/// Text in which Markdown finds nothing of its own: what could begin markup has a backslash before
+/// it. An underscore inside a word begins none.
+[[nodiscard]] std::string markdown_text(std::string_view text);
+
+/// The lines that a table of GitHub's Markdown begins with, and one of its rows.
+[[nodiscard]] std::string markdown_heading(std::span<const Column> columns);
+[[nodiscard]] std::string markdown_row(std::span<const Cell> cells);
+
+/// The caption, the table, its lines and notes, and an empty line.
+[[nodiscard]] std::string markdown_table(const Table& table);
 
 }  // namespace proofmass::coordinator

@@ -1,5 +1,3 @@
-#include "coordinator/table/terminal_table.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,6 +6,8 @@
 #include <sstream>
 #include <utility>
 #include <vector>
+
+#include "coordinator/table/table.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -23,23 +23,7 @@ std::size_t longest_word(const std::string& text) {
   return longest;
 }
 
-/// Words in lines of at most `first` columns, and then of `width`; a longer word has its own.
-std::vector<std::string> lines_of(const std::string& text, std::size_t first, std::size_t width) {
-  std::istringstream words(text);
-  std::vector<std::string> lines{""};
-  for (std::string word; words >> word;) {
-    std::string longer = lines.back().empty() ? word : fmt::format("{} {}", lines.back(), word);
-    const bool fits = display_width(longer) <= (lines.size() == 1 ? first : width);
-    if (fits || lines.back().empty()) {
-      lines.back() = std::move(longer);
-    } else {
-      lines.push_back(std::move(word));
-    }
-  }
-  return lines;
-}
-
-/// The same, whatever the words are.
+/// lines_of(), whatever the words are.
 std::vector<std::string> broken(const std::string& text, std::size_t first, std::size_t width) {
   std::vector<std::string> lines = lines_of(text, first, width);
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -313,6 +297,21 @@ std::string terminal_text(const Table& table, const TerminalStyle& style) {
 std::string left_aligned(std::string_view text, std::size_t width) {
   const std::size_t taken = display_width(text);
   return std::string(text) + std::string(width > taken ? width - taken : 0, ' ');
+}
+
+std::vector<std::string> lines_of(const std::string& text, std::size_t first, std::size_t width) {
+  std::istringstream words(text);
+  std::vector<std::string> lines{""};
+  for (std::string word; words >> word;) {
+    std::string longer = lines.back().empty() ? word : fmt::format("{} {}", lines.back(), word);
+    const bool fits = display_width(longer) <= (lines.size() == 1 ? first : width);
+    if (fits || lines.back().empty()) {
+      lines.back() = std::move(longer);
+    } else {
+      lines.push_back(std::move(word));
+    }
+  }
+  return lines;
 }
 
 std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin) {

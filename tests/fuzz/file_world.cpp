@@ -17,10 +17,10 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/query/query.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/sensitivity.hpp"
-#include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
 #include "core/error.hpp"
@@ -222,7 +222,7 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     }
     case FileUse::report: {
       const Store store = Store::open_read_only(file);
-      (void)report_text(read_review(store, *stored_campaign(store), ReviewDepth::tables));
+      (void)report_text(read_review(store, *stored_campaign(store), ReviewDepth::matrix));
       return;
     }
     case FileUse::requirement: {

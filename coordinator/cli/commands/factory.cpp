@@ -14,8 +14,8 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -38,10 +38,6 @@ std::string_view list_name(KeyRole role) {
   return role == KeyRole::worker ? wire::authorized_workers_name : wire::authorized_clients_name;
 }
 
-wire::Domain domain_of(KeyRole role) {
-  return role == KeyRole::worker ? wire::Domain::workers : wire::Domain::clients;
-}
-
 std::string list_head(KeyRole role) {
   const bool is_client = role == KeyRole::client;
   return fmt::format(
@@ -59,15 +55,6 @@ std::string list_line(const wire::KeyPair& pair, std::string_view name,
                      rights);
 }
 
-/// The person who sets a coordinator up may control all of its campaigns.
-std::string_view first_rights(KeyRole role) {
-  return role == KeyRole::client ? "observe,submit,control" : "";
-}
-
-bool is_there(const std::filesystem::path& file) {
-  return std::filesystem::exists(std::filesystem::symlink_status(file));
-}
-
 /// Files that belong together, none of which is there before: they are removed again unless all
 /// were made, whether somebody asked to stop or the disk is full.
 class FilesOfOneSet {
@@ -75,7 +62,9 @@ class FilesOfOneSet {
   /// @throws UsageError if one of them is there.
   FilesOfOneSet(const std::filesystem::path& directory, std::vector<std::string> names)
       : directory_(directory), names_(std::move(names)) {
-    const auto is_missing = [&](const auto& name) { return !is_there(directory / name); };
+    const auto is_missing = [&](const auto& name) {
+      return !std::filesystem::exists(std::filesystem::symlink_status(directory / name));
+    };
     const auto there = std::ranges::find_if_not(names_, is_missing);
     if (there == names_.end()) return;
     const auto missing = std::ranges::find_if(names_, is_missing);
@@ -124,9 +113,11 @@ void make_whole_set(const std::filesystem::path& directory, const IsStopped& is_
   for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
     if (is_stopped()) throw Interrupted();
     const wire::KeyPair pair = wire::make_key_pair();
+    // The person who sets a coordinator up may control all of its campaigns.
+    const std::string_view rights = role == KeyRole::client ? "observe,submit,control" : "";
     wire::write_key_pair(directory, to_text(role), role, pair);
     wire::write_whole_file("allow-list", directory / list_name(role),
-                           list_head(role) + list_line(pair, to_text(role), first_rights(role)),
+                           list_head(role) + list_line(pair, to_text(role), rights),
                            wire::trusted_mode, wire::IfThere::keep);
   }
   files.keep();
@@ -151,7 +142,8 @@ class NewPair {
         list_(directory / list_name(role)),
         text_(read_list(list_)) {
     wire::check_key_directory(directory);
-    for (const auto& [key, owner] : parse_allow_list(text_, domain_of(role), list_)) {
+    const auto domain = role == KeyRole::worker ? wire::Domain::workers : wire::Domain::clients;
+    for (const auto& [key, owner] : parse_allow_list(text_, domain, list_)) {
       if (owner.name != name) continue;
       throw UsageError(
           fmt::format("--{} = {} (is in {} already)", to_text(role), name, list_.string()));

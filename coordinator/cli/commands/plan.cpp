@@ -15,11 +15,9 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/report/json.hpp"
-#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/campaign/allocation.hpp"
 #include "core/campaign/plan_study.hpp"
 #include "core/model.hpp"

@@ -24,7 +24,6 @@
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -130,7 +129,7 @@ int query_remotely(const QueryOptions& options) {
   asked.set_statement(options.sql == "-" ? read_standard_input() : options.sql);
   const bool is_for_people = options.format == RowFormat::table;
   return print_answer(options.connection, question,
-                      is_for_people ? AnswerText::lines : AnswerText::bytes);
+                      is_for_people ? print_lines : write_standard_output);
 }
 
 [[noreturn]] void end_process(const std::string& error) {

@@ -20,16 +20,15 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
-#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/local_run.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/progress_display.hpp"
-#include "coordinator/cli/worker_processes.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/page/page.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/summarise.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
@@ -135,9 +134,8 @@ ServiceConfig service_config(RunStart& start, CampaignFiles& files) {
 /// A page for people who watch the campaign, and a line that says where it is; null if none is
 /// wanted.
 std::unique_ptr<Page> begin_page(const RunOptions& options, ProgressDisplay& display) {
-  const std::optional<PageConfig> config = page_config_of(options.page);
-  if (!config) return nullptr;
-  auto page = std::make_unique<Page>(*config, [&display](const Event& event) {
+  if (!options.page.is_wanted()) return nullptr;
+  auto page = std::make_unique<Page>(options.page, [&display](const Event& event) {
     if (event.severity != Severity::info) display.note("proofmass: warning: " + to_text(event));
   });
   display.note(fmt::format("proofmass: live page at {}", page->url()));
@@ -221,8 +219,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   const auto show = [&] {
     const proto::CampaignStatus status = service.campaigns().front();
     if (!service.is_done()) storage.update(status);  // Otherwise run_campaign() tells why.
-    display.update(options.part ? of_part(status, part.count, num_finished_beside)
-                                : out_of(status, num_runs));
+    display.update(out_of(status, part.count, num_finished_beside));
   };
   std::unique_ptr<Page> page = begin_page(options, display);
   service.run(stop, [&] {
@@ -305,14 +302,12 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
   if (!options.stop.stop_rule.empty()) throw UsageError(range + " (must not be with --until)");
 }
 
-void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
-  if (output == RunOutput::tables) {
-    const Review review = read_review(store, campaign, ReviewDepth::tables);
-    write_standard_output(report_text(review, style_of(stdout).paint));
-  }
-  if (output == RunOutput::json) {
-    print_json(report_json(read_review(store, campaign, ReviewDepth::matrix)));
-  }
+void print_outcome(const Store& store, const Campaign& campaign,
+                   std::optional<OutputFormat> output) {
+  if (!output) return;
+  const Review review = read_review(store, campaign, ReviewDepth::matrix);
+  if (output == OutputFormat::json) return print_json(report_json(review));
+  write_standard_output(report_text(review, style_of(stdout).paint));
 }
 
 /// The runs of `50:100`, which are 50 to 99; empty if the text is none such.
@@ -354,7 +349,7 @@ int run_campaign(const RunOptions& options) {
       read_campaign(options.campaign_file, options.overrides);
   check_until(*campaign, options.stop.stop_rule);
   check_part(options, *campaign);
-  (void)page_config_of(options.page);  // Before any file is made.
+  options.page.validate();  // Before any file is made.
   const std::filesystem::path database = database_of(options);
   const std::uint64_t num_runs = campaign->num_runs;
   compute_reference_digest(campaign->model(), options);
@@ -380,15 +375,6 @@ int run_campaign(const RunOptions& options) {
   return is_doubtful ? exit_not_met : exit_done;
 }
 
-namespace {
-
-int run_from_start(const RunOptions& options) {
-  end_at_stop_signals();  // Until there is a file.
-  return run_campaign(options);
-}
-
-}  // namespace
-
 void add_run_options(CLI::App& command, RunOptions& options) {
   add_override_options(command, options.overrides);
   add_audit_option(command, options.audit_fraction);
@@ -406,7 +392,10 @@ void add_run_options(CLI::App& command, RunOptions& options) {
 
 void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
-      app, chosen, "run", "Run a campaign, or its missing runs", run_from_start);
+      app, chosen, "run", "Run a campaign, or its missing runs", [](const RunOptions& given) {
+        end_at_stop_signals();  // Until there is a file.
+        return run_campaign(given);
+      });
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_campaign_file(command, options.campaign_file);
   command.add_option("--db", options.database, "Database; by default FILE's stem with .db, here")
@@ -414,8 +403,7 @@ void add_run(CLI::App& app, Command& chosen) {
   add_range_option(command, options.part);
   add_run_options(command, options);
   add_page_options(command, options.page);
-  command.add_flag_callback(
-      "--json", [&output = options.output] { output = RunOutput::json; }, "Print JSON");
+  add_json_flag(command, *options.output);
 }
 
 }  // namespace proofmass::coordinator

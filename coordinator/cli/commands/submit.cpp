@@ -1,23 +1,32 @@
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/commands/watch.hpp"
-#include "coordinator/cli/output.hpp"
-#include "coordinator/cli/shared_options.hpp"
+#include "coordinator/report/json.hpp"
+#include "coordinator/report/status_notes.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -105,6 +114,174 @@ void add_submit(CLI::App& app, Command& chosen) {
   add_override_options(command, options.overrides);
   command.add_flag("--wait", options.waits,
                    "Show the progress until the campaign is\nfinished, as `watch` does");
+  add_client_options(command, options.client);
+  command.footer(exit_codes_text({exit_not_met}));
+}
+
+namespace {
+
+/// Changes when a line about the campaign is worth writing.
+std::string gist_of(const proto::CampaignStatus& campaign) {
+  const std::uint64_t tenths =
+      campaign.num_done() * 10 / std::max<std::uint64_t>(1, campaign.num_runs());
+  const auto num_troubles = std::ranges::count(notes_about(campaign), Tone::bad, &Remark::tone);
+  return fmt::format("{} {} {} {} {}", static_cast<int>(campaign.phase()), tenths,
+                     campaign.num_given_up(), num_troubles, campaign.storage_failure());
+}
+
+/// Campaigns that are over come last: they are the ones that a small screen leaves out.
+proto::StatusReply with_open_ones_first(proto::StatusReply status) {
+  std::stable_partition(status.mutable_campaigns()->begin(), status.mutable_campaigns()->end(),
+                        [](const auto& campaign) { return !is_over(campaign); });
+  return status;
+}
+
+}  // namespace
+
+Drawing drawn_over(std::size_t num_lines_before, std::string_view text, std::size_t num_rows) {
+  // The cursor stands below the last line, so one row stays free.
+  const std::size_t rows_max = std::max<std::size_t>(2, num_rows) - 1;
+  const auto num_lines = static_cast<std::size_t>(std::ranges::count(text, '\n')) +
+                         (text.empty() || text.ends_with('\n') ? 0 : 1);
+  const std::size_t num_shown = num_lines > rows_max ? rows_max - 1 : num_lines;
+  Drawing drawing;
+  if (num_lines_before > 0) drawing.text = fmt::format("\033[{}A", num_lines_before);
+  // What a longer line left behind is erased to the end of the line.
+  const auto draw = [&](std::string_view line) {
+    drawing.text.append(line).append("\033[K\n");
+    ++drawing.num_lines;
+  };
+  while (drawing.num_lines < num_shown) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    draw(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  if (num_shown < num_lines) draw(fmt::format("and {} more lines", num_lines - num_shown));
+  drawing.text += "\033[J";
+  return drawing;
+}
+
+WatchDisplay::WatchDisplay(WatchMode mode, std::FILE* stream) : mode_(mode), stream_(stream) {}
+
+void WatchDisplay::update(const proto::StatusReply& status) {
+  switch (mode_) {
+    case WatchMode::screen:
+      show_screen(status);
+      break;
+    case WatchMode::lines:
+      show_lines(status);
+      break;
+    case WatchMode::json:
+      fmt::print(stream_, "{}", dumped(status_json(status), -1));
+      break;
+  }
+  std::fflush(stream_);
+}
+
+void WatchDisplay::show_screen(const proto::StatusReply& status) {
+  TerminalStyle style = style_of(stream_);
+  style.cuts_remarks = true;
+  const Drawing drawing =
+      drawn_over(num_lines_drawn_, status_text(with_open_ones_first(status), style),
+                 screen_size_of(stream_).rows);
+  fmt::print(stream_, "{}", drawing.text);
+  num_lines_drawn_ = drawing.num_lines;
+}
+
+void WatchDisplay::show_lines(const proto::StatusReply& status) {
+  for (const proto::CampaignStatus& campaign : status.campaigns()) {
+    std::string gist = gist_of(campaign);
+    std::string& shown = shown_[campaign.name()];
+    if (gist == shown) continue;
+    shown = std::move(gist);
+    fmt::print(stream_, "{}\n", wire::visible_text(campaign_line(campaign)));
+  }
+}
+
+namespace {
+
+[[noreturn]] void fail_unknown(const proto::StatusReply& status, const std::string& name) {
+  std::string names;
+  for (const proto::CampaignStatus& campaign : status.campaigns()) {
+    names += (names.empty() ? "" : ", ") + campaign.name();
+  }
+  throw Error(fmt::format("campaign = {} (there is {})", name, names.empty() ? "none" : names));
+}
+
+void keep_only(proto::StatusReply& status, const std::string& name) {
+  const auto is_other = [&](const auto& campaign) { return campaign.name() != name; };
+  if (std::ranges::all_of(status.campaigns(), is_other)) fail_unknown(status, name);
+  auto& campaigns = *status.mutable_campaigns();
+  campaigns.erase(std::remove_if(campaigns.begin(), campaigns.end(), is_other), campaigns.end());
+}
+
+WatchMode mode_for(OutputFormat format) {
+  if (format == OutputFormat::json) return WatchMode::json;
+  return takes_escapes(stdout) ? WatchMode::screen : WatchMode::lines;
+}
+
+/// As `run` does, says that a finished campaign has missed its stop rule. A coordinator without the
+/// program that answers cannot tell.
+int exit_code_by_rule(const Ask& ask, const std::string& campaign) {
+  proto::RequestEnvelope question = question_about(campaign, proto::QUESTION_REPORT);
+  question.mutable_answer()->add_options("--json");
+  const proto::ReplyEnvelope reply = ask(question);
+  if (!reply.has_answer()) return exit_done;
+  const Json report = Json::parse(answer_bytes(ask, reply.answer()), nullptr, false);
+  const Json stop = report.is_object() ? report.value("stop", Json()) : Json();
+  if (!stop.is_object() || !stop.value("is_missed", false)) return exit_done;
+  const Json answer = stop.value("answer", Json());
+  wire::say(fmt::format("{}: {}: {}\n", campaign, stop.value("rule", ""),
+                        answer.is_string() ? answer.get<std::string>() : "not checked"));
+  return exit_not_met;
+}
+
+}  // namespace
+
+int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
+                     WatchDisplay& display, const std::function<void()>& pause) {
+  for (;;) {
+    proto::StatusReply status = whole_status(ask);
+    if (campaign) keep_only(status, *campaign);
+    display.update(status);
+    if (std::ranges::all_of(status.campaigns(), is_over)) {
+      const bool is_in_vain = std::ranges::any_of(status.campaigns(), [](const auto& one) {
+        return one.phase() == proto::CAMPAIGN_PHASE_CANCELLED || wire::has_failed(one);
+      });
+      return is_in_vain ? exit_cannot_be_done : exit_done;
+    }
+    pause();
+  }
+}
+
+int watch_on_standard_output(const Ask& ask, const std::optional<std::string>& campaign,
+                             OutputFormat format) {
+  WatchDisplay display(mode_for(format), stdout);
+  const int exit_code = watch_until_over(
+      ask, campaign, display, [] { std::this_thread::sleep_for(std::chrono::seconds(1)); });
+  return campaign && exit_code == exit_done ? exit_code_by_rule(ask, *campaign) : exit_code;
+}
+
+namespace {
+
+struct WatchOptions {
+  ClientOptions client;
+  std::optional<std::string> campaign;  ///< By default all.
+};
+
+int watch_campaigns(const WatchOptions& options) {
+  if (options.campaign) (void)checked_campaign_name(*options.campaign);
+  return with_connection(options.client, [&](const Ask& ask) {
+    return watch_on_standard_output(ask, options.campaign, options.client.format);
+  });
+}
+
+}  // namespace
+
+void add_watch(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<WatchOptions>(
+      app, chosen, "watch", "Show the progress until campaigns are finished", watch_campaigns);
+  command.add_option("NAME", options.campaign, "Campaign; all by default");
   add_client_options(command, options.client);
   command.footer(exit_codes_text({exit_not_met}));
 }

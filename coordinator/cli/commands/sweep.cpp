@@ -17,11 +17,8 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/commands/run.hpp"
-#include "coordinator/cli/cost_estimate.hpp"
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/sweep_plan.hpp"
-#include "coordinator/report/summarise.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
@@ -60,7 +57,7 @@ using Sweep = std::vector<SweptCampaign>;
 
 RunOptions run_options_of(const SweepOptions& options, const SweptValues& values) {
   RunOptions run = options.run;
-  run.output = RunOutput::none;
+  run.output.reset();
   run.database =
       directory_of_sweep(options) / sweep_file_name(run.campaign_file.stem().string(), values);
   for (const auto& [key, value] : values) run.overrides.assignments.push_back(key + "=" + value);

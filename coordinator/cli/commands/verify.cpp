@@ -3,13 +3,22 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/report/json.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/store/store.hpp"
+#include "coordinator/table/table.hpp"
+#include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/text/visible_text.hpp"
@@ -29,14 +38,14 @@ struct CheckedFileOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-VerifyOptions how_to_verify(const CheckedFileOptions& options) {
-  return {.fraction = options.fraction.value_or(fraction_by_default),
+VerifyOptions how_to_verify(const std::optional<double>& fraction) {
+  return {.fraction = fraction.value_or(fraction_by_default),
           .num_threads = wire::num_processors()};
 }
 
-CLI::Option* add_fraction(CLI::App& command, CheckedFileOptions& options) {
-  return command
-      .add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
+CLI::Option* add_fraction(CLI::App& command, std::optional<double>& fraction,
+                          const std::string& whose = "the runs") {
+  return command.add_option("--fraction", fraction, "Fraction of " + whose + " to simulate again")
       ->check(wire::in_range(0.0, 1.0))
       ->default_str(fmt::format("{}", fraction_by_default));
 }
@@ -86,14 +95,14 @@ int print_checks(const CheckedFileOptions& options,
 
 int verify_database(const CheckedFileOptions& options, const IsStopped& is_stopped) {
   return print_checks(options, [&](const auto& report) {
-    return verify(options.file, how_to_verify(options), report, is_stopped);
+    return verify(options.file, how_to_verify(options.fraction), report, is_stopped);
   });
 }
 
 int publish_campaign(const CheckedFileOptions& options, const IsStopped& is_stopped) {
   if (options.is_check) {
     return print_checks(options, [&](const auto& report) {
-      return check_publication(options.file, how_to_verify(options), report, is_stopped);
+      return check_publication(options.file, how_to_verify(options.fraction), report, is_stopped);
     });
   }
   std::filesystem::path output = options.output;
@@ -110,7 +119,7 @@ void add_verify(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<CheckedFileOptions>(
       app, chosen, "verify", "Check a database, simulate some runs again", verify_database);
   add_database(command, options.file);
-  add_fraction(command, options);
+  add_fraction(command, options.fraction);
   add_json_flag(command, options.format);
 }
 
@@ -129,7 +138,142 @@ void add_publish(CLI::App& app, Command& chosen) {
   command.add_option("--author", options.authors, "Of the results, for citations; may be repeated")
       ->excludes(check);
   add_force_flag(command, options.if_there);
-  add_fraction(command, options)->needs(check);
+  add_fraction(command, options.fraction)->needs(check);
+  add_json_flag(command, options.format);
+}
+
+namespace {
+
+struct MergeOptions {
+  std::filesystem::path whole;
+  std::vector<std::filesystem::path> parts;
+  /// Of each part's runs, simulated again; in [0, 1]. One that is not asked for is simulated if it
+  /// can be.
+  std::optional<double> fraction = {};
+  OutputFormat format = OutputFormat::text;
+};
+
+/// The campaign of the part that has the most runs, which may have been extended since the others.
+struct LargestPart {
+  std::shared_ptr<const Campaign> campaign;
+  std::filesystem::path part;
+};
+
+LargestPart largest_part(const std::vector<std::filesystem::path>& parts) {
+  LargestPart largest;
+  for (const std::filesystem::path& part : parts) {
+    std::shared_ptr<const Campaign> campaign = stored_campaign(Store::open_read_only(part));
+    if (largest.campaign != nullptr && campaign->num_runs <= largest.campaign->num_runs) continue;
+    largest = {.campaign = std::move(campaign), .part = part};
+  }
+  return largest;
+}
+
+/// Where a campaign with a stop rule ends depends on the results of all runs before.
+void require_part(const std::filesystem::path& part, const LargestPart& largest) {
+  const Store store = Store::open_read_only(part);
+  const std::string remedy =
+      fmt::format("asked for by {}; merge databases of one campaign only", largest.part.string());
+  require_same(store, *largest.campaign, part, remedy);
+  const std::string rule = store.stop_plan().stop_rule;
+  if (rule.empty()) return;
+  throw UsageError(
+      fmt::format("{} has until = {} (must not be in a part of a campaign)", part.string(), rule));
+}
+
+/// @throws ArchiveError with the checks that fail.
+void require_sound(const std::filesystem::path& part, const MergeOptions& options,
+                   const IsStopped& is_stopped) {
+  std::string failing;
+  const auto collect = [&](const Check& check) {
+    const bool is_skipped =
+        check.verdict == CheckOutcome::not_checked && check.name == "simulation";
+    if (is_skipped && options.fraction.value_or(0.0) > 0.0) {
+      failing += fmt::format("\nno run was simulated again, as --fraction asks: {}", check.finding);
+    }
+    if (check.verdict == CheckOutcome::fails) failing += "\n" + check_text(check);
+  };
+  if (verify(part, how_to_verify(options.fraction), collect, is_stopped) && failing.empty()) return;
+  while (failing.ends_with('\n')) failing.pop_back();
+  throw ArchiveError(fmt::format("{} fails these checks:{}", part.string(), failing));
+}
+
+std::string count_text(const MergedPart& part) {
+  const std::string num_new = counted(part.num_new, "run");
+  if (part.num_again == 0) return num_new;
+  return fmt::format("{}, and {} equal to those of parts before it", num_new, part.num_again);
+}
+
+/// Runs without a result.
+RunSet runs_missing_in(const Store& store) {
+  RunSet missing(RunRange{{0}, store.num_runs()});
+  missing.remove(RunSet(store.finished_runs()));
+  return missing;
+}
+
+/// The missing runs for people, and how to get them.
+std::string missing_text(const Store& store, const RunSet& missing, const MergeOptions& options) {
+  if (missing.empty()) return {};
+  return fmt::format(
+      "{0} of {1} runs are in no part: {2}\n`proofmass run FILE --db {3} --runs {1}` computes "
+      "them\n",
+      missing.size(), store.num_runs(), to_text(missing), options.whole.string());
+}
+
+void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
+                  const MergeOptions& options) {
+  const std::string digest = whole.summary()->digests.results;
+  std::string lines;
+  Json json{{"file", options.whole.string()}, {"parts", Json::array()}};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::string file = options.parts[i].string();
+    lines += fmt::format("{}: {}\n", file, count_text(parts[i]));
+    json["parts"].push_back(
+        {{"file", file}, {"num_new", parts[i].num_new}, {"num_again", parts[i].num_again}});
+  }
+  const RunSet missing = runs_missing_in(whole);
+  if (options.format == OutputFormat::text) {
+    return print_lines(lines + missing_text(whole, missing, options) +
+                       fmt::format("Digest {}\n", digest));
+  }
+  json["num_runs"] = whole.num_runs();
+  json["num_missing"] = missing.size();
+  json["missing"] = array_of(missing.ranges(), [](const RunRange& range) -> Json {
+    return {{"first_run", range.first.value}, {"num_runs", range.count}};
+  });
+  json["digest"] = digest;
+  print_json(json);
+}
+
+int merge_databases(const MergeOptions& options, const IsStopped& is_stopped) {
+  check_new_file("output", options.whole);
+  const LargestPart largest = largest_part(options.parts);
+  for (const std::filesystem::path& part : options.parts) require_part(part, largest);
+  for (const std::filesystem::path& part : options.parts) require_sound(part, options, is_stopped);
+  const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
+  std::vector<MergedPart> parts;
+  Store whole = Store::merge(options.whole, *largest.campaign, definition, options.parts,
+                             [&](const MergedPart& part) {
+                               if (is_stopped()) throw Interrupted();
+                               parts.push_back(part);
+                             });
+  update_statistics(whole, *largest.campaign);
+  print_merged(whole, parts, options);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_merge(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_stoppable_command<MergeOptions>(
+      app, chosen, "merge", "Join databases of parts of a campaign", merge_databases);
+  command.add_option("OUT", options.whole, "Database to be made of all parts")
+      ->type_name(database_type)
+      ->required();
+  command.add_option("PART", options.parts, "Databases of one campaign, as of `run --range`")
+      ->type_name(database_type)
+      ->required();
+  add_fraction(command, options.fraction, "each part's runs");
   add_json_flag(command, options.format);
 }
 

@@ -7,7 +7,7 @@
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
-#include "coordinator/report/summarise.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
@@ -85,7 +85,7 @@ class BitFlips : public test::StoreTest {
   [[nodiscard]] std::string report_of(const std::filesystem::path& path) const {
     return printed([&] {
       const Store store = Store::open_read_only(path);
-      return report_text(read_review(store, *stored_campaign(store), ReviewDepth::tables));
+      return report_text(read_review(store, *stored_campaign(store), ReviewDepth::matrix));
     });
   }
 
@@ -176,7 +176,7 @@ class RowsOutOfOrder : public BitFlips {
     const Store store = Store::open_read_only(file());
     const std::string expected = "campaign database = " + file().string() +
                                  " (is damaged: " + reason + "; restore it from a copy)";
-    EXPECT_EQ(message([&] { (void)read_review(store, MicroscopeCampaign{}, ReviewDepth::tables); }),
+    EXPECT_EQ(message([&] { (void)read_review(store, MicroscopeCampaign{}, ReviewDepth::matrix); }),
               expected);
     EXPECT_EQ(message([&] { (void)read_results(store, MicroscopeCampaign{}); }), expected);
     EXPECT_EQ(message([&] { export_hdf5(store, directory() / "export", test::never_stopped); }),

@@ -2,8 +2,7 @@
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/summarise.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"
 #include "tests/test.hpp"
 

@@ -1,7 +1,6 @@
 #include "coordinator/cli/campaign_databases.hpp"
-#include "coordinator/cli/cost_estimate.hpp"
+#include "coordinator/cli/commands/run.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/sweep_plan.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"

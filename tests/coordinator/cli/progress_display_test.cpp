@@ -1,5 +1,4 @@
-#include "coordinator/cli/progress_display.hpp"
-
+#include "coordinator/cli/local_run.hpp"
 #include "tests/coordinator/cli/display_output.hpp"
 #include "tests/test.hpp"
 
@@ -28,9 +27,9 @@ TEST(Duration, IsWrittenInItsTwoLargestUnits) {
 
 TEST(ProgressBar, ShowsRunsPercentRateAndTimeLeft) {
   EXPECT_EQ(progress_bar(progress(42, 100, 0.5), 79),
-            "42/100 runs [############.................]  42 %  0.50 runs/s  1 min 56 s left");
+            "42/100 runs [###########.................]  42 %  0.500 runs/s  1 min 56 s left");
   EXPECT_EQ(progress_bar(progress(100, 100, 25.0), 62),
-            "100/100 runs [##############################] 100 %  25 runs/s");
+            "100/100 runs [############################] 100 %  25.0 runs/s");
 }
 
 TEST(ProgressBar, SaysThatTheFirstRunsAreComputed) {
@@ -45,9 +44,9 @@ TEST(ProgressBar, SaysThatTheFirstRunsAreComputed) {
 // What is done only grows, and so does the percentage, whenever a rule asks for more runs.
 TEST(ProgressBar, DoesNotGoBackWhenAStopRuleAsksForMore) {
   EXPECT_EQ(progress_line(out_of(progress(768, 768, 10.0), 2000)),
-            "768/2000 runs   38 %  10 runs/s  2 min 4 s left");
+            "768/2000 runs   38 %  10.0 runs/s  2 min 4 s left");
   EXPECT_EQ(progress_line(out_of(progress(768, 1024, 10.0), 2000)),
-            "768/2000 runs   38 %  10 runs/s  2 min 4 s left");
+            "768/2000 runs   38 %  10.0 runs/s  2 min 4 s left");
   EXPECT_EQ(progress_line(out_of(progress(10, 20, 0.0), 20)), "10/20 runs   50 %");
 }
 

@@ -7,8 +7,8 @@
 #include <cerrno>
 #include <csignal>
 
+#include "coordinator/cli/local_run.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/worker_processes.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/error.hpp"
 #include "tests/proto/link/scratch_directory.hpp"

@@ -1,5 +1,3 @@
-#include "coordinator/cli/commands/watch.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/program.hpp"
 #include "proto/wire/names.hpp"
 #include "tests/coordinator/cli/display_output.hpp"

@@ -37,7 +37,7 @@ TEST_F(ServiceSnapshotTest, TellsWhatEachWorkerDoes) {
   state.quarantined[quarantined.host] = TimePoint::max();
 
   ServiceSnapshot snapshot;
-  take_workers(state, now, SnapshotDepth::with_workers, snapshot);
+  take_workers(state, now, snapshot);
   ASSERT_EQ(snapshot.workers.size(), 4U);
   EXPECT_EQ(snapshot.workers[0].activity, WorkerActivity::idle);
   EXPECT_EQ(snapshot.workers[1].activity, WorkerActivity::computing);
@@ -59,11 +59,10 @@ TEST_F(ServiceSnapshotTest, HasTheSpeedOfCardsInTheirLatestCampaign) {
   EXPECT_EQ(record.status.card_rate_hz(), 2000.0);
 }
 
-TEST_F(ServiceSnapshotTest, CountsWorkersWithoutCopyingThem) {
+TEST_F(ServiceSnapshotTest, CountsWorkersByActivity) {
   for (std::uint64_t id = 1; id <= 7; ++id) add_worker(id).num_lent = id % 2;
   ServiceSnapshot snapshot;
-  take_workers(state, now, SnapshotDepth::without_workers, snapshot);
-  EXPECT_TRUE(snapshot.workers.empty());
+  take_workers(state, now, snapshot);
   const auto count = [&](WorkerActivity activity) {
     return snapshot.num_workers_by_activity[static_cast<std::size_t>(activity)];
   };

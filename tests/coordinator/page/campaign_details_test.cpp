@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/report.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
@@ -26,14 +26,6 @@ namespace proofmass::coordinator {
 namespace {
 
 using namespace std::chrono_literals;
-
-TEST(NextReading, ComesAfterTwoSecondsOrHundredAndFiftyTimesWhatTheLastTook) {
-  const TimePoint ended{1000s};
-  EXPECT_EQ(next_reading(ended, 0s), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 10ms), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 100ms), ended + 15s);
-  EXPECT_EQ(next_reading(ended, 8s), ended + 1200s);
-}
 
 TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
   const TimePoint ended{1000s};

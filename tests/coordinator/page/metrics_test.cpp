@@ -52,7 +52,7 @@ std::map<std::string, ReadMetric> read_metrics(const std::string& text) {
 }
 
 std::string text_of(const ServiceSnapshot& snapshot) {
-  return metrics_text(snapshot, snapshot.taken_at, {}, {});
+  return metrics_text(snapshot, snapshot.taken_at, {});
 }
 
 TEST(Metrics, TellWhatIsKnownOfEachCampaign) {
@@ -115,18 +115,23 @@ TEST(Metrics, LeaveOutCampaignsBeyondABound) {
   EXPECT_EQ(metrics.at("proofmass_campaigns").samples.at("{phase=\"finished\"}"), 250.0);
 }
 
-TEST(ProcessFigures, AreThoseOfThisProcess) {
-  const ProcessFigures before = process_figures();
-  EXPECT_GT(before.resident_size, 1'000'000U);
-  EXPECT_GT(before.virtual_size, before.resident_size);
-  EXPECT_GE(before.num_descriptors_max, before.num_descriptors);
+TEST(Metrics, HaveFiguresOfThisProcess) {
+  const auto value_of = [](const std::string& name) {
+    return read_metrics(text_of({})).at(name).samples.at("");
+  };
+  const double cpu_s = value_of("process_cpu_seconds_total");
+  const double num_open = value_of("process_open_fds");
+  EXPECT_GT(value_of("process_resident_memory_bytes"), 1e6);
+  EXPECT_GT(value_of("process_virtual_memory_bytes"), value_of("process_resident_memory_bytes"));
+  EXPECT_GE(value_of("process_max_fds"), num_open);
   const double now_s =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  EXPECT_NEAR(before.start_unix_s, now_s, 3600.0);  // Tests do not take hours.
+  // Tests do not take hours.
+  EXPECT_NEAR(value_of("process_start_time_seconds"), now_s, 3600.0);
   const int further = ::dup(1);
-  EXPECT_EQ(process_figures().num_descriptors, before.num_descriptors + 1);
+  EXPECT_EQ(value_of("process_open_fds"), num_open + 1.0);
   ::close(further);
-  EXPECT_GE(process_figures().cpu_s, before.cpu_s);
+  EXPECT_GE(value_of("process_cpu_seconds_total"), cpu_s);
 }
 
 }  // namespace

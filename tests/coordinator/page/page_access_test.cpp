@@ -58,7 +58,7 @@ TEST(LoopbackHost, IsThisMachineByNameOrAddress) {
 }
 
 TEST(PageWithoutToken, IsForThisMachineAlone) {
-  const PageAccess access{std::nullopt};
+  const PageAccess access;
   EXPECT_FALSE(access.refusal_of({.host = "localhost:5557"}).has_value());
   const auto refusal = access.refusal_of({.host = "evil.example:5557"});
   ASSERT_TRUE(refusal.has_value());
@@ -67,7 +67,7 @@ TEST(PageWithoutToken, IsForThisMachineAlone) {
 }
 
 TEST(PageWithToken, AsksForIt) {
-  const PageAccess access{PageToken(page_secret)};
+  const PageAccess access(page_secret);
   const auto status = [&](const HttpRequest& request) {
     const auto refusal = access.refusal_of(request);
     return refusal ? refusal->status : 200U;
@@ -87,7 +87,7 @@ TEST(PageWithToken, AsksForIt) {
 }
 
 TEST(PageWithToken, GivesACookieForIt) {
-  const PageAccess access{PageToken(page_secret)};
+  const PageAccess access(page_secret);
   EXPECT_FALSE(access.welcome("another-secret-of-20").has_value());
   EXPECT_FALSE(access.welcome("").has_value());
   const auto welcome = access.welcome(page_secret);
@@ -101,7 +101,7 @@ TEST(PageWithToken, GivesACookieForIt) {
   EXPECT_FALSE(access.refusal_of({.cookie = pair}).has_value());
   EXPECT_FALSE(access.refusal_of({.cookie = "a=b; " + pair + "; c=d"}).has_value());
   EXPECT_TRUE(access.refusal_of({.cookie = "x" + pair}).has_value());
-  const PageAccess other{PageToken("another-secret-of-20")};
+  const PageAccess other("another-secret-of-20");
   EXPECT_TRUE(other.refusal_of({.cookie = pair}).has_value());
 }
 
@@ -115,7 +115,7 @@ class TokenFileTest : public ::testing::Test {
   }
   /// Of the error that begins with the name of the file.
   std::string rule_for(const std::filesystem::path& file) {
-    const std::string message = test::message_of<Error>([&] { (void)PageToken::read(file); });
+    const std::string message = test::message_of<Error>([&] { (void)PageAccess::read(file); });
     EXPECT_THAT(message, testing::StartsWith("page token file = " + file.string() + " ("));
     EXPECT_THAT(message, Not(HasSubstr("secret")));
     return message;
@@ -128,9 +128,11 @@ class TokenFileTest : public ::testing::Test {
 };
 
 TEST_F(TokenFileTest, HoldsTheToken) {
-  EXPECT_TRUE(PageToken::read(write(page_secret, owner_only)).is(page_secret));
-  EXPECT_TRUE(PageToken::read(write(page_secret + "\n", owner_only)).is(page_secret));
-  EXPECT_FALSE(PageToken::read(write(page_secret, owner_only)).is(page_secret + "\n"));
+  EXPECT_TRUE(PageAccess::read(write(page_secret, owner_only)).welcome(page_secret).has_value());
+  EXPECT_TRUE(
+      PageAccess::read(write(page_secret + "\n", owner_only)).welcome(page_secret).has_value());
+  EXPECT_FALSE(
+      PageAccess::read(write(page_secret, owner_only)).welcome(page_secret + "\n").has_value());
 }
 
 TEST_F(TokenFileTest, MustBePrivate) {

@@ -19,14 +19,10 @@ class PageSiteTest : public ::testing::Test {
     turn();
   }
   void turn() {
-    board.on_turn(now, [this](SnapshotDepth depth) {
-      ServiceSnapshot copy = service;
-      if (depth == SnapshotDepth::without_workers) copy.workers.clear();
-      return copy;
-    });
+    board.on_turn(now, [this] { return service; });
   }
   [[nodiscard]] PageSite site() {
-    return PageSite({.access = PageAccess(token ? std::optional(PageToken(*token)) : std::nullopt),
+    return PageSite({.access = token ? PageAccess(*token) : PageAccess(),
                      .board = &board,
                      .details =
                          [this](const CampaignRecord& campaign, TimePoint) {

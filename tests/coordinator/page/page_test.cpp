@@ -29,7 +29,7 @@ class PageOfServiceTest : public test::ServiceTest {
     }
     return given.get();
   }
-  static PageConfig on_loopback() { return {.address = {.port = 0}}; }
+  static PageConfig on_loopback() { return {.address = "127.0.0.1:0"}; }
 };
 
 TEST_F(PageOfServiceTest, ShowsTheCampaignsAndWorkersOfNow) {
@@ -70,9 +70,8 @@ TEST(PageBeyondLoopback, WarnsThatNothingIsEncryptedWithoutTellingTheToken) {
   std::ofstream(file) << test::page_secret;
   std::filesystem::permissions(file, std::filesystem::perms::owner_read);
   std::vector<std::string> lines;
-  const Page page(
-      {.address = {.host = "0.0.0.0", .port = 0, .is_loopback = false}, .token_file = file},
-      [&](const wire::Event& event) { lines.push_back(to_text(event)); });
+  const Page page({.address = "*:0", .token_file = file},
+                  [&](const wire::Event& event) { lines.push_back(to_text(event)); });
   ASSERT_EQ(lines.size(), 2U);
   EXPECT_THAT(lines[0], StartsWith("page_served url=http://0.0.0.0:"));
   EXPECT_THAT(lines[1], StartsWith("page_not_encrypted url="));

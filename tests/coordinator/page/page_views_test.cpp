@@ -142,7 +142,7 @@ TEST(ChosenWorkers, HaveEachWorkerOnceOverAllPages) {
         names.insert(worker->status.name());
       }
     }
-    EXPECT_EQ(names.size(), 333U) << name_of(order);
+    EXPECT_EQ(names.size(), 333U) << static_cast<int>(order);
   }
 }
 

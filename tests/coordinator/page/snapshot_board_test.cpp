@@ -12,18 +12,16 @@ using namespace std::chrono_literals;
 class SnapshotBoardTest : public ::testing::Test {
  protected:
   void turn() {
-    board.on_turn(now, [this](SnapshotDepth depth) {
+    board.on_turn(now, [this] {
       ++num_taken;
-      last_depth = depth;
       return ServiceSnapshot{};
     });
   }
-  auto want(SnapshotDepth depth = SnapshotDepth::without_workers) { return board.want(depth, now); }
+  auto want() { return board.want(now); }
 
   TimePoint now{1000s};
   SnapshotBoard board{now};
   int num_taken = 0;
-  SnapshotDepth last_depth = SnapshotDepth::without_workers;
 };
 
 TEST_F(SnapshotBoardTest, CostsNothingWhileNobodyAsks) {
@@ -32,7 +30,6 @@ TEST_F(SnapshotBoardTest, CostsNothingWhileNobodyAsks) {
     turn();
   }
   EXPECT_EQ(num_taken, 0);
-  EXPECT_EQ(board.newest(), nullptr);
 }
 
 TEST_F(SnapshotBoardTest, HasASnapshotAfterTheNextTurn) {
@@ -41,7 +38,6 @@ TEST_F(SnapshotBoardTest, HasASnapshotAfterTheNextTurn) {
   const auto snapshot = want();
   ASSERT_NE(snapshot, nullptr);
   EXPECT_EQ(snapshot->taken_at, now);
-  EXPECT_EQ(snapshot, board.newest());
 }
 
 TEST_F(SnapshotBoardTest, TakesOneASecondForHalfAMinute) {
@@ -51,33 +47,6 @@ TEST_F(SnapshotBoardTest, TakesOneASecondForHalfAMinute) {
     now += 100ms;
   }
   EXPECT_EQ(num_taken, 30);
-}
-
-TEST_F(SnapshotBoardTest, HandsOutNothingOld) {
-  (void)want();
-  turn();
-  now += SnapshotBoard::age_max;
-  EXPECT_NE(want(), nullptr);
-  now += 1ms;
-  EXPECT_EQ(want(), nullptr);
-  EXPECT_NE(board.newest(), nullptr);  // For those who cannot wait.
-}
-
-TEST_F(SnapshotBoardTest, CopiesWorkersOnlyIfTheyAreAskedFor) {
-  (void)want();
-  turn();
-  EXPECT_EQ(last_depth, SnapshotDepth::without_workers);
-  EXPECT_EQ(want(SnapshotDepth::with_workers), nullptr);
-  now += 100ms;
-  turn();  // Without waiting for the second to end.
-  EXPECT_EQ(last_depth, SnapshotDepth::with_workers);
-  EXPECT_NE(want(SnapshotDepth::with_workers), nullptr);
-  EXPECT_NE(want(), nullptr);
-  EXPECT_EQ(num_taken, 2);
-  now += SnapshotBoard::wanted_for;
-  (void)want();
-  turn();
-  EXPECT_EQ(last_depth, SnapshotDepth::without_workers);
 }
 
 TEST_F(SnapshotBoardTest, TellsHowLongTheServiceHasNotComeRound) {

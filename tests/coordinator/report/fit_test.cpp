@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "coordinator/report/standard_errors.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -32,10 +32,11 @@ RunResult result_with(std::vector<double> fit) {
 }
 
 std::vector<FitStatistic> fit_of(const std::vector<std::vector<double>>& runs,
-                                 const ResultSchema& schema = schema_of_two()) {
-  RunningFit running(schema);
+                                 const ResultSchema& schema = schema_of_two(),
+                                 bool are_draws_independent = true) {
+  RunningStandardErrors running(schema, are_draws_independent);
   for (const std::vector<double>& fit : runs) running.add(result_with(fit));
-  return running.statistics();
+  return running.statistics().fit;
 }
 
 // χ² of 4 degrees is above x with the chance e^(−x/2) (1 + x/2), and of 2 degrees e^(−x/2). Each is
@@ -109,13 +110,15 @@ TEST(Fit, IsNoneWhereStandardErrorsHaveNone) {
 TEST(Fit, HasATableThatSaysWhatDoesNotFit) {
   const std::vector<std::vector<double>> runs{{20.1, 6.0, 20.0, 4.0, 2.0, 2.0},
                                               {21.0, 6.0, 19.0, 4.0, 2.0, 2.0}};
-  StandardErrorStatistics statistics{.quantities = {}, .fit = fit_of(runs)};
-  const auto text = [&] { return terminal_text(fit_table(schema_of_two(), statistics.fit), {}); };
-  EXPECT_THAT(text(), AllOf(ContainsRegex("a_c12 +19.5 +4.00 +4.88 .* does not fit"),
-                            ContainsRegex("a_c13 +2.00 +2.00 +1.00 +0 +1.00\n"),
-                            HasSubstr("chance that one of 3 ratios")));
-  leave_out_intervals(statistics);
-  EXPECT_THAT(text(), AllOf(HasSubstr("4.88"), Not(HasSubstr("fit\n")), Not(HasSubstr("chance"))));
+  const auto text = [&](bool are_independent) {
+    const auto fit = fit_of(runs, schema_of_two(), are_independent);
+    return terminal_text(fit_table(schema_of_two(), fit), {});
+  };
+  EXPECT_THAT(text(true), AllOf(ContainsRegex("a_c12 +19.5 +4.00 +4.88 .* does not fit"),
+                                ContainsRegex("a_c13 +2.00 +2.00 +1.00 +0 +1.00\n"),
+                                HasSubstr("chance that one of 3 ratios")));
+  EXPECT_THAT(text(false),
+              AllOf(HasSubstr("4.88"), Not(HasSubstr("fit\n")), Not(HasSubstr("chance"))));
   EXPECT_TRUE(fit_table(schema_of_two(), fit_of({})).rows.empty());
 }
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/report/run_groups.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 

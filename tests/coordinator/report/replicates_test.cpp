@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/run_groups.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
 namespace proofmass::coordinator {

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -275,9 +274,9 @@ TEST_F(StoredReport, CountsWhatWasGivenUpAsWithoutAnEstimate) {
   store.commit(deliveries);
   const Entry given_up = GivenUpRun{.run = {9}};
   store.write({&given_up, 1});
-  EXPECT_THAT(report_text(read_review(store, MicroscopeCampaign{}, ReviewDepth::tables)),
+  EXPECT_THAT(report_text(read_review(store, MicroscopeCampaign{}, ReviewDepth::matrix)),
               HasSubstr("worst of 8: "));
-  EXPECT_THAT(report_text(read_review(store, MicroscopeCampaign{}, ReviewDepth::tables)),
+  EXPECT_THAT(report_text(read_review(store, MicroscopeCampaign{}, ReviewDepth::matrix)),
               HasSubstr(" have an estimate; 2 more have none ("));
 }
 

@@ -1,9 +1,7 @@
 #include <regex>
 
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_charts.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 #include "tests/support/microscope_results.hpp"

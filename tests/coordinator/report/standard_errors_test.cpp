@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "coordinator/charts/svg.hpp"
+#include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
@@ -20,8 +20,8 @@ using ::testing::Not;
 
 const std::vector<double> pulls{-3.0, -1.0, 0.5, 1.5, 2.0};
 
-StandardErrorStatistics of_five_runs() {
-  RunningStandardErrors running(test::schema());
+StandardErrorStatistics of_five_runs(bool are_independent = true) {
+  RunningStandardErrors running(test::schema(), are_independent);
   for (std::size_t run = 0; run < pulls.size(); ++run)
     running.add(test::result_off_by(run, pulls[run]));
   running.add(test::result_of(5));                            // Without standard errors.
@@ -84,8 +84,7 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
 }
 
 TEST(StandardErrors, HaveNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
-  StandardErrorStatistics statistics = of_five_runs();
-  leave_out_intervals(statistics);
+  const StandardErrorStatistics statistics = of_five_runs(false);
   const std::string text = terminal_text(standard_error_table(test::schema(), statistics), {});
   EXPECT_THAT(text, ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 .* +60.0\n"));
   EXPECT_THAT(text, AllOf(Not(HasSubstr("±")), Not(HasSubstr("interval"))));

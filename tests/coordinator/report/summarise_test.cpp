@@ -1,8 +1,6 @@
-#include "coordinator/report/summarise.hpp"
-
-#include "coordinator/report/error_figures.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report_tables.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/review.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
 #include "proto/text/visible_text.hpp"

@@ -1,6 +1,5 @@
-#include "coordinator/table/document_table.hpp"
-#include "coordinator/table/figures.hpp"
-#include "coordinator/table/terminal_table.hpp"
+#include "coordinator/table/table.hpp"
+
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/test.hpp"
 
