@@ -187,12 +187,13 @@ inline constexpr std::size_t num_spectrum_samples_max = std::size_t{1} << 23;
 [[nodiscard]] RunSpectra replayed_spectra(const Replay& replay, RunIndex run,
                                           const IsStopped& is_stopped);
 
-/// The spectra of the run that is the farthest off. None, and the reason, where there is no such
-/// run or this program cannot replay it.
+/// The spectra of the run that is the farthest off; nothing of a model of a program, which
+/// describes none. None, and the reason, where there is no such run or this program cannot replay
+/// it.
 /// @param store  That of the review.
 /// @throws StoreError; Interrupted.
-[[nodiscard]] RunSpectra worst_run_spectra(const Store& store, const Review& review,
-                                           const IsStopped& is_stopped);
+[[nodiscard]] std::optional<RunSpectra> worst_run_spectra(const Store& store, const Review& review,
+                                                          const IsStopped& is_stopped);
 
 /// `spectrum:SESSION` for each session that has a spectrum: the names of their charts.
 [[nodiscard]] std::vector<std::string> spectrum_names(const Recording& recording);

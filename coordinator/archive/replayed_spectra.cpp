@@ -251,8 +251,9 @@ RunSpectra replayed_spectra(const Replay& replay, RunIndex run, const IsStopped&
   return spectra;
 }
 
-RunSpectra worst_run_spectra(const Store& store, const Review& review,
-                             const IsStopped& is_stopped) {
+std::optional<RunSpectra> worst_run_spectra(const Store& store, const Review& review,
+                                            const IsStopped& is_stopped) {
+  if (review.is_of_program) return std::nullopt;
   const std::optional<RunIndex> worst = worst_run_of(review);
   if (!worst) return none_of({}, "No run has an estimate, or no quantity an objective.");
   try {

@@ -27,18 +27,20 @@ struct Extents {
   }
   void add(const Curve& curve) {
     for (const Point& point : curve.points) add(point);
+    // One point is a mark, and no line.
+    has_data |= curve.points.size() > (std::holds_alternative<Dash>(curve.look) ? 1 : 0);
   }
   void add(const Band& band) {
     for (const BandPoint& point : band.points) {
       add(Point{point.x, point.lower});
       y.add(point.upper);
     }
+    has_data |= band.points.size() > 1;
   }
   void add(const LimitLine& limit) { x.add(limit.value); }
   void add(const Point& point) {
     x.add(point.x);
     y.add(point.y);
-    has_data = true;
   }
 };
 
@@ -101,6 +103,10 @@ void draw_limit_labels(std::span<const LimitLine* const> limits, const AxisMap& 
 std::size_t num_ticks_for(double length, double least) {
   return static_cast<std::size_t>(std::clamp(length / least, 2.0, 8.0));
 }
+
+/// Half of a number's width, whose digits and signs are wider than the mean letter: `−5×10⁵` by 15
+/// %.
+double half_width(const std::string& label) { return 0.58 * text_width(label); }
 
 double label_margin(const AxisRange& range) {
   double width = 20.0;
@@ -223,12 +229,16 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
   PlotArea area;
   area.y = {.scale = chart.y.scale,
             .range = range_of(chart.y, extents.y, num_ticks_for(chart.plot_height, 35.0))};
-  const double left = label_margin(area.y.range);
-  area.box = {corner.x + left, 0.0, width - left - right_margin, chart.plot_height};
+  double left = label_margin(area.y.range), right = right_margin;
   area.x = {.scale = chart.x.scale,
-            .range = range_of(chart.x, extents.x, num_ticks_for(area.box.width, 50.0)),
-            .begin = area.box.left,
-            .end = area.box.right()};
+            .range = range_of(chart.x, extents.x, num_ticks_for(width - left - right, 50.0))};
+  if (const std::vector<Tick>& ticks = area.x.range.ticks; !ticks.empty()) {
+    left = std::max(left, half_width(ticks.front().label));
+    right = std::max(right, half_width(ticks.back().label));
+  }
+  area.box = {corner.x + left, 0.0, width - left - right, chart.plot_height};
+  area.x.begin = area.box.left;
+  area.x.end = area.box.right();
   const std::vector<const LimitLine*> limits = vertical_limits(chart, area.x);
   area.box.top = corner.y + draw_head(chart, corner, width, writer) +
                  limit_row_height * static_cast<double>(limits.size());
@@ -355,7 +365,7 @@ void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWri
   for (const Tick& tick : x.range.ticks) {
     const double at = x.at(tick.value);
     writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
-    const double half = text_width(tick.label) / 2.0;
+    const double half = half_width(tick.label);
     if (at - half < taken_to) continue;  // It would touch the label before it.
     taken_to = at + half + 3.0;
     writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <set>
 #include <string>
@@ -143,6 +144,11 @@ std::vector<Column> worker_columns_of(const WorkerChoice& choice) {
           {"process"}};
 }
 
+std::string rate_figure(double rate) {
+  return rate < 1000.0 ? measured_figure(rate)
+                       : grouped(static_cast<std::uint64_t>(std::round(rate)));
+}
+
 Row worker_row(const RegisteredWorker& worker) {
   const proto::WorkerStatus& status = worker.status;
   return {status.name(),
@@ -151,7 +157,7 @@ Row worker_row(const RegisteredWorker& worker) {
           grouped(status.num_slots()),
           grouped(status.num_lent()),
           grouped(status.num_results()),
-          measured_figure(results_per_h(worker)),
+          rate_figure(results_per_h(worker)),
           fmt::format("{} ago", duration_text(status.silent_s())),
           std::to_string(status.process_id())};
 }
@@ -326,7 +332,7 @@ h2 { font-size: 1.15rem; margin: 1.6rem 0 0.4rem; }
 thead th { color: var(--faint); }
 .long { display: inline-block; white-space: normal; min-width: 16rem; max-width: 46rem;
   overflow-wrap: anywhere; }
-progress { width: 8rem; height: 0.8rem; accent-color: var(--chart-first); vertical-align: middle; }
+progress { width: min(8rem, 12vw); height: 0.8rem; accent-color: var(--chart-first); vertical-align: middle; }
 .large progress { width: min(28rem, 60vw); height: 1.1rem; }
 dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(9rem, 1fr)); gap: 0.6rem;
   margin: 0.8rem 0; }

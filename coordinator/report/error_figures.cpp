@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t num_worst_shown = 5;
 constexpr std::size_t num_convergence_points = 40;
-constexpr std::uint64_t first_convergence_count = 5;
+constexpr std::uint64_t few_convergence_runs = 5;
 
 }  // namespace
 
@@ -30,11 +30,13 @@ void keep_largest(const RunValue& candidate, std::size_t count, std::vector<RunV
 std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs) {
   std::vector<std::uint64_t> counts;
   if (num_runs == 0) return counts;
-  const double ratio = static_cast<double>(num_runs) / static_cast<double>(first_convergence_count);
-  for (std::size_t i = 0; i < num_convergence_points && num_runs > first_convergence_count; ++i) {
+  // Of few runs all: one point is no line.
+  const double first =
+      num_runs > few_convergence_runs ? static_cast<double>(few_convergence_runs) : 1.0;
+  const double ratio = static_cast<double>(num_runs) / first;
+  for (std::size_t i = 0; i < num_convergence_points; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(num_convergence_points);
-    const auto count = static_cast<std::uint64_t>(
-        std::round(static_cast<double>(first_convergence_count) * std::pow(ratio, part)));
+    const auto count = static_cast<std::uint64_t>(std::round(first * std::pow(ratio, part)));
     if (counts.empty() || counts.back() < count) counts.push_back(count);
   }
   if (counts.empty() || counts.back() < num_runs) counts.push_back(num_runs);
@@ -260,8 +262,9 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
   if (points.empty()) return "No run has an estimate.";
   const ConvergencePoint& last = points.back();
   const double scale = quantity_at(review, index).display_scale;
-  std::string text = fmt::format("After {} runs the worst is {}, the mean {}", last.num_runs,
-                                 figure_text(last.worst / scale), figure_text(last.mean / scale));
+  std::string text =
+      fmt::format("After {} the worst is {}, the mean {}", counted(last.num_runs, "run"),
+                  figure_text(last.worst / scale), figure_text(last.mean / scale));
   if (last.mean_interval) {
     text += fmt::format(" (95 %: {} to {})",
                         figure_text(std::max(last.mean_interval->lower, 0.0) / scale),
@@ -292,10 +295,11 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
   const Histogram& histogram = review.figures[index].magnitudes;
   Chart chart{.text = {.id = fmt::format("histogram-{}", quantity.name),
                        .title = fmt::format("|error| of {}", quantity.symbol),
-                       .description = fmt::format(
-                           "Histogram of {} runs. {} {}{}", review.results.statistics.num_estimated,
-                           objective_sentence(review, index), worst_sentence(review, index),
-                           below_sentence(histogram))},
+                       .description =
+                           fmt::format("Histogram of {}. {} {}{}",
+                                       counted(review.results.statistics.num_estimated, "run"),
+                                       objective_sentence(review, index),
+                                       worst_sentence(review, index), below_sentence(histogram))},
               .x = {.label = axis_label("|error|", quantity), .scale = Scale::logarithmic},
               .y = {.label = "runs"}};
   const double objective = review.objectives[index] / quantity.display_scale;

@@ -74,6 +74,10 @@ void add_ends(Table& table, Column from, Column to,
 /// Of |error|: of few values the symmetric interval of a mean may begin below 0, where none can
 /// lie.
 [[nodiscard]] std::optional<Interval> not_negative(std::optional<Interval> interval);
+/// Whether the bias differs from 0 if all parameters are looked at together (Holm, 5 %), by
+/// Student's law. False also where nothing tells: of one run, of draws that are not independent,
+/// and of errors that are too skewed for that law.
+[[nodiscard]] bool is_biased(const Review& review, std::size_t quantity);
 /// The unit in which a table shows a quantity.
 [[nodiscard]] Cell unit_cell(const Quantity& quantity);
 

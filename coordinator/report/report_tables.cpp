@@ -72,36 +72,52 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
 
 /// Student's law holds for the mean of n values if their skewness is √n/5 or less [Cochran1977].
 /// Chance makes that of a sample larger by two standard deviations, 2√(6/n).
-double skewness_max(std::uint64_t num_runs) {
+bool is_too_skewed(double skewness, std::uint64_t num_runs) {
   const auto n = static_cast<double>(num_runs);
-  return std::sqrt(n) / 5.0 + 2.0 * std::sqrt(6.0 / n);
+  return std::abs(skewness) > std::sqrt(n) / 5.0 + 2.0 * std::sqrt(6.0 / n);
 }
 
-/// Which biases differ from 0 if all parameters are looked at together.
+/// `a, b`, the symbols of those parameters of which is_one(index) holds.
+template <typename IsOne>
+std::string symbols_of(const Review& review, const IsOne& is_one) {
+  std::string list;
+  for (std::size_t i = 0; i < review.schema.quantities.size(); ++i) {
+    if (!is_one(i)) continue;
+    list += fmt::format("{}{}", list.empty() ? "" : ", ", review.schema.quantities[i].symbol);
+  }
+  return list;
+}
+
+/// Which biases differ from 0, and which intervals do not hold.
 std::string bias_sentence(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  if (statistics.num_estimated < 2) return "Bias: one run does not tell whether it differs from 0.";
-  std::vector<double> p_values;
-  std::string names, skewed;
-  const auto append = [](std::string& list, std::string_view name) {
-    list += (list.empty() ? "" : ", ") + std::string(name);
-  };
-  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
-    p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
-  }
-  const std::vector<double> adjusted = holm_adjusted(p_values);
-  for (std::size_t i = 0; i < adjusted.size(); ++i) {
-    if (adjusted[i] >= 1.0 - default_confidence) continue;
-    const double skewness = std::abs(statistics.accuracy[i].error.skewness);
-    append(skewness > skewness_max(statistics.num_estimated) ? skewed : names,
-           review.schema.quantities[i].symbol);
-  }
-  std::string text = fmt::format(
-      "Bias: each interval holds by itself. Of all {} together (Holm, 5 %) {}.", adjusted.size(),
-      names.empty() ? "no bias differs from 0" : "the bias differs from 0 of " + names);
-  if (skewed.empty()) return text;
-  return text +
-         fmt::format(" Too skewed to tell from {} runs: {}.", statistics.num_estimated, skewed);
+  const std::uint64_t num_runs = statistics.num_estimated;
+  if (num_runs < 2) return "Bias: one run does not tell whether it differs from 0.";
+  const std::string skewed = symbols_of(review, [&](std::size_t i) {
+    return is_too_skewed(statistics.accuracy[i].error.skewness, num_runs);
+  });
+  const std::string names = symbols_of(review, [&](std::size_t i) { return is_biased(review, i); });
+  const std::size_t count = statistics.accuracy.size();
+  return fmt::format(
+      "Bias: each interval holds by itself{}. {} {}.",
+      skewed.empty() ? ""
+                     : fmt::format(", but not of errors that are too skewed for {} runs: {}",
+                                   num_runs, skewed),
+      count == 1 ? "At 5 %" : fmt::format("Of all {} together (Holm, 5 %)", count),
+      names.empty() ? fmt::format("no {}bias differs from 0", skewed.empty() ? "" : "other ")
+                    : "the bias differs from 0 of " + names);
+}
+
+/// Where the intervals of |error| cover less than they say; empty if nowhere.
+std::string skewness_note(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
+  const std::string skewed = symbols_of(review, [&](std::size_t i) {
+    return is_too_skewed(statistics.accuracy[i].skewness, statistics.num_estimated);
+  });
+  if (skewed.empty()) return "";
+  return fmt::format(
+      "mean, std: too skewed for intervals from {} runs, which may cover less than 95 %: {}",
+      statistics.num_estimated, skewed);
 }
 
 std::string joint_sentence(const Review& review) {
@@ -149,6 +165,20 @@ std::vector<std::string> budget_notes(const Review& review) {
 }
 
 }  // namespace
+
+bool is_biased(const Review& review, std::size_t quantity) {
+  const CampaignStatistics& statistics = review.results.statistics;
+  const std::uint64_t num_runs = statistics.num_estimated;
+  if (num_runs < 2 || !statistics.are_draws_independent ||
+      is_too_skewed(statistics.accuracy[quantity].error.skewness, num_runs)) {
+    return false;
+  }
+  std::vector<double> p_values;
+  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
+    p_values.push_back(bias_p_value(accuracy.error, num_runs));
+  }
+  return holm_adjusted(p_values)[quantity] < 1.0 - default_confidence;
+}
 
 Cell figure_cell(const std::optional<double>& value, double scale) {
   if (!value) return no_figure();
@@ -266,7 +296,10 @@ Table interval_table(const Review& review) {
     return has_deviation ? figure_cell(all[i].standard_deviation, scale(i)) : no_figure();
   });
   add_ends(table, {"from", false, 8, deviation}, {"to", false, 9, deviation}, [&](auto i) {
-    return IntervalAndScale(not_negative(all[i].deviation_interval), scale(i));
+    // Values that differ have a deviation: an end of 0 is that of resamples without the far ones.
+    const std::optional<Interval>& interval = all[i].deviation_interval;
+    const bool is_known = !interval || all[i].standard_deviation == 0.0 || interval->lower > 0.0;
+    return IntervalAndScale(is_known ? interval : std::nullopt, scale(i));
   });
   add_column(table, {"bias", false, 9, "error", true},
              [&](auto i) { return figure_cell(all[i].error.bias, scale(i)); });
@@ -279,6 +312,7 @@ Table interval_table(const Review& review) {
     table.notes.emplace_back(
         "std: an interval from fewer than 200 runs is too narrow, see core/statistics");
   }
+  if (std::string note = skewness_note(review); !note.empty()) table.notes.push_back(note);
   // Whoever stops where the errors are small sees a worst one that is too small.
   if (!review.stop) {
     table.notes.push_back(worth_of_worst(

@@ -80,9 +80,9 @@ std::string limit_line(const RequirementAnswer& answer) {
 
 /// Of a requirement that a project's document states.
 std::string statement_line(const StatedRequirement& stated) {
-  if (stated.text.empty()) return "";
-  return fmt::format("{:{}}{}\n", "", margin,
-                     wire::visible_text(fmt::format("{}: {}", stated.id, stated.text)));
+  if (stated.is_numbered) return "";
+  const std::string text = stated.id + (stated.text.empty() ? "" : ": ") + stated.text;
+  return fmt::format("{:{}}{}\n", "", margin, wire::visible_text(text));
 }
 
 std::string bound_line(const RequirementAnswer& answer) {
@@ -168,8 +168,8 @@ std::string rule_text(const RequirementAnswer& answer) {
   if (answer.check.is_of_fixed_size) {
     const std::string later =
         answer.num_later > 0 ? fmt::format("; {} more since", answer.num_later) : std::string();
-    return fmt::format("{} draws, a number fixed before the first result{}", answer.check.num_runs,
-                       later);
+    return fmt::format("{}, a number fixed before the first result{}",
+                       counted(answer.check.num_runs, "draw"), later);
   }
   return "sequential: holds however often one looks and goes on";
 }
@@ -263,8 +263,10 @@ StatedRequirement joint_requirement() {
 std::vector<StatedRequirement> numbered_requirements(std::span<const std::string> requirements) {
   std::vector<StatedRequirement> stated;
   for (const std::string& requirement : requirements) {
-    stated.push_back(
-        {.id = fmt::format("R{}", stated.size() + 1), .text = "", .requirement = requirement});
+    stated.push_back({.id = fmt::format("R{}", stated.size() + 1),
+                      .text = "",
+                      .requirement = requirement,
+                      .is_numbered = true});
   }
   return stated;
 }

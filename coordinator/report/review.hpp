@@ -44,8 +44,8 @@ struct QuantityFigures {
 /// @param count  Of those that are kept; at least 1.
 void keep_largest(const RunValue& candidate, std::size_t count, std::vector<RunValue>& largest);
 
-/// The numbers of runs at which convergence is shown: 40 from 5 on, equally spaced on a logarithmic
-/// axis. Ascending, without repetition.
+/// The numbers of runs at which convergence is shown: 40 from 5 on, of at most 5 runs from 1 on,
+/// equally spaced on a logarithmic axis. Ascending, without repetition.
 /// @param num_runs  The last one, unless it is 0.
 [[nodiscard]] std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs);
 

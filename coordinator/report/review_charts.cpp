@@ -51,7 +51,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
   Curve seen = observed_fractions(review, tolerance);
   const double end = largest_shown(seen, tolerance);
   constexpr int num_points = 120;
-  Curve line{.name = fmt::format("{} draws", check.num_runs)};
+  Curve line{.name = counted(check.num_runs, "draw")};
   for (int i = 0; i <= num_points; ++i) {
     const double probability = end * i / num_points;
     line.points.push_back({100.0 * probability, 100.0 * probability_to_meet(check, probability)});
@@ -63,11 +63,11 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                    fmt::format("Requirements for {} with {}", given_percent(tolerance.coverage),
                                given_percent(tolerance.confidence)),
                .description = fmt::format(
-                   "Probability that {} draws meet such a requirement, against the probability "
+                   "Probability that {} meet such a requirement, against the probability "
                    "with which a draw exceeds its limit. {} Where {} of all draws exceed it, the "
                    "requirement is called met with a probability of {} %, the consumer's risk; "
                    "where fewer do, what lacks to 100 % is the producer's risk.",
-                   check.num_runs,
+                   counted(check.num_runs, "draw"),
                    check.bound_order == 0
                        ? "So few draws never meet it."
                        : fmt::format("At most {} of them may exceed it.", check.bound_order - 1),
@@ -181,7 +181,7 @@ a{color:inherit}
 .skip:focus{position:static}
 h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
 h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
-p,li{text-wrap:pretty}
+p,li{text-wrap:pretty;overflow-wrap:anywhere}
 .scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
 .scroll{background:linear-gradient(to left,var(--chart-ground) 1rem,transparent) right/2rem 100%,
 linear-gradient(to left,rgb(128 128 128/.4),transparent) right/1rem 100%}
@@ -198,7 +198,7 @@ th.words,td.words{text-align:left}
 td{white-space:nowrap}
 td.words{white-space:normal;overflow-wrap:anywhere;min-width:6rem}
 tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
-tbody th{max-width:40vw;overflow-wrap:anywhere}
+tbody th{max-width:40vw;overflow-wrap:break-word}
 .met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
 td strong{white-space:nowrap}
 .note{font-size:.9rem;margin:.3rem 0;max-width:48rem}

@@ -222,6 +222,7 @@ Row matrix_cells(const RequirementAnswer& row) {
   const RequirementCheck& check = row.check;
   return {requirement_name(row),
           statement_of(row),
+          {name_of(check.verdict), tone_of(check.verdict)},
           value_cell(row, row.limit),
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
@@ -229,7 +230,6 @@ Row matrix_cells(const RequirementAnswer& row) {
           check.bound_order > 0 ? count_cell(check.bound_order - 1) : Cell("none"),
           value_cell(row, row.bound),
           margin_cell(row),
-          {name_of(check.verdict), tone_of(check.verdict)},
           value_cell(row, row.worst ? std::optional(row.worst->value) : std::nullopt),
           row.worst ? count_cell(row.worst->run.value) : Cell("none")};
 }
@@ -289,6 +289,7 @@ Table matrix_table(const Review& review) {
                                      name_of(review.interpretation)),
               .columns = {{"id", true},
                           {"requirement", true},
+                          {"verdict", true},
                           {"limit"},
                           {"draws"},
                           {"without estimate"},
@@ -296,7 +297,6 @@ Table matrix_table(const Review& review) {
                           {"allowed"},
                           {"bound"},
                           {"margin"},
-                          {"verdict", true},
                           {"worst value"},
                           {"in run"}},
               .notes = matrix_notes(review)};

@@ -120,6 +120,10 @@ Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
   return table;
 }
 
+std::string one_of(std::size_t count, std::string_view thing) {
+  return count == 1 ? fmt::format("the {}", thing) : fmt::format("one of {} {}s", count, thing);
+}
+
 /// Names the drivers whose values go together; empty if there are none.
 std::string dependence_note(const DrawnRuns& drawn, std::span<const Sensitivity> of_error,
                             std::span<const Sensitivity> of_magnitude) {
@@ -188,12 +192,12 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
   table.notes = {
       fmt::format("{}; of variance: R², beyond that of the terms above; p: that chance "
                   "alone makes one of all quantities, or of products of two beyond their "
-                  "factors, look so in one of {} errors",
+                  "factors, look so in {}",
                   position ? fmt::format("of this run: what the term, less its mean, "
                                          "adds to the error, {}",
                                          info.display_unit)
                            : "slope: in SI units",
-                  drawn.errors.size())};
+                  one_of(drawn.errors.size(), "error"))};
   for (const ExplanatoryTerm& term : terms) {
     double figure = term.slope;
     if (position) {
@@ -333,11 +337,11 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
   Table drivers = driver_table(drawn, of_error, "error", position);
   if (has_rows) {
     drivers.notes.push_back(fmt::format(
-        "{}; p: that chance alone makes one of {} inputs look so influential on one of {} errors "
-        "or their magnitudes (Kruskal-Wallis, Holm)",
+        "{}; p: that chance alone makes {} look so influential on {} or {} (Kruskal-Wallis, Holm)",
         position ? "% below: of the runs"
                  : "% of variance: with its 95 % interval; rank: rank correlation",
-        both[1].size(), drawn.errors.size()));
+        one_of(both[1].size(), "input"), one_of(drawn.errors.size(), "error"),
+        drawn.errors.size() == 1 ? "its magnitude" : "their magnitudes"));
     const std::string dependence = dependence_note(drawn, of_error, of_magnitude);
     if (!dependence.empty()) drivers.notes.push_back(dependence);
   }
@@ -349,11 +353,12 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                                                 info.symbol, quantity_text(errors[*position], info),
                                                 rank_of(errors, *position), errors.size())
                                   : fmt::format("{}: {} runs", info.symbol, errors.size());
-  return fmt::format("{}\n{}\n{}\n{}\n{}{}", heading, basis_text(drawn),
-                     terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
-                     terminal_text(drivers, style),
-                     terminal_text(term_table(drawn, quantity, terms, position), style),
-                     position ? "" : fmt::format("\nLargest |error|: run {}{}\n", worst, why));
+  return fmt::format(
+      "{}\n{}\n{}\n{}\n{}{}", heading, basis_text(drawn),
+      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
+      terminal_text(drivers, style),
+      terminal_text(term_table(drawn, quantity, terms, position), style),
+      position ? "" : fitted(fmt::format("\nLargest |error|: run {}{}\n", worst, why)));
 }
 
 std::string unexplained_text(const DrawnRuns& drawn, std::span<const std::size_t> quantities) {

@@ -34,8 +34,9 @@ Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statist
       .text = {.id = fmt::format("pull-{}", quantity.name), .title = std::string(quantity.symbol)},
       .x = {.label = "error / standard error"},
       .y = {.label = "runs"},
-      .layers = {std::move(bars), std::move(law), LimitLine{.value = -normal_95},
-                 LimitLine{.value = normal_95}},
+      .layers = {std::move(bars), std::move(law),
+                 LimitLine{.value = -normal_95, .ink = Ink::text, .dash = Dash::dotted},
+                 LimitLine{.value = normal_95, .ink = Ink::text, .dash = Dash::dotted}},
       .plot_height = 90.0};
 }
 
@@ -192,7 +193,7 @@ std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
                                        const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return std::nullopt;
   ChartGrid grid{.text = {.id = "pulls",
-                          .title = "Errors in units of their standard errors",
+                          .title = "Errors in units of their standard errors; dotted: ±1.96",
                           .description = "Histograms beside the normal law of honest standard "
                                          "errors; the lines hold 95 % of it."}};
   for (const StandardErrorStatistic& statistic : statistics.quantities) {

@@ -121,13 +121,14 @@ class TerminalTable {
   /// The last column of a group has the room that the columns before it lack for its heading.
   void widen_for_groups() {
     for (std::size_t i = 0; i < columns_.size(); ++i) {
-      const std::size_t first = i;
-      std::size_t width = columns_[i].width;
-      while (continues_group(i + 1)) width += columns_[++i].width;
-      const std::size_t needed = display_width(columns_[first].column->group);
-      if (needed <= width) continue;
-      columns_[i].width += needed - width;
-      columns_[i].needed = columns_[i].width;
+      const std::size_t heading = display_width(columns_[i].column->group);
+      std::size_t width = columns_[i].width, needed = columns_[i].needed;
+      while (continues_group(i + 1)) {
+        width += columns_[++i].width;
+        needed += columns_[i].needed;
+      }
+      columns_[i].width += heading - std::min(heading, width);
+      columns_[i].needed += heading - std::min(heading, needed);
     }
   }
 

@@ -26,6 +26,7 @@ AccuracyStatistic accuracy_of(const ErrorExtremes& extremes, const Moments& magn
           .worst_run = extremes.worst_run,
           .mean = magnitudes.mean,
           .standard_deviation = magnitudes.standard_deviation,
+          .skewness = magnitudes.skewness,
           .num_beyond_objective = extremes.num_beyond,
           .beyond_objective =
               probability_interval(static_cast<double>(extremes.num_beyond),
@@ -140,6 +141,7 @@ void complete(AccuracyStatistic& accuracy, std::vector<double>& errors) {
   const Moments about = moments(errors);
   accuracy.mean = about.mean;
   accuracy.standard_deviation = about.standard_deviation;
+  accuracy.skewness = about.skewness;
   accuracy.mean_interval = mean_interval(about, default_confidence);
   accuracy.deviation_interval = bootstrap_deviation_interval(errors, default_confidence);
   std::ranges::sort(errors);

@@ -41,6 +41,7 @@ struct AccuracyStatistic {
   RunIndex worst_run;                          ///< The first run that reaches `worst`.
   double mean = 0.0;                           ///< SI.
   double standard_deviation = 0.0;             ///< SI, with n − 1; 0 for a single run.
+  double skewness = 0.0;                       ///< Adjusted, see Moments.
   std::uint64_t num_beyond_objective = 0;      ///< Runs whose |error| is above the objective.
   Interval beyond_objective;                   ///< Of the share of such runs among all draws.
   std::optional<Interval> mean_interval;       ///< Empty for a single run.

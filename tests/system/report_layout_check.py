@@ -63,6 +63,18 @@ for (const frame of document.querySelectorAll('iframe')) {
       tell(`${box.textContent.trim().split('\\n')[0]} is ${box.scrollWidth} wide in ${box.clientWidth}`);
     }
   }
+  for (const heading of page.querySelectorAll('tbody th')) {
+    const words = heading.textContent.split(/\\s+/);
+    const range = page.createRange();
+    range.selectNodeContents(heading);
+    const lines = new Set([...range.getClientRects()].map((line) => Math.round(line.top)));
+    if (lines.size > words.length && words.every((word) => word.length < 13)) {
+      tell(`${heading.textContent} is broken`);
+    }
+  }
+  for (const verdict of page.querySelectorAll('#matrix td strong')) {
+    if (verdict.getBoundingClientRect().right > width) tell(`${verdict.textContent} is not in sight`);
+  }
   const links = [...page.querySelectorAll('#summary li a')];
   if (links.length !== 5) tell(`sentences = ${links.length} (must be 5)`);
   for (const link of links) {

@@ -166,7 +166,9 @@ int list_databases(const ListOptions& options) {
   if (options.format == OutputFormat::json) {
     print_json(listing_json(campaigns));
   } else {
-    write_standard_output(terminal_text(listing_table(campaigns), style_of(stdout)));
+    TerminalStyle style = style_of(stdout);
+    style.wraps_cells = true;  // Names that begin alike are told apart by their ends.
+    write_standard_output(terminal_text(listing_table(campaigns), style));
   }
   return exit_done;
 }

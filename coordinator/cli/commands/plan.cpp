@@ -238,7 +238,10 @@ std::unique_ptr<PlanStudy> study_of(const PlanOptions& options, const Campaign& 
   } catch (const ConfigError& error) {
     throw UsageError(fmt::format("{}: {}", options.file.string(), error.what()));
   }
-  throw UsageError(fmt::format("{}: campaigns of this model have no bound", options.file.string()));
+  throw UsageError(fmt::format(
+      "{}: this model does not tell the standard errors of its estimates before the runs, of which "
+      "a plan is made; `run` the campaign instead",
+      options.file.string()));
 }
 
 /// What is to be allocated. @throws UsageError if it cannot be, or no allocation is better.

@@ -452,7 +452,8 @@ Review review_of_worst(std::optional<RunValue> worst) {
 TEST_F(ReplayedSpectra, AreOfTheWorstRun) {
   const Store store = store_with(test::quick_campaign(3));
   const RunSpectra spectra =
-      worst_run_spectra(store, review_of_worst(RunValue{RunIndex{2}, 0.9}), test::never_stopped);
+      worst_run_spectra(store, review_of_worst(RunValue{RunIndex{2}, 0.9}), test::never_stopped)
+          .value();
   EXPECT_EQ(spectra.run, RunIndex{2});
   const RunSpectra own = replayed_spectra(Replay(store), RunIndex{2}, test::never_stopped);
   ASSERT_EQ(spectra.sessions.size(), 11U);
@@ -463,11 +464,11 @@ TEST_F(ReplayedSpectra, SayWhyThereAreNone) {
   { const Store store = store_with(test::quick_campaign(1)); }
   test::change(file(), "UPDATE campaign SET model_version = 'hardy2013-2'");
   const Store store = Store::open_read_only(file());
-  EXPECT_THAT(worst_run_spectra(store, review_of_worst({}), test::never_stopped).reasons,
+  EXPECT_THAT(worst_run_spectra(store, review_of_worst({}), test::never_stopped)->reasons,
               ElementsAre("No run has an estimate, or no quantity an objective."));
   EXPECT_THAT(
       worst_run_spectra(store, review_of_worst(RunValue{RunIndex{0}, 0.9}), test::never_stopped)
-          .reasons,
+          ->reasons,
       ElementsAre("Run 0 cannot be replayed: model_version = hardy2013-2 (must be "
                   "hardy2013-11, the model of this program: others compute other bits)."));
 }

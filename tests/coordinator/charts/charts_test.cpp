@@ -152,6 +152,28 @@ TEST(Chart, WithoutDataSaysSo) {
   EXPECT_THAT(svg_of(histogram(), SvgUse::embedded), Not(HasSubstr("no data")));
 }
 
+// Half of `−5×10⁵`, in DejaVu Sans of 13 pixels, is 25.9 wide.
+TEST(Chart, CutsNoLabelOfATick) {
+  Chart chart = curve({{-1e6, 0.0}, {1.2e6, 1.0}}, Scale::linear);
+  chart.x.from = chart.x.to = std::nullopt;
+  const std::string svg = svg_of(chart, SvgUse::plain);
+  const std::vector<std::string> labels =
+      test::tags_of(svg, "<text[^>]*text-anchor=\"middle\">[^<]*10[⁵⁶]");
+  ASSERT_THAT(labels, Not(IsEmpty()));
+  double end = 0.0;
+  for (const std::string& label : labels) {
+    const double middle = test::number_of(label, "x");
+    EXPECT_GE(middle - 25.9, end) << label;
+    end = middle + 25.9;
+  }
+  EXPECT_LE(end, 480.0);
+}
+
+TEST(Chart, HasNoLineOfOnePoint) {
+  EXPECT_THAT(svg_of(curve({{1.0, 0.5}}, Scale::logarithmic), SvgUse::plain),
+              HasSubstr(">no data</text>"));
+}
+
 TEST(BarChart, HasValuesAsText) {
   const BarChart chart{.text = {.id = "budget", .title = "Budget", .description = ""},
                        .x = {.label = "m/s²", .scale = Scale::logarithmic},

@@ -145,6 +145,13 @@ TEST(ChosenWorkers, HaveEachWorkerOnceOverAllPages) {
   }
 }
 
+TEST(WorkersPage, GroupsTheDigitsOfRates) {
+  ServiceSnapshot snapshot{.workers = test::many_workers(1)};
+  snapshot.workers[0].status.set_num_results(4000);
+  snapshot.workers[0].registered_s = 7200.0;
+  EXPECT_THAT(workers_page(snapshot, {}, {}).live, HasSubstr("<td>4,000</td><td>2,000</td>"));
+}
+
 TEST(ChosenWorkers, AreSortedByStateAndThroughput) {
   std::vector<RegisteredWorker> workers = test::many_workers(4);
   workers[2].activity = WorkerActivity::quarantined;

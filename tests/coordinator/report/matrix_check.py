@@ -26,7 +26,7 @@ except ImportError:
     sys.exit(1 if "CI" in os.environ else 77)
 
 SHORTEN = {"orbits": "2", "sample_period_s": "1", "runs": "64"}
-COLUMNS = "id requirement limit draws without exceedances allowed bound margin verdict worst run".split()
+COLUMNS = "id requirement verdict limit draws without exceedances allowed bound margin worst run".split()
 
 
 class Matrix(html.parser.HTMLParser):

@@ -145,8 +145,33 @@ TEST(ErrorTable, NamesNoBiasOfErrorsThatAreTooSkewed) {
     error.skewness = parameter == Parameter::k2c ? -6.9 : 0.5;
   }
   EXPECT_THAT(error_text(review_of(MicroscopeCampaign(), statistics)),
-              ::testing::AllOf(HasSubstr("the bias\n  differs from 0 of a_c12."),
-                               HasSubstr("Too skewed to tell from 100 runs: K2c/K1c².")));
+              ::testing::AllOf(HasSubstr("too skewed for\n  100 runs: K2c/K1c². Of all 10"),
+                               HasSubstr("the bias differs from 0 of\n  a_c12.")));
+}
+
+// √100/5 + 2√(6/100) = 2.49.
+TEST(IntervalTable, NamesMeansThatAreTooSkewed) {
+  CampaignStatistics statistics = paper_statistics(100);
+  statistics.accuracy[index(Parameter::a_c12)].skewness = 2.48;
+  const auto text = [&] { return interval_text(review_of(MicroscopeCampaign(), statistics)); };
+  EXPECT_THAT(text(), ::testing::Not(HasSubstr("skewed")));
+  statistics.accuracy[index(Parameter::k2c)].skewness = 2.5;
+  EXPECT_THAT(text(), HasSubstr("mean, std: too skewed for intervals from 100 runs, which may "
+                                "cover less than 95\n  %: K2c/K1c²\n"));
+}
+
+// Resamples without the far ones have no deviation, which values that differ have.
+TEST(IntervalTable, HasNoDeviationThatMayBeZero) {
+  CampaignStatistics statistics = paper_statistics(300);
+  std::optional<Interval>& interval =
+      statistics.accuracy[index(Parameter::a_c11_delta_x)].deviation_interval;
+  interval = Interval{.lower = 1e-9, .upper = 9e-9, .confidence = 0.95};
+  const auto line = [&] {
+    return lines_of(interval_text(review_of(MicroscopeCampaign(), statistics))).at(5);
+  };
+  EXPECT_THAT(line(), HasSubstr("│    7.30    1.00    9.00 │"));
+  interval->lower = 0.0;
+  EXPECT_THAT(line(), HasSubstr("│    7.30       -       - │"));
 }
 
 // A rule that stops where errors are small makes the worst one too small.

@@ -237,6 +237,13 @@ TEST_F(ReviewSummary, NamesWhatDrivesTheWorstError) {
       sentences_of(review)[3],
       HasSubstr("; most of it is a bias that all runs share, −90 nm with a standard deviation "
                 "of 4 nm, which follows from the campaign and not from its draws."));
+  review.results.statistics.num_estimated = 2;  // Then 4 nm are too few to tell, as with one run.
+  of_delta_x.error.standard_deviation = 4e-8;
+  EXPECT_THAT(sentences_of(review)[3], Not(HasSubstr("bias")));
+  review.results.statistics.num_estimated = 1;
+  of_delta_x.error.standard_deviation = 0.0;
+  EXPECT_THAT(sentences_of(review)[3], Not(HasSubstr("bias")));
+  review.results.statistics.num_estimated = 100;
   of_delta_x.error = error;
   EXPECT_THAT(
       sentences_of(review)[3],

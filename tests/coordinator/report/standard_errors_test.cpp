@@ -77,7 +77,10 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
                         "a_c12 +1e-4 rad +0.900 .* +3.30 +0.632 .* +60.0 +14.7 +94.7"));
   const std::string svg = svg_of(*pull_overview(test::schema(), statistics), SvgUse::embedded);
   EXPECT_EQ(test::malformed_part(svg), "");
-  EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law")));
+  EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law"),
+                         HasSubstr("dotted: ±1.96<")));
+  EXPECT_EQ(test::tags_of(svg, "stroke-dasharray=\"2 3\"").size(),
+            2 * statistics.quantities.size());
 }
 
 TEST(StandardErrors, HaveNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {

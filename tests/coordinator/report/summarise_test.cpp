@@ -192,9 +192,11 @@ RunResult run_with(std::uint64_t run, double error) {
 
 double error_at(std::uint64_t run) { return std::ldexp(std::sin(static_cast<double>(run)), -3); }
 
+// Fewer than two points are no line.
 TEST(ConvergenceCounts, AscendFromFiveToAllRuns) {
   EXPECT_TRUE(convergence_counts(0).empty());
-  EXPECT_THAT(convergence_counts(3), ElementsAre(3));
+  EXPECT_THAT(convergence_counts(3), ElementsAre(1, 2, 3));
+  EXPECT_THAT(convergence_counts(5), ElementsAre(1, 2, 3, 4, 5));
   EXPECT_THAT(convergence_counts(7), ElementsAre(5, 6, 7));
   const std::vector<std::uint64_t> counts = convergence_counts(1'000'000);
   EXPECT_EQ(counts.size(), 41U);
