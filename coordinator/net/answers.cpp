@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <stdlib.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -124,9 +125,12 @@ std::uint64_t require_space(const Order& order, const std::filesystem::path& dat
 std::unique_ptr<wire::UnnamedFile> make_unnamed_file(const std::filesystem::path& directory) {
   mkdir(directory.c_str(), S_IRWXU);  // If that fails, so does what follows.
   std::string name = (directory / "output-XXXXXX").string();
-  auto file = std::make_unique<wire::UnnamedFile>(mkostemp(name.data(), O_CLOEXEC));
+  const int descriptor = mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor < 0) {
+    throw Error(fmt::format("{}: {}", directory.string(), std::generic_category().message(errno)));
+  }
   unlink(name.c_str());
-  return file;
+  return std::make_unique<wire::UnnamedFile>(descriptor);
 }
 
 bool limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) {
@@ -270,9 +274,9 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
   const auto compute = [order, id, is_cancelled]() -> Computed {
     const CopyRemover remover{order.copy};
     std::unique_ptr<wire::UnnamedFile> file = make_unnamed_file(order.directory);
-    const std::unique_ptr<wire::UnnamedFile> errors = make_unnamed_file(order.directory);
-    const int exit_code = exit_code_of(run(order, *file, *errors, *is_cancelled), order);
-    const std::string error_text = errors->read(0, wire::reply_text_size_max);
+    const wire::UnnamedFile errors(memfd_create("errors", MFD_CLOEXEC));  // A full disk is named.
+    const int exit_code = exit_code_of(run(order, *file, errors, *is_cancelled), order);
+    const std::string error_text = errors.read(0, wire::reply_text_size_max);
     if (order.copy && exit_code != 0) throw Error(failure_text(error_text));
     if (order.copy) {
       file = std::make_unique<wire::UnnamedFile>(open(order.copy->c_str(), O_RDONLY | O_CLOEXEC));

@@ -332,7 +332,8 @@ h2 { font-size: 1.15rem; margin: 1.6rem 0 0.4rem; }
 thead th { color: var(--faint); }
 .long { display: inline-block; white-space: normal; min-width: 16rem; max-width: 46rem;
   overflow-wrap: anywhere; }
-progress { width: min(8rem, 12vw); height: 0.8rem; accent-color: var(--chart-first); vertical-align: middle; }
+progress { width: min(8rem, 12vw); height: 0.8rem; accent-color: var(--chart-first);
+  vertical-align: middle; }
 .large progress { width: min(28rem, 60vw); height: 1.1rem; }
 dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(9rem, 1fr)); gap: 0.6rem;
   margin: 0.8rem 0; }

@@ -167,15 +167,14 @@ Table standard_error_table(const ResultSchema& schema, const StandardErrorStatis
              [&](auto i) { return figure_cell(share_within(all[i]), percent_scale); });
   const bool have_ratios =
       std::ranges::all_of(all, [](const auto& of) { return of.squared_ratio.has_value(); });
-  const auto with_remark = [&]() -> Table& {
-    if (!have_ratios) table.notes.emplace_back("where σ is 0, there is no ratio and no error within");
-    return table;
-  };
-  if (!have_intervals) return with_remark();
+  if (!have_ratios) {
+    table.notes.emplace_back("where σ is 0, there is no ratio and no error within");
+  }
+  if (!have_intervals) return table;
   add_ends(table, {"from", false, 9, within}, {"to", false, 9, within},
            [&](auto i) { return IntervalAndScale(all[i].within, percent_scale); });
   if (have_ratio_errors) {
-    table.notes.back() +=
+    table.notes.front() +=
         "; ±: its standard deviation; from, to: 95 % interval, which one honest one in twenty "
         "misses";
   } else {

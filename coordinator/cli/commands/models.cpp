@@ -175,8 +175,8 @@ struct Outlook {
   std::uint64_t num_draws = 0;  ///< Of these.
   std::uint64_t num_without_draw = 0;
   double batch_s = 0.0;
-  std::size_t num_simulated = 0;  ///< Runs; 0 if they take too long.
-  MissingEstimates missing;       ///< Of these.
+  std::size_t num_simulated = 0;                       ///< Runs; 0 if they take too long.
+  MissingEstimates missing;                            ///< Of these.
   std::vector<DefinitionDifference> differences = {};  ///< From the example.
 };
 

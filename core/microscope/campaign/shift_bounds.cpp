@@ -272,7 +272,7 @@ void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
   // the residual with K2c, and with K2d that of the gradient in Γ_App,dx.
   const double twice_bias_m_s2 = 2.0 * differential_bias_max_m_s2;
   const double gradient_line_m_s2 =
-      gradient_line_s2_ * std::hypot(sum[a_c11_delta_x], sum[a_c11_delta_z]);
+      gradient_line_s2_ * std::sqrt(square(sum[a_c11_delta_x]) + square(sum[a_c11_delta_z]));
   const double of_residual = twice_bias_m_s2 * sum[k2c] * health.residual_m_s2;
   const double of_known =
       twice_bias_m_s2 * (sum[k2c] * known_line_m_s2_ + sum[k2d] * gradient_line_m_s2);

@@ -100,8 +100,11 @@ struct Probe {
 /// The first runs that have an instrument, with noise and the loops of the campaign.
 std::vector<Probe> probes_of(const MicroscopeCampaign& campaign,
                              const std::vector<RunIndex>& runs) {
+  // One by one a run takes as long as a batch, a second or more.
+  constexpr std::size_t one_by_one_max = 4;
+  const std::size_t num_max = campaign.scenario.has_plain_loops() ? batch_lanes : one_by_one_max;
   std::vector<RunRequest> requests;
-  for (std::size_t i = 0; i < std::min(runs.size(), batch_lanes); ++i) {
+  for (std::size_t i = 0; i < std::min(runs.size(), num_max); ++i) {
     requests.push_back({runs[i], campaign.table_values(runs[i])});
   }
   const RunPlan plan(campaign, joint_method);

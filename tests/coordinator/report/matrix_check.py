@@ -173,7 +173,7 @@ def check(programs, folder):
             stdout=subprocess.PIPE, check=False, text=True).stdout
         matrix = Matrix()
         matrix.feed(report)
-        rows = [row for row in matrix.rows if len(row) == len(COLUMNS) and row[2][1] is not None]
+        rows = [row for row in matrix.rows if len(row) == len(COLUMNS) and row[COLUMNS.index("limit")][1] is not None]
         if len(rows) != len(requirements):
             problems.append(f"{len(rows)} rows (must be {len(requirements)})")
         for row, requirement in zip(rows, requirements):

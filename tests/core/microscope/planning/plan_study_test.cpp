@@ -322,14 +322,15 @@ TEST(PlanStudy, ProbesTheLoopsOfTheCampaign) {
   for (MicroscopeCampaign* of : {&campaign, &slow, &drifting}) {
     of->scenario.sensor.range_m_s2 = std::sqrt(nominal_m_s2 * slow_m_s2);
     const auto study = study_plan(*of);
-    const std::vector<PlanLoss> losses = study->bound(study->scope().num_steps).losses;
+    const PlanBound bound = study->bound(study->scope().num_steps);
+    const std::vector<PlanLoss>& losses = bound.losses;
     const Loss loss = RunPlan(*of).simulate(RunIndex{0}, {}).loss;
     const bool is_lost = loss.cause == static_cast<std::uint32_t>(LossCause::saturation);
     EXPECT_EQ(is_lost, of != &slow);
     // Noise takes some of the probed runs beyond it, and all where this run is.
     const auto saturation = std::ranges::find(losses, "saturation", &PlanLoss::cause);
     const std::size_t num_lost = saturation == losses.end() ? 0 : saturation->num_runs;
-    EXPECT_EQ(num_lost == batch_lanes, is_lost) << num_lost;
+    EXPECT_EQ(num_lost == study->scope().num_probed, is_lost) << num_lost;
   }
 }
 
