@@ -73,7 +73,7 @@ class ColumnChange : public test::VerificationTest {
       campaign_.environment_table.push_back(
           {.time_s = time_s, .linear_m_s2 = {1e-8, 2e-8, 3e-8}, .angular_rad_s2 = {0, 0, 0}});
     }
-    campaign_.scenario.noise.thrust_asd_m_s2 = 1.5e-8;  // Loud enough for warnings.
+    campaign_.scenario.noise.thrust_asd_m_s2 = 8e-9;  // Loud enough for warnings.
     campaign_.dispersions[0].law = Law::table;
     campaign_.dispersions[0].file = "table.csv";
     campaign_.dispersions[0].column = "k";
