@@ -114,8 +114,7 @@ std::string loops_note(const Scenario& scenario) {
   const AxisMargins gain = *std::ranges::min_element(of_axes, {}, by_gain);
   const AxisMargins phase = *std::ranges::min_element(of_axes, {}, by_phase);
   const std::string_view of_realism =
-      scenario.realism ? "; errors and probes have what [realism] adds, standard errors do not"
-                       : "";
+      scenario.realism ? "; errors have what [realism] adds, and standard errors do not" : "";
   return fmt::format(
       "loops that are not the paper's: with a perfect instrument, the least margin of gain is a "
       "factor of {:.3g} ({}), that of phase {:.3g}° ({}); each run has its own, gain_margin and "

@@ -154,6 +154,20 @@ void expect_error(const MicroscopeCampaign& campaign, double budget) {
   EXPECT_NEAR(calibrated.values[uncorrected], budget, 0.01 * std::abs(budget));
 }
 
+// What a fit would state is of noise of scale 1, which is not there.
+TEST(EpTest, HasNoStandardErrorsWithoutNoise) {
+  EstimationMethodInfo method = no_calibration;
+  method.has_standard_errors = true;
+  MicroscopeCampaign campaign = circular_campaign();
+  const RunResult quiet = RunPlan(campaign, method).simulate(RunIndex{0}, {});
+  EXPECT_EQ(quiet.estimate.size(), num_parameters + num_test_parameters);
+  EXPECT_TRUE(quiet.standard_error.empty() && quiet.correlations.empty() && quiet.fit.empty());
+  campaign.scenario.noise.scale = 1.0;
+  const RunResult noisy = RunPlan(campaign, method).simulate(RunIndex{0}, {});
+  EXPECT_EQ(noisy.standard_error.size(), num_parameters + 1);
+  EXPECT_GE(noisy.fit.size(), 2U);
+}
+
 /// Leaves ten windows within two percent of the record, with noise in every signal. The sums have
 /// no digit left of what a cubic polynomial does not take.
 void leave_a_stretch(SessionPhasors& record) {
