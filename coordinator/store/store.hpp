@@ -271,8 +271,8 @@ class Store {
   /// their bits are.
   [[nodiscard]] std::vector<std::string> parameter_differences(const Campaign& campaign) const;
   /// What `summary`, `statistic`, `budget_entry` and `run_warning` have other than
-  /// write_statistics() would store, a line each; only the first two in a file that was made before
-  /// there were the others.
+  /// write_statistics() would store, a line each; only the first two in a file of another model,
+  /// whose rules the others follow, or one that was made before there were the others.
   /// @param summary  As it is stored; its digests and the runs that are given up are not compared.
   [[nodiscard]] std::vector<std::string> statistic_differences(
       const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget,

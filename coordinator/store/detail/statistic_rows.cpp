@@ -341,9 +341,11 @@ std::vector<std::string> Store::statistic_differences(const CampaignStatistics& 
       ComparedTable{.name = "run_warning",
                     .row_name = "effect || ' on ' || parameter || ' in run ' || run_index",
                     .tolerance = rounding}};
+  const bool has_same_rules =
+      has_own_budget(impl_->database) && model_version() == model().version();
   return table_differences(
-      impl_->database, impl_->kind,
-      std::span(tables).first(has_own_budget(impl_->database) ? 4 : 2), [&](Database& expected) {
+      impl_->database, impl_->kind, std::span(tables).first(has_same_rules ? 4 : 2),
+      [&](Database& expected) {
         replace_all(expected, schema(), statistics, budget, warnings);
         if (!summary) return;
         detail::replace_summary(expected, statistics, summary->num_given_up, summary->digests);
