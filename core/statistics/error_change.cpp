@@ -32,41 +32,50 @@ std::vector<double> distances(std::span<const double> values, double centre) {
   return distances;
 }
 
-/// Of |x − mean| − s (x − mean), s being the mean sign of x − mean: the same mean as |x − mean|
-/// has, and the scatter that this mean has, as the mean of a skew law moves it.
-Moments scale_moments(std::span<const double> errors) {
+/// Mean sign s of x − mean: where x − mean are many and small, and few and large, the mean of
+/// |x − mean| depends on where the mean is.
+double mean_sign(std::span<const double> errors) {
   const double mean = mean_of(errors, {});
-  const std::vector<double> deviations = distances(errors, mean);
-  Moments scale = moments(deviations);
-  CompensatedSum signs, signed_squares;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const double deviation = errors[i] - mean;
-    if (deviation != 0.0) signs.add(std::copysign(1.0, deviation));
-    signed_squares.add(deviation * deviations[i]);
+  CompensatedSum signs;
+  for (const double error : errors) {
+    if (error != mean) signs.add(std::copysign(1.0, error - mean));
   }
-  const auto n = static_cast<double>(scale.count);
-  const double sign = signs.value() / n;
-  const double covariance = signed_squares.value() / (n - 1.0);
-  const double deviation = moments(errors).standard_deviation;
-  const double variance = scale.standard_deviation * scale.standard_deviation +
-                          sign * (sign * deviation * deviation - 2.0 * covariance);
-  scale.standard_deviation = std::sqrt(std::max(variance, 0.0));
-  return scale;
+  return signs.value() / static_cast<double>(errors.size());
 }
 
-/// What a pair has of |error − mean of its campaign| more in the second campaign. What rounding
-/// makes of equal distances is 0.
-std::vector<double> deviation_differences(std::span<const double> first,
-                                          std::span<const double> second) {
-  const double mean_first = mean_of(first, {}), mean_second = mean_of(second, {});
-  std::vector<double> differences(first.size());
+/// |x − mean| − s (x − mean): the same mean as |x − mean| has, and the scatter that this mean has,
+/// as the mean of a skew law moves it.
+std::vector<double> scale_parts(std::span<const double> errors, double sign) {
+  const double mean = mean_of(errors, {});
+  std::vector<double> parts = distances(errors, mean);
+  for (std::size_t i = 0; i < parts.size(); ++i) parts[i] -= sign * (errors[i] - mean);
+  return parts;
+}
+
+Moments scale_moments(std::span<const double> errors) {
+  return moments(scale_parts(errors, mean_sign(errors)));
+}
+
+/// The mean sign of both campaigns of pairs. Each with its own would differ by chance, in pairs
+/// that agree by more than the pairs do.
+double mean_sign_of_pairs(std::span<const double> first, std::span<const double> second) {
+  return 0.5 * (mean_sign(first) + mean_sign(second));
+}
+
+/// What a pair has more of the scale in the second campaign. What rounding makes of equal parts is
+/// 0.
+std::vector<double> scale_differences(std::span<const double> first,
+                                      std::span<const double> second) {
+  const double sign = mean_sign_of_pairs(first, second);
+  const std::vector<double> of_first = scale_parts(first, sign);
+  std::vector<double> differences = scale_parts(second, sign);
+  const double of_means = std::max(std::abs(mean_of(first, {})), std::abs(mean_of(second, {})));
   for (std::size_t i = 0; i < first.size(); ++i) {
-    const double difference = std::abs(second[i] - mean_second) - std::abs(first[i] - mean_first);
-    const double largest = std::max(
-        {std::abs(first[i]), std::abs(second[i]), std::abs(mean_first), std::abs(mean_second)});
+    differences[i] -= of_first[i];
+    const double largest = std::max({std::abs(first[i]), std::abs(second[i]), of_means});
     const bool is_rounding =
-        std::abs(difference) <= 8.0 * std::numeric_limits<double>::epsilon() * largest;
-    differences[i] = is_rounding ? 0.0 : difference;
+        std::abs(differences[i]) <= 16.0 * std::numeric_limits<double>::epsilon() * largest;
+    if (is_rounding) differences[i] = 0.0;
   }
   return differences;
 }
@@ -149,7 +158,7 @@ ChangePValues compare_paired_errors(std::span<const double> first, std::span<con
     if (is_second_beyond && !is_first_beyond) ++num_only_second;
   }
   return {.location = paired_p_value(differences),
-          .scale = paired_p_value(deviation_differences(first, second)),
+          .scale = paired_p_value(scale_differences(first, second)),
           .tail = sign_test_p_value(num_only_first, num_only_second)};
 }
 
@@ -172,12 +181,12 @@ std::optional<double> fixed_point(double slope, const Next& next) {
   return factor;
 }
 
-/// Distances from the mean, in units of their own mean; none if there is no scatter.
-std::vector<double> relative_distances(std::span<const double> values) {
-  std::vector<double> relative = distances(values, mean_of(values, {}));
+/// scale_parts() in units of their own mean; none if there is no scatter.
+std::vector<double> relative_scale_parts(std::span<const double> errors, double sign) {
+  std::vector<double> relative = scale_parts(errors, sign);
   const double mean = moments(relative).mean;
   if (!(mean > 0.0)) return {};
-  for (double& distance : relative) distance /= mean;
+  for (double& part : relative) part /= mean;
   return relative;
 }
 
@@ -203,10 +212,10 @@ std::optional<double> smallest_scale_factor(std::span<const double> first,
   });
 }
 
-// f − 1 = (z + z') s(f)/(μ √n), with s(f) the deviation of f b − a, a and b being the distances of
-// a pair from the means, b brought to the mean μ of a: what has changed is not of the scatter of
-// pairs. Of few pairs both tests must find it; Wilcoxon's needs no more than 1/0.864 times the
-// pairs of Student's t, whatever the law.
+// f − 1 = (z + z') s(f)/(μ √n), with s(f) the deviation of f b − a, a and b being the parts of the
+// scale of a pair, b brought to the mean μ of a: what has changed is not of the scatter of pairs.
+// Of few pairs both tests must find it; Wilcoxon's needs no more than 1/0.864 times the pairs of
+// Student's t, whatever the law.
 std::optional<double> smallest_paired_scale_factor(std::span<const double> first,
                                                    std::span<const double> second,
                                                    std::size_t num_parameters) {
@@ -214,7 +223,9 @@ std::optional<double> smallest_paired_scale_factor(std::span<const double> first
   if (first.size() < num_pairs_min) return std::nullopt;
   const double efficiency = first.size() < num_welch_min ? 0.864 : 1.0;
   const auto n = static_cast<double>(first.size());
-  const std::vector<double> a = relative_distances(first), b = relative_distances(second);
+  const double sign = mean_sign_of_pairs(first, second);
+  const std::vector<double> a = relative_scale_parts(first, sign);
+  const std::vector<double> b = relative_scale_parts(second, sign);
   if (a.empty() || b.empty()) return std::nullopt;
   const double scatter = moments(b).standard_deviation, of_a = moments(a).standard_deviation;
   std::vector<double> differences(a.size());

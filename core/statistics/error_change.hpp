@@ -40,9 +40,9 @@ struct ChangePValues {
                                            std::span<const double> second);
 
 /// Of campaigns of the same draws, run by run: Student's t of the differences of the errors and of
-/// their distances from the mean of their campaign, below num_welch_min pairs the larger p-value of
-/// it and Wilcoxon's signed ranks; and the sign test of the pairs of which one error is in the tail
-/// (McNemar).
+/// their distances from the mean of their campaign, with the scatter that holds for skew laws,
+/// below num_welch_min pairs the larger p-value of it and Wilcoxon's signed ranks; and the sign
+/// test of the pairs of which one error is in the tail (McNemar).
 /// @pre As many errors in both, one at least.
 [[nodiscard]] ChangePValues compare_paired_errors(std::span<const double> first,
                                                   std::span<const double> second);
