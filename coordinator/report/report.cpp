@@ -226,6 +226,14 @@ Json standard_errors_of(const ResultSchema& schema, const StandardErrorStatistic
           {"fit", array_of(statistics.fit, of_session)}};
 }
 
+Json json_of_all(const RequirementAnswer& answer) {
+  if (!answer.of_all) return nullptr;
+  return {{"num_runs", answer.of_all->num_runs},
+          {"num_exceedances", answer.of_all->num_exceedances},
+          {"exceedance_interval", answer.exceedance_of_all()},
+          {"is_opposed", answer.is_opposed()}};
+}
+
 Json json_of(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Requirement& requirement = answer.requirement;
@@ -242,6 +250,7 @@ Json json_of(const RequirementAnswer& answer) {
           {"num_exceedances_allowed",
            check.bound_order > 0 ? Json(check.bound_order - 1) : Json(nullptr)},
           {"exceedance_bounds", check.exceedance},
+          {"all_runs", json_of_all(answer)},
           {"tolerance_bound", answer.is_joint() ? Json(nullptr) : Json(answer.bound)},
           {"num_runs_at_best", check.num_runs_at_best},
           {"num_runs_at_this_rate", check.num_runs_at_this_rate}};

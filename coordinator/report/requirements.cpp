@@ -9,6 +9,7 @@
 
 #include "core/error.hpp"
 #include "core/result_rules.hpp"
+#include "core/statistics/interval.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -67,9 +68,10 @@ std::string count_lines(const RequirementAnswer& answer) {
     text = fmt::format("{}; {}\n", counts,
                        bounds_text(answer.requirement, *check.exceedance, check.verdict));
   }
-  return text + missing_lines(answer) +
-         fmt::format("{}     {} of all draws\n", is_joint ? "Required" : "Allowed ",
-                     given_percent(is_joint ? required : 1.0 - required));
+  text += missing_lines(answer);
+  if (answer.of_all) text += fmt::format("{:{}}{}\n", "", margin, text_of_all(answer));
+  return text + fmt::format("{}     {} of all draws\n", is_joint ? "Required" : "Allowed ",
+                            given_percent(is_joint ? required : 1.0 - required));
 }
 
 // Tables may show the quantity in another unit than that of the requirement.
@@ -87,7 +89,7 @@ std::string statement_line(const StatedRequirement& stated) {
 
 std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
-  if (answer.is_joint() || answer.num_later > 0) return "";
+  if (answer.is_joint() || answer.of_all) return "";
   if (!answer.bound) {
     return fmt::format(
         "Bound        none of {}, for {} with {}\n",
@@ -164,14 +166,45 @@ std::optional<double> RequirementAnswer::relative_margin() const {
   return 1.0 - *bound / limit;
 }
 
+Interval RequirementAnswer::exceedance_of_all() const {
+  PROOFMASS_EXPECT(of_all.has_value());
+  return probability_interval(static_cast<double>(of_all->num_exceedances),
+                              static_cast<double>(of_all->num_runs), default_confidence);
+}
+
+bool RequirementAnswer::is_opposed() const {
+  if (!of_all) return false;
+  const Interval exceedance = exceedance_of_all();
+  const double allowed = 1.0 - requirement.tolerance.coverage;
+  return check.verdict == RequirementVerdict::met ? exceedance.lower > allowed
+                                                  : exceedance.upper < allowed;
+}
+
 std::string rule_text(const RequirementAnswer& answer) {
   if (answer.check.is_of_fixed_size) {
     const std::string later =
-        answer.num_later > 0 ? fmt::format("; {} more since", answer.num_later) : std::string();
+        answer.of_all
+            ? fmt::format("; {} more since", answer.of_all->num_runs - answer.check.num_runs)
+            : std::string();
     return fmt::format("{}, a number fixed before the first result{}",
                        counted(answer.check.num_runs, "draw"), later);
   }
   return "sequential: holds however often one looks and goes on";
+}
+
+std::string text_of_all(const RequirementAnswer& answer) {
+  const ExceedanceCount& all = answer.of_all.value();
+  Interval interval = answer.exceedance_of_all();
+  if (answer.is_joint()) {
+    interval = {.lower = 1.0 - interval.upper,
+                .upper = 1.0 - interval.lower,
+                .confidence = interval.confidence};
+  }
+  return fmt::format(
+      "{} of all {} runs; {} of all draws, with {}{}",
+      answer.is_joint() ? all.num_runs - all.num_exceedances : all.num_exceedances, all.num_runs,
+      interval_percent(interval), given_percent(interval.confidence),
+      answer.is_opposed() ? ": they speak against this answer, which more runs may change" : "");
 }
 
 std::string_view name_of(RequirementVerdict verdict) {
@@ -303,7 +336,7 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
     }
     answer.is_of_error = !answer.is_joint() && answer.requirement.parameter < objectives.size();
     rows_.push_back(
-        {.answer = answer, .exceedances = Exceedances(answer.requirement, objectives, budget)});
+        {.answer = answer, .of_all = {Exceedances(answer.requirement, objectives, budget)}});
   }
 }
 
@@ -313,15 +346,15 @@ void VerificationMatrix::add(const RunResult& result) {
       result.run.value == *num_fixed_) {
     missing_of_fixed_ = missing_;
     missing_of_fixed_.num_given_up = 0;
-    for (Row& row : rows_) row.of_fixed = row.exceedances;
+    for (Row& row : rows_) row.of_fixed = row.of_all;
   }
   ++num_runs_;
   missing_.add(result);
   if (!result.is_completed()) return;
   for (Row& row : rows_) {
-    const double value = row.exceedances.add(result);
+    const double value = row.of_all.exceedances.add(result);
     if (!row.answer.is_of_error) row.values.push_back(value);
-    std::optional<RunValue>& worst = row.answer.worst;
+    std::optional<RunValue>& worst = row.of_all.worst;
     if (!worst || value > worst->value) worst = {.run = result.run, .value = value};
   }
 }
@@ -331,8 +364,9 @@ void VerificationMatrix::end_results() {
   have_results_ended_ = true;
   for (Row& row : rows_) {
     row.answer.missing = missing_;
+    row.answer.worst = row.of_all.worst;
     row.answer.check =
-        check_requirement(row.answer.requirement, row.exceedances.of(num_runs_), num_fixed_);
+        check_requirement(row.answer.requirement, row.of_all.exceedances.of(num_runs_), num_fixed_);
     if (row.of_fixed) keep_fixed_verdict(row);
     std::ranges::sort(row.values);
     row.set_bound(std::exchange(row.values, {}));
@@ -343,15 +377,16 @@ void VerificationMatrix::keep_fixed_verdict(Row& row) const {
   RequirementAnswer& answer = row.answer;
   if (answer.check.verdict != RequirementVerdict::undecided) return;
   const RequirementCheck of_fixed =
-      check_requirement(answer.requirement, row.of_fixed->of(*num_fixed_), num_fixed_);
+      check_requirement(answer.requirement, row.of_fixed->exceedances.of(*num_fixed_), num_fixed_);
   if (of_fixed.verdict == RequirementVerdict::undecided) return;
   answer.check = of_fixed;
   answer.missing = missing_of_fixed_;
-  answer.num_later = num_runs_ - *num_fixed_;
+  answer.worst = row.of_fixed->worst;
+  answer.of_all = row.of_all.exceedances.of(num_runs_);
 }
 
 void VerificationMatrix::Row::set_bound(std::span<const double> ascending) {
-  if (answer.num_later > 0) return;
+  if (answer.of_all) return;
   // Runs without an estimate are the largest errors.
   const std::uint64_t order = answer.check.bound_order, num_missing = answer.missing.total();
   if (ascending.empty() || order <= num_missing) return;

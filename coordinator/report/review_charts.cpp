@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "coordinator/charts/chart.hpp"
@@ -21,15 +22,20 @@ double probability_to_meet(const RequirementCheck& check, double exceedance_prob
                           static_cast<double>(check.num_runs), exceedance_probability);
 }
 
-bool is_same(const Tolerance& a, const Tolerance& b) {
-  return std::pair(a.coverage, a.confidence) == std::pair(b.coverage, b.confidence);
+/// True if as many draws answer both with the same coverage and confidence.
+bool have_same_curve(const RequirementAnswer& a, const RequirementAnswer& b) {
+  const auto key = [](const RequirementAnswer& of) {
+    const Tolerance& tolerance = of.requirement.tolerance;
+    return std::tuple(tolerance.coverage, tolerance.confidence, of.check.num_runs);
+  };
+  return key(a) == key(b);
 }
 
-Curve observed_fractions(const Review& review, const Tolerance& tolerance) {
-  Curve markers{.name = "seen in this campaign", .ink = Ink::fourth, .look = Shape::diamond};
+Curve observed_fractions(const Review& review, const RequirementAnswer& first) {
+  Curve markers{.name = "seen in these draws", .ink = Ink::fourth, .look = Shape::diamond};
   for (const RequirementAnswer& row : review.matrix) {
     const RequirementCheck& check = row.check;
-    if (!is_same(row.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
+    if (!have_same_curve(row, first)) continue;
     const double seen =
         static_cast<double>(check.num_exceedances) / static_cast<double>(check.num_runs);
     markers.points.push_back({100.0 * seen, 100.0 * probability_to_meet(check, seen)});
@@ -48,7 +54,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                            std::size_t number) {
   const Tolerance& tolerance = first.requirement.tolerance;
   const RequirementCheck& check = first.check;
-  Curve seen = observed_fractions(review, tolerance);
+  Curve seen = observed_fractions(review, first);
   const double end = largest_shown(seen, tolerance);
   constexpr int num_points = 120;
   Curve line{.name = counted(check.num_runs, "draw")};
@@ -103,13 +109,12 @@ std::string strongest_sentence(const ResultSchema& schema, const Causes& causes)
 std::vector<Chart> characteristic_charts(const Review& review) {
   if (!review.why_not_independent.empty()) return {};
   std::vector<Chart> charts;
-  std::vector<Tolerance> shown;
+  std::vector<const RequirementAnswer*> shown;
   for (const RequirementAnswer& row : review.matrix) {
-    const Tolerance& tolerance = row.requirement.tolerance;
-    const bool is_shown =
-        std::ranges::any_of(shown, [&](const Tolerance& one) { return is_same(one, tolerance); });
+    const bool is_shown = std::ranges::any_of(
+        shown, [&](const RequirementAnswer* one) { return have_same_curve(*one, row); });
     if (is_shown || row.check.num_runs == 0) continue;
-    shown.push_back(tolerance);
+    shown.push_back(&row);
     charts.push_back(characteristic_chart(review, row, charts.size() + 1));
   }
   return charts;

@@ -222,7 +222,7 @@ Row matrix_cells(const RequirementAnswer& row) {
   const RequirementCheck& check = row.check;
   return {requirement_name(row),
           statement_of(row),
-          {name_of(check.verdict), tone_of(check.verdict)},
+          {name_of(check.verdict), row.is_opposed() ? Tone::open : tone_of(check.verdict)},
           value_cell(row, row.limit),
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
@@ -258,6 +258,12 @@ std::vector<std::string> matrix_notes(const Review& review) {
       "so many draws meet the requirement.",
       "Bound: with the confidence of the row, the stated part of all draws does not exceed it "
       "(order statistics, any law). Margin: (limit − bound) / limit."};
+  for (const RequirementAnswer& row : review.matrix) {
+    if (!row.of_all) continue;
+    notes.push_back(fmt::format(
+        "{} was decided by the first {} draws: {} {}.", requirement_name(row), row.check.num_runs,
+        row.is_joint() ? "all hold in" : "exceeding are", text_of_all(row)));
+  }
   if (std::ranges::any_of(review.matrix, &RequirementAnswer::is_joint)) {
     notes.emplace_back(
         "All objectives together: limit and bound are of the largest ratio of an |error| to its "

@@ -401,6 +401,7 @@ TEST_F(StoredRequirement, StandsOnceAFixedNumberHasMetIt) {
   store.commit(deliveries);
   store.extend(test::campaign_of(60), "");
   std::vector<Delivery> later = test::deliveries_of(59, 60);
+  later.front().result.estimate[index(Parameter::a_c12)] += 1.0;
   store.commit(later);
   const std::vector<std::string> texts{"a_c12 < 9e-4 for 95% with 95%",
                                        "a_c12 < 9e-4 for 99% with 95%"};
@@ -411,8 +412,34 @@ TEST_F(StoredRequirement, StandsOnceAFixedNumberHasMetIt) {
   EXPECT_EQ(rows[0].check.num_runs, 59U);
   EXPECT_EQ(rule_text(rows[0]), "59 draws, a number fixed before the first result; 1 more since");
   EXPECT_FALSE(rows[0].bound);
+  // The later one exceeds, and is the worst of all; the answer is of the others.
+  EXPECT_EQ(rows[0].worst->value, 0.0);
+  EXPECT_EQ(rows[0].of_all->num_exceedances, 1U);
+  EXPECT_FALSE(rows[0].is_opposed());
   EXPECT_EQ(rows[1].check.verdict, RequirementVerdict::undecided);
   EXPECT_EQ(rows[1].check.num_runs, 60U);
+}
+
+// Clopper and Pearson's interval of 10 in 75 by scipy.stats.beta: 6.58 to 23.16 %.
+TEST_F(StoredRequirement, SaysWhatRunsAfterTheAnswerSpeakAgainst) {
+  Store store = Store::create(file(), test::campaign_of(59), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 75);
+  for (Delivery& delivery : deliveries) {
+    delivery.result.estimate = delivery.result.truth;
+    const std::uint64_t run = delivery.result.run.value;
+    if (run >= 60 && run < 70) delivery.result.estimate[index(Parameter::a_c12)] += 1.0;
+  }
+  store.commit(std::span(deliveries).first(59));
+  store.extend(test::campaign_of(75), "");
+  store.commit(std::span(deliveries).subspan(59));
+  const std::vector<std::string> texts{"a_c12 < 9e-4 for 95% with 95%"};
+  const auto rows =
+      read_review(store, test::campaign_of(75), ReviewDepth::matrix, numbered_requirements(texts))
+          .matrix;
+  EXPECT_EQ(rows[0].check.verdict, RequirementVerdict::met);
+  EXPECT_EQ(text_of_all(rows[0]),
+            "10 of all 75 runs; 6.58 to 23.2 % of all draws, with 95 %: they speak against this "
+            "answer, which more runs may change");
 }
 
 TEST_F(StoredRequirement, IsSequentialWithAStopRule) {
