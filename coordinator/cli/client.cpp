@@ -36,8 +36,8 @@ constexpr double timeout_s_max = 86400.0;
 
 /// Declares --keys and --insecure-plain.
 void add_key_options(CLI::App& command, ClientConnectionConfig& connection) {
-  command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
-      ->type_name(wire::directory_type)
+  add_path(command, wire::directory_type, "--keys", connection.keys,
+           "Directory with client.key and coordinator.pub")
       ->envname("PROOFMASS_KEYS");
   command.add_flag("--insecure-plain", connection.is_plain_waived,
                    "Allow an address beyond this machine without keys");

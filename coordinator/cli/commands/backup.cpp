@@ -33,9 +33,7 @@ void add_backup(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<BackupOptions>(
       app, chosen, "backup", "Copy a database, even while it is written", back_up_database);
   add_database(command, options.database);
-  command.add_option("DESTINATION", options.destination, "File to make")
-      ->type_name(database_type)
-      ->required();
+  add_path(command, database_type, "DESTINATION", options.destination, "File to make")->required();
   add_json_flag(command, options.format);
 }
 

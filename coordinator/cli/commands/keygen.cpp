@@ -217,8 +217,8 @@ int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
 void add_keygen(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<KeygenOptions>(
       app, chosen, "keygen", "Make keys of a coordinator, workers, clients", make_keys);
-  command.add_option("DIRECTORY", options.directory, "Directory to make, or to add a key to")
-      ->type_name(wire::directory_type)
+  add_path(command, wire::directory_type, "DIRECTORY", options.directory,
+           "Directory to make, or to add a key to")
       ->required();
   command.add_option("--worker", options.worker, "Add a key of this name for a worker");
   command.add_option("--client", options.client, "Add a key of this name for a client");

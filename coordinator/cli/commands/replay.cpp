@@ -185,16 +185,11 @@ void add_replay(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<ReplayOptions>(
       app, chosen, "replay", "Simulate runs again, write their time series", replay_runs);
   add_database(command, options.database);
-  command.add_option("--run", options.run, "The run")
-      ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
-  command
-      .add_option("--worst", options.num_worst,
-                  "Instead the runs with the largest |error|\nbeside its objective")
-      ->check(wire::in_range(std::size_t{1}, num_worst_max));
-  command
-      .add_option("--output", options.output,
-                  "File, or directory for csv and --worst;\nby default nothing is written")
-      ->type_name(wire::file_type);
+  add_number(command, "--run", options.run, {0, num_runs_max - 1}, "The run");
+  add_number(command, "--worst", options.num_worst, {1, num_worst_max},
+             "Instead the runs with the largest |error|\nbeside its objective");
+  add_path(command, wire::file_type, "--output", options.output,
+           "File, or directory for csv and --worst;\nby default nothing is written");
   wire::add_choice(command, "--format", options.format, formats, "hdf5 by default");
   command.add_option("--session", options.sessions, "Write this session only; may be repeated")
       ->allow_extra_args(false);

@@ -20,7 +20,6 @@
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/name.hpp"
-#include "proto/command_line/option_checks.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
@@ -76,7 +75,7 @@ struct ControlOptions {
   ClientOptions client;
   ControlAction action = proto::CONTROL_ACTION_PAUSE;
   std::string campaign;
-  int priority = 0;  ///< For set_priority.
+  std::optional<int> priority;  ///< For set_priority.
 };
 
 int ask_for(const ClientOptions& client, const proto::RequestEnvelope& request,
@@ -92,7 +91,7 @@ int control_campaign(const ControlOptions& options) {
   proto::ControlRequest& control = *request.mutable_control();
   control.set_action(options.action);
   control.set_campaign(checked_campaign_name(options.campaign));
-  control.set_priority(options.priority);
+  control.set_priority(options.priority.value_or(0));
   return ask_for(
       options.client, request,
       {.name = wire::name_of(options.action), .kind = "campaign", .target = options.campaign});
@@ -105,8 +104,8 @@ void add_action(CLI::App& app, Command& chosen, ControlAction action,
   options.action = action;
   command.add_option("NAME", options.campaign, "Campaign")->required();
   if (action == proto::CONTROL_ACTION_SET_PRIORITY) {
-    command.add_option("PRIORITY", options.priority, "-100 to 100; higher ones are computed first")
-        ->check(wire::in_range(-wire::priority_max, wire::priority_max))
+    add_number(command, "PRIORITY", options.priority, {-wire::priority_max, wire::priority_max},
+               "-100 to 100; higher ones are computed first")
         ->required();
   }
   add_client_options(command, options.client);
@@ -322,8 +321,7 @@ void add_fetch(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<FetchOptions>(
       app, chosen, "fetch", "Copy a campaign's database from a coordinator", fetch_database);
   command.add_option("NAME", options.campaign, "Campaign")->required();
-  command.add_option("FILE", options.file, "File to make; NAME.db by default")
-      ->type_name(database_type);
+  add_path(command, database_type, "FILE", options.file, "File to make; NAME.db by default");
   add_client_options(command, options.client);
 }
 

@@ -23,7 +23,6 @@
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/option_checks.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -106,11 +105,8 @@ void add_submit(CLI::App& app, Command& chosen) {
       app, chosen, "submit", "Hand a campaign or more runs to a coordinator", submit_campaign);
   add_campaign_file(command, options.campaign_file);
   command.add_option("--name", options.name, "Name of the campaign; the one in FILE by default");
-  command
-      .add_option(
-          "--priority", options.priority,
-          "Higher priorities come first; by default 0, or\nunchanged if the campaign exists")
-      ->check(wire::in_range(-wire::priority_max, wire::priority_max));
+  add_number(command, "--priority", options.priority, {-wire::priority_max, wire::priority_max},
+             "Higher priorities come first; by default 0, or\nunchanged if the campaign exists");
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);
   add_override_options(command, options.overrides);

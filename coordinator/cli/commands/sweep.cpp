@@ -233,10 +233,8 @@ void add_sweep(CLI::App& app, Command& chosen) {
       ->required()
       ->take_all()
       ->allow_extra_args(false);
-  command
-      .add_option("--directory", options.directory,
-                  "Directory of the databases; by default FILE's\nstem with -sweep, here")
-      ->type_name(wire::directory_type);
+  add_path(command, wire::directory_type, "--directory", options.directory,
+           "Directory of the databases; by default FILE's\nstem with -sweep, here");
   add_run_options(command, options.run);
   add_json_flag(command, options.format);
 }

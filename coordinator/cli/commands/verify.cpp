@@ -45,8 +45,8 @@ VerifyOptions how_to_verify(const std::optional<double>& fraction) {
 
 CLI::Option* add_fraction(CLI::App& command, std::optional<double>& fraction,
                           const std::string& whose = "the runs") {
-  return command.add_option("--fraction", fraction, "Fraction of " + whose + " to simulate again")
-      ->check(wire::in_range(0.0, 1.0))
+  return add_number(command, "--fraction", fraction, {0.0, 1.0},
+                    "Fraction of " + whose + " to simulate again")
       ->default_str(fmt::format("{}", fraction_by_default));
 }
 
@@ -126,14 +126,12 @@ void add_verify(CLI::App& app, Command& chosen) {
 void add_publish(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<CheckedFileOptions>(
       app, chosen, "publish", "Write an archive to cite, or check one", publish_campaign);
-  command.add_option("FILE", options.file, "Database; with --check an archive")
-      ->type_name(wire::file_type)
+  add_path(command, wire::file_type, "FILE", options.file, "Database; with --check an archive")
       ->required();
   CLI::Option* const check =
       command.add_flag("--check", options.is_check, "Check an archive, simulate some runs again");
-  command
-      .add_option("--output", options.output, "Archive; by default FILE's stem with .tar.gz, here")
-      ->type_name(wire::file_type)
+  add_path(command, wire::file_type, "--output", options.output,
+           "Archive; by default FILE's stem with .tar.gz, here")
       ->excludes(check);
   command.add_option("--author", options.authors, "Of the results, for citations; may be repeated")
       ->excludes(check);
@@ -267,11 +265,10 @@ int merge_databases(const MergeOptions& options, const IsStopped& is_stopped) {
 void add_merge(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<MergeOptions>(
       app, chosen, "merge", "Join databases of parts of a campaign", merge_databases);
-  command.add_option("OUT", options.whole, "Database to be made of all parts")
-      ->type_name(database_type)
+  add_path(command, database_type, "OUT", options.whole, "Database to be made of all parts")
       ->required();
-  command.add_option("PART", options.parts, "Databases of one campaign, as of `run --range`")
-      ->type_name(database_type)
+  add_path(command, database_type, "PART", options.parts,
+           "Databases of one campaign, as of `run --range`")
       ->required();
   add_fraction(command, options.fraction, "each part's runs");
   add_json_flag(command, options.format);
