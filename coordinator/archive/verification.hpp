@@ -64,7 +64,7 @@ struct VerifyOptions {
 /// @throws ArchiveError if there is no such file or it is no campaign database; Interrupted.
 [[nodiscard]] bool verify(const std::filesystem::path& file, const VerifyOptions& options,
                           const std::function<void(const Check&)>& report,
-                          const IsStopped& is_stopped);
+                          const HeedStop& heed_stop);
 
 /// `ok`, `FAILS` or `not checked`.
 [[nodiscard]] std::string_view word_for(CheckOutcome verdict);
@@ -83,7 +83,7 @@ struct VerifyOptions {
 ///         Interrupted. Then no file appears.
 void publish(const std::filesystem::path& database, const std::filesystem::path& archive,
              wire::IfThere if_there, std::span<const std::string> authors,
-             const IsStopped& is_stopped);
+             const HeedStop& heed_stop);
 
 /// Checks an archive from elsewhere: `checksums`, `campaign`, then all of verify(). It is unpacked
 /// to the temporary directory, where nothing of it remains.
@@ -95,6 +95,6 @@ void publish(const std::filesystem::path& database, const std::filesystem::path&
 [[nodiscard]] bool check_publication(const std::filesystem::path& archive,
                                      const VerifyOptions& options,
                                      const std::function<void(const Check&)>& report,
-                                     const IsStopped& is_stopped);
+                                     const HeedStop& heed_stop);
 
 }  // namespace proofmass::coordinator

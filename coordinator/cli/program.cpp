@@ -226,10 +226,12 @@ const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate) {
   return request;
 }
 
-int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
+int run_until_stopped(const std::function<int(const HeedStop&)>& work) {
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   try {
-    return work([&stop] { return stop != StopRequest::none; });
+    return work([&stop] {
+      if (stop != StopRequest::none) throw Interrupted();
+    });
   } catch (const Interrupted&) {
   } catch (const StoreError&) {
     // A database that is being made says so of whatever ends its making.

@@ -13,11 +13,8 @@ struct BackupOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-int back_up_database(const BackupOptions& options, const IsStopped& is_stopped) {
+int back_up_database(const BackupOptions& options, const HeedStop& heed_stop) {
   check_new_file("destination", options.destination);
-  const auto heed_stop = [&] {
-    if (is_stopped()) throw Interrupted();
-  };
   const Store store = Store::open_read_only(options.database);
   // A copy may be all that is left some day: one of a damaged file must not pass for a good one.
   check_definition_digest(store);

@@ -119,9 +119,9 @@ Declared<Options> add_command(CLI::App& app, Command& chosen, const std::string&
 template <typename Options>
 Declared<Options> add_stoppable_command(CLI::App& app, Command& chosen, const std::string& name,
                                         const std::string& description,
-                                        int (*run)(const Options&, const IsStopped&)) {
+                                        int (*run)(const Options&, const HeedStop&)) {
   const auto work = [run](const Options& options) {
-    return run_until_stopped([&](const IsStopped& is_stopped) { return run(options, is_stopped); });
+    return run_until_stopped([&](const HeedStop& heed_stop) { return run(options, heed_stop); });
   };
   const auto declared = add_command<Options>(app, chosen, name, description, work);
   declared.command.footer(exit_codes_text({exit_interrupted}));

@@ -39,7 +39,7 @@ void refuse_same_files(std::span<const std::filesystem::path> files) {
   }
 }
 
-int compare_databases(const CompareOptions& options, const IsStopped& is_stopped) {
+int compare_databases(const CompareOptions& options, const HeedStop& heed_stop) {
   std::vector<std::filesystem::path> files{options.first, options.second};
   files.insert(files.end(), options.others.begin(), options.others.end());
   if (files.size() > num_compared_max) {
@@ -47,7 +47,7 @@ int compare_databases(const CompareOptions& options, const IsStopped& is_stopped
         fmt::format("DB = {} files (must be at most {})", files.size(), num_compared_max));
   }
   refuse_same_files(files);
-  const std::vector<ComparedCampaign> members = compare_several(files, is_stopped);
+  const std::vector<ComparedCampaign> members = compare_several(files, heed_stop);
   if (options.format == OutputFormat::json) {
     print_json(comparison_json(members));
   } else {
@@ -87,7 +87,7 @@ struct ExportOptions {
   DrawColumns draws = DrawColumns::left_out;
 };
 
-int export_results(const ExportOptions& options, const IsStopped& is_stopped) {
+int export_results(const ExportOptions& options, const HeedStop& heed_stop) {
   if (options.format == ExportFormat::sqlite && options.draws == DrawColumns::included) {
     throw UsageError("draws = (must not be given with --format sqlite)");
   }
@@ -95,9 +95,9 @@ int export_results(const ExportOptions& options, const IsStopped& is_stopped) {
   check_output_file(options.output, options.if_there, "name one that may be replaced");
   const Store store = Store::open_read_only(options.database);
   if (options.format == ExportFormat::hdf5) {
-    export_hdf5(store, options.output, is_stopped, options.draws);
+    export_hdf5(store, options.output, heed_stop, options.draws);
   } else {
-    export_sqlite(store, options.output, is_stopped);
+    export_sqlite(store, options.output, heed_stop);
   }
   return exit_done;
 }
@@ -108,10 +108,10 @@ struct ImportOptions {
   std::filesystem::path database;
 };
 
-int import_file(const ImportOptions& options, const IsStopped& is_stopped) {
+int import_file(const ImportOptions& options, const HeedStop& heed_stop) {
   check_new_file("db", options.database);
   const MissingEstimates missing =
-      import_results(options.results, options.schema, options.database, is_stopped);
+      import_results(options.results, options.schema, options.database, heed_stop);
   const Store store = Store::open_read_only(options.database);
   const std::string without = missing.total() == 0
                                   ? ""

@@ -98,7 +98,7 @@ class FilesOfOneSet {
   bool is_whole_ = false;
 };
 
-void make_whole_set(const std::filesystem::path& directory, const IsStopped& is_stopped) {
+void make_whole_set(const std::filesystem::path& directory, const HeedStop& heed_stop) {
   FilesOfOneSet files(
       directory, {"coordinator.key", "coordinator.pub", "worker.key", "worker.pub", "client.key",
                   "client.pub", "authorized_workers", "authorized_clients"});
@@ -107,7 +107,7 @@ void make_whole_set(const std::filesystem::path& directory, const IsStopped& is_
   wire::write_key_pair(directory, to_text(KeyRole::coordinator), KeyRole::coordinator,
                        wire::make_key_pair());
   for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
-    if (is_stopped()) throw Interrupted();
+    heed_stop();
     const wire::KeyPair pair = wire::make_key_pair();
     // The person who sets a coordinator up may control all of its campaigns.
     const std::string_view rights = role == KeyRole::client ? "observe,submit,control" : "";
@@ -183,7 +183,7 @@ void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
 
 /// Makes a directory with the keys of a coordinator, of workers and of clients, and the lists of
 /// who may connect; or adds pairs to one. Says what to copy where.
-int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
+int make_keys(const KeygenOptions& options, const HeedStop& heed_stop) {
   const std::filesystem::path& directory = options.directory;
   if (options.worker && options.worker == options.client) {
     throw UsageError(
@@ -201,7 +201,7 @@ int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
     say_where_to_copy(directory, KeyRole::client, *options.client);
   }
   if (of_worker || of_client) return exit_done;
-  make_whole_set(directory, is_stopped);
+  make_whole_set(directory, heed_stop);
   fmt::print(
       "wrote {0}\nKeep this directory on the coordinator's machine:\n"
       "  proofmass-coordinator --keys {0}\n"

@@ -141,14 +141,14 @@ std::unique_ptr<SeriesOutput> output_of(const ReplayOptions& options, const Stor
 }
 
 /// Simulates the runs one after the other. What was written of a run stays if a later one fails.
-int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
+int replay_runs(const ReplayOptions& options, const HeedStop& heed_stop) {
   check_arguments(options);
   const Store store = Store::open_read_only(options.database);
   const Replay replay(store);
   const SignalSelection selection(replay.recording(), options.sessions, options.groups);
   const std::vector<RunResult> results =
       options.run ? std::vector{replay.stored_result(RunIndex{*options.run})}
-                  : replay.worst_results(*options.num_worst, is_stopped);
+                  : replay.worst_results(*options.num_worst, heed_stop);
   for (const RunResult& result : results) {
     for (const auto& file : files_of(options, result.run, selection)) {
       check_output_file(file, options.if_there, "series are written to files");
@@ -160,7 +160,7 @@ int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
   Json json{{"runs", Json::array()}};
   for (const RunResult& stored : results) {
     const std::unique_ptr<SeriesOutput> output = output_of(options, store, stored, selection);
-    ReplayedRun run{.stored = stored, .differences = replay.run(stored, output.get(), is_stopped)};
+    ReplayedRun run{.stored = stored, .differences = replay.run(stored, output.get(), heed_stop)};
     if (run.differences.empty()) run.files = files_of(options, stored.run, selection);
     if (is_json) json["runs"].push_back(replayed_json(run));
     if (!is_json) print_lines(replayed_text(run, store.schema()));

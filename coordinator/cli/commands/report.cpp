@@ -127,8 +127,8 @@ int write_documents(const ReportOptions& options, const Store& store,
     return exit_code_of(review, stated);
   };
   if (options.html.empty()) return write();
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    review.spectra = worst_run_spectra(store, review, is_stopped);
+  return run_until_stopped([&](const HeedStop& heed_stop) {
+    review.spectra = worst_run_spectra(store, review, heed_stop);
     return write();
   });
 }
@@ -266,8 +266,8 @@ void print_names(const Review& review, const Campaign& campaign) {
 /// The spectra of the worst run, which is simulated for them.
 /// @throws ArchiveError if it has no spectrum of that name.
 void add_spectra(const Store& store, const std::string& chart, Review& review,
-                 const IsStopped& is_stopped) {
-  review.spectra = worst_run_spectra(store, review, is_stopped);
+                 const HeedStop& heed_stop) {
+  review.spectra = worst_run_spectra(store, review, heed_stop);
   const RunSpectra& spectra = *review.spectra;
   if (std::ranges::any_of(spectra.sessions, [&](const SessionSpectrum& spectrum) {
         return spectrum_name(spectrum.session) == chart;
@@ -295,8 +295,8 @@ int plot(const PlotOptions& options) {
   };
   const std::vector<std::string> spectra = spectrum_names_of(*campaign);
   if (std::ranges::find(spectra, options.chart) == spectra.end()) return write();
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    add_spectra(store, options.chart, review, is_stopped);
+  return run_until_stopped([&](const HeedStop& heed_stop) {
+    add_spectra(store, options.chart, review, heed_stop);
     return write();
   });
 }

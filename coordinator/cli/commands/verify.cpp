@@ -93,22 +93,22 @@ int print_checks(const CheckedFileOptions& options,
   return exit_cannot_be_done;
 }
 
-int verify_database(const CheckedFileOptions& options, const IsStopped& is_stopped) {
+int verify_database(const CheckedFileOptions& options, const HeedStop& heed_stop) {
   return print_checks(options, [&](const auto& report) {
-    return verify(options.file, how_to_verify(options.fraction), report, is_stopped);
+    return verify(options.file, how_to_verify(options.fraction), report, heed_stop);
   });
 }
 
-int publish_campaign(const CheckedFileOptions& options, const IsStopped& is_stopped) {
+int publish_campaign(const CheckedFileOptions& options, const HeedStop& heed_stop) {
   if (options.is_check) {
     return print_checks(options, [&](const auto& report) {
-      return check_publication(options.file, how_to_verify(options.fraction), report, is_stopped);
+      return check_publication(options.file, how_to_verify(options.fraction), report, heed_stop);
     });
   }
   std::filesystem::path output = options.output;
   if (output.empty()) output = options.file.stem().string() + ".tar.gz";
   check_output_file(output, options.if_there, "name one to replace");
-  publish(options.file, output, options.if_there, options.authors, is_stopped);
+  publish(options.file, output, options.if_there, options.authors, heed_stop);
   print_written(output, options.format);
   return exit_done;
 }
@@ -181,7 +181,7 @@ void require_part(const std::filesystem::path& part, const LargestPart& largest)
 
 /// @throws ArchiveError with the checks that fail.
 void require_sound(const std::filesystem::path& part, const MergeOptions& options,
-                   const IsStopped& is_stopped) {
+                   const HeedStop& heed_stop) {
   std::string failing;
   const auto collect = [&](const Check& check) {
     const bool is_skipped =
@@ -191,7 +191,7 @@ void require_sound(const std::filesystem::path& part, const MergeOptions& option
     }
     if (check.verdict == CheckOutcome::fails) failing += "\n" + check_text(check);
   };
-  if (verify(part, how_to_verify(options.fraction), collect, is_stopped) && failing.empty()) return;
+  if (verify(part, how_to_verify(options.fraction), collect, heed_stop) && failing.empty()) return;
   while (failing.ends_with('\n')) failing.pop_back();
   throw ArchiveError(fmt::format("{} fails these checks:{}", part.string(), failing));
 }
@@ -243,16 +243,16 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
   print_json(json);
 }
 
-int merge_databases(const MergeOptions& options, const IsStopped& is_stopped) {
+int merge_databases(const MergeOptions& options, const HeedStop& heed_stop) {
   check_new_file("output", options.whole);
   const LargestPart largest = largest_part(options.parts);
   for (const std::filesystem::path& part : options.parts) require_part(part, largest);
-  for (const std::filesystem::path& part : options.parts) require_sound(part, options, is_stopped);
+  for (const std::filesystem::path& part : options.parts) require_sound(part, options, heed_stop);
   const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
   std::vector<MergedPart> parts;
   Store whole = Store::merge(options.whole, *largest.campaign, definition, options.parts,
                              [&](const MergedPart& part) {
-                               if (is_stopped()) throw Interrupted();
+                               heed_stop();
                                parts.push_back(part);
                              });
   update_statistics(whole, *largest.campaign);
