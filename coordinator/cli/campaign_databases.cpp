@@ -183,15 +183,7 @@ CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std
 }
 
 std::vector<std::filesystem::path> CampaignFolder::list() const {
-  std::vector<std::filesystem::path> files;
-  std::error_code error;
-  std::filesystem::directory_iterator item(directory_, error);
-  for (; !error && item != std::filesystem::directory_iterator(); item.increment(error)) {
-    if (item->path().extension() == ".db") files.push_back(item->path());
-  }
-  if (error) refuse(directory_, error.message());
-  std::sort(files.begin(), files.end());
-  return files;
+  return databases_in(directory_);
 }
 
 ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {

@@ -181,10 +181,7 @@ std::string_view name_of(RequirementVerdict verdict) {
 
 // Thirteen decimals are those that a double near 1 has.
 std::string given_percent(double fraction) {
-  std::string percent = fmt::format("{:.13f}", 100.0 * fraction);
-  percent.erase(percent.find_last_not_of('0') + 1);
-  if (percent.back() == '.') percent.pop_back();
-  return percent + " %";
+  return without_end_zeros(fmt::format("{:.13f}", 100.0 * fraction)) + " %";
 }
 
 std::string interval_percent(const Interval& interval) {
