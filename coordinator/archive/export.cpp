@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "coordinator/archive/detail/hdf5_file.hpp"
-#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "core/model.hpp"
 

@@ -18,7 +18,6 @@
 #include "coordinator/store/store.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
-#include "core/result_rules.hpp"
 #include "core/statistics/independence.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"

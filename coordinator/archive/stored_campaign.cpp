@@ -15,7 +15,6 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/names.hpp"
 

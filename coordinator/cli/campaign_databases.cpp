@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <exception>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/read_results.hpp"

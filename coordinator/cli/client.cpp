@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <system_error>
@@ -17,7 +16,6 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/net/answers.hpp"
-#include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/table/table.hpp"

@@ -35,7 +35,6 @@
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "core/result_rules.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"

@@ -10,7 +10,6 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/stated_requirement.hpp"
-#include "coordinator/store/store.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"

@@ -1,15 +1,12 @@
 // A disk that changes bits: whatever is read from a campaign database is what was stored, or is
 // refused.
 
-#include <exception>
-
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {

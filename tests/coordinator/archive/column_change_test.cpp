@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "coordinator/report/read_results.hpp"
-#include "core/microscope/definition/campaign_definition.hpp"
 #include "core/result_rules.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"

@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/table/table.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/error_change.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"

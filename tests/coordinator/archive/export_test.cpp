@@ -4,7 +4,6 @@
 
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/table/table.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/support/microscope_results.hpp"

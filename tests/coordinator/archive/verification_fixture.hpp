@@ -3,7 +3,6 @@
 #include "coordinator/archive/verification.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 

@@ -13,12 +13,9 @@
 #include <future>
 #include <memory>
 #include <string>
-#include <utility>
-#include <variant>
 
 #include "coordinator/net/private_endpoint.hpp"
 #include "core/error.hpp"
-#include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/played_coordinator.hpp"
 
 namespace proofmass::coordinator {

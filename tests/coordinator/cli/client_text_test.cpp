@@ -5,8 +5,6 @@
 #include <sstream>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/report/json.hpp"
-#include "coordinator/report/status_notes.hpp"
 #include "core/runs.hpp"
 #include "tests/proto/wire/requests.hpp"
 

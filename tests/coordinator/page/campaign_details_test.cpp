@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <condition_variable>
 #include <ctime>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <new>
 #include <string>
@@ -15,7 +13,6 @@
 
 #include "coordinator/report/report.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
