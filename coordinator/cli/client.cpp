@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <string>
 #include <system_error>
@@ -71,10 +72,10 @@ void warn_if_plain(const ClientOptions& options) {
       connection.endpoint));
 }
 
-int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {
-  ClientConnection connection(options.connection);
+Ask connected(const ClientOptions& options) {
+  const auto connection = std::make_shared<ClientConnection>(options.connection);
   warn_if_plain(options);
-  return work([&](const proto::RequestEnvelope& request) { return connection.ask(request); });
+  return [connection](const proto::RequestEnvelope& request) { return connection->ask(request); };
 }
 
 proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
@@ -184,15 +185,13 @@ std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer) {
 
 int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
                  void (*print)(std::string_view)) {
-  return with_connection({.connection = connection}, [&](const Ask& ask) {
-    const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
-    const proto::AnswerReply& answer = reply.answer();
-    const std::string bytes = answer_bytes(ask, answer);
-    print(bytes);
-    flush_standard_output();
-    if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
-    return static_cast<int>(answer.exit_code());
-  });
+  const Ask ask = connected({.connection = connection});
+  const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
+  const proto::AnswerReply& answer = reply.answer();
+  print(answer_bytes(ask, answer));
+  flush_standard_output();
+  if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
+  return static_cast<int>(answer.exit_code());
 }
 
 namespace {

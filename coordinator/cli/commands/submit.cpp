@@ -87,15 +87,14 @@ void say_failures(const Ask& ask, const std::string& name, std::uint64_t failure
 int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
   const proto::RequestEnvelope request = submit_request(options, *campaign);
-  return with_connection(options.client, [&](const Ask& ask) {
-    print_done(ask, request, {.name = "submit", .kind = "campaign", .target = campaign->name},
-               options.client.format);
-    if (!options.waits) return static_cast<int>(exit_done);
-    flush_standard_output();
-    const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);
-    if (options.stop.failures_max) say_failures(ask, campaign->name, *options.stop.failures_max);
-    return exit_code;
-  });
+  const Ask ask = connected(options.client);
+  print_done(ask, request, {.name = "submit", .kind = "campaign", .target = campaign->name},
+             options.client.format);
+  if (!options.waits) return exit_done;
+  flush_standard_output();
+  const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);
+  if (options.stop.failures_max) say_failures(ask, campaign->name, *options.stop.failures_max);
+  return exit_code;
 }
 
 }  // namespace
@@ -269,9 +268,8 @@ struct WatchOptions {
 
 int watch_campaigns(const WatchOptions& options) {
   if (options.campaign) (void)checked_campaign_name(*options.campaign);
-  return with_connection(options.client, [&](const Ask& ask) {
-    return watch_on_standard_output(ask, options.campaign, options.client.format);
-  });
+  return watch_on_standard_output(connected(options.client), options.campaign,
+                                  options.client.format);
 }
 
 }  // namespace
