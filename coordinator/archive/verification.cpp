@@ -58,7 +58,7 @@ class Verification {
                const std::function<void(const Check&)>& report, const HeedStop& heed_stop)
       : file_(file), options_(options), report_(report), heed_stop_(heed_stop) {}
 
-  bool run() {
+  void run() {
     make("file", [this] { return check_file(); });
     make("integrity", [this] { return check_integrity(); });
     make("definition", [this] { return check_definition(); });
@@ -70,7 +70,6 @@ class Verification {
       run_result_checks();
     }
     make("simulation", [this] { return check_simulation(); });
-    return holds_;
   }
 
  private:
@@ -102,7 +101,6 @@ class Verification {
       check = Check::fails(error.what());
     }
     check.name = name;
-    holds_ = holds_ && check.verdict != CheckOutcome::fails;
     report_(check);
   }
 
@@ -368,7 +366,6 @@ class Verification {
   const std::function<void(const Check&)>& report_;
   const HeedStop& heed_stop_;
 
-  bool holds_ = true;
   std::optional<Store> store_;
   std::shared_ptr<const Campaign> campaign_;
   bool is_same_model_ = false;
@@ -381,10 +378,10 @@ constexpr std::size_t verdict_width = 13;
 
 }  // namespace
 
-bool verify(const std::filesystem::path& file, const VerifyOptions& options,
+void verify(const std::filesystem::path& file, const VerifyOptions& options,
             const std::function<void(const Check&)>& report, const HeedStop& heed_stop) {
   require_campaign_file(file);
-  return Verification(file, options, report, heed_stop).run();
+  Verification(file, options, report, heed_stop).run();
 }
 
 Check Check::fails(std::string finding, std::vector<std::string> details,

@@ -155,10 +155,12 @@ TEST_F(BitFlips, LeaveAComparisonAsItIsOrMakeItRefused) {
 TEST_F(BitFlips, EndNoVerificationAndNoListing) {
   for_each_flip(5, 100, [&](const std::filesystem::path& path, const std::string& what) {
     (void)printed([&] {
-      const bool holds = verify(
-          path, {.model_version = "another, so that nothing is simulated"}, [](const Check&) {},
+      std::size_t num_failing = 0;
+      verify(
+          path, {.model_version = "another, so that nothing is simulated"},
+          [&](const Check& check) { num_failing += check.verdict == CheckOutcome::fails ? 1 : 0; },
           test::never_stopped);
-      EXPECT_FALSE(holds) << what;
+      EXPECT_GT(num_failing, 0U) << what;
       return std::string();
     });
     (void)printed([&] { return terminal_text(listing_table(list_campaigns(std::vector{path}))); });
@@ -193,12 +195,12 @@ TEST_F(RowsOutOfOrder, OfResultsAreRefused) {
   swap_keys(file(), "run_result", 5, 2);
   expect_refusal("result of run 3 comes after that of run 5");
   std::string results;
-  EXPECT_FALSE(verify(
+  verify(
       file(), {},
       [&](const Check& check) {
         if (check.name == "results") results = check.finding;
       },
-      test::never_stopped));
+      test::never_stopped);
   EXPECT_NE(results.find("is damaged: result of run 3 comes after that of run 5"),
             std::string::npos)
       << results;
