@@ -244,18 +244,21 @@ std::vector<StatedRequirement> requirements_of_objectives(const ResultSchema& sc
         {.id = name,
          .text = fmt::format("Objective of {}", quantities[i].symbol),
          // The shortest text that reads back to the same bits.
-         .requirement = fmt::format("{} <= {} {}", name, objectives[i], default_tolerance_text())});
+         .requirement = fmt::format("{} <= {} {}", name, objectives[i], default_tolerance_text()),
+         .is_default = true});
   }
   return stated;
 }
 
-}  // namespace
-
+/// All objectives together, with the default tolerance.
 StatedRequirement joint_requirement() {
   return {.id = "all",
           .text = "All objectives together",
-          .requirement = "all objectives " + default_tolerance_text()};
+          .requirement = "all objectives " + default_tolerance_text(),
+          .is_default = true};
 }
+
+}  // namespace
 
 std::vector<StatedRequirement> numbered_requirements(std::span<const std::string> requirements) {
   std::vector<StatedRequirement> stated;

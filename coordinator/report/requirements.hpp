@@ -119,9 +119,6 @@ struct RequirementAnswer {
 /// shown with 90 % confidence.
 inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.90};
 
-/// All objectives together, with the default tolerance.
-[[nodiscard]] StatedRequirement joint_requirement();
-
 /// Requirements that were given without ids: R1, R2 ...
 [[nodiscard]] std::vector<StatedRequirement> numbered_requirements(
     std::span<const std::string> requirements);
