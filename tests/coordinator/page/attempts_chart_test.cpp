@@ -1,6 +1,3 @@
-#include <set>
-#include <string>
-
 #include "coordinator/page/page_views.hpp"
 #include "tests/test.hpp"
 

@@ -1,15 +1,10 @@
 #include "coordinator/page/campaign_details.hpp"
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
 #include <condition_variable>
 #include <ctime>
-#include <map>
-#include <mutex>
 #include <new>
-#include <string>
-#include <vector>
 
 #include "coordinator/report/report.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -21,8 +16,6 @@
 
 namespace proofmass::coordinator {
 namespace {
-
-using namespace std::chrono_literals;
 
 TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
   const TimePoint ended{1000s};

@@ -1,18 +1,11 @@
-#include <gmock/gmock.h>
-
-#include <map>
 #include <regex>
-#include <sstream>
-#include <string>
 
 #include "coordinator/page/page.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 /// A metric as a reader of the format sees it.
 struct ReadMetric {

@@ -1,10 +1,5 @@
 #include "coordinator/page/page.hpp"
 
-#include <gmock/gmock.h>
-
-#include <fstream>
-#include <future>
-
 #include "tests/coordinator/net/service_fixture.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 #include "tests/coordinator/page/raw_client.hpp"

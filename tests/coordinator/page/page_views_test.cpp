@@ -1,11 +1,7 @@
 #include "coordinator/page/page_views.hpp"
 
-#include <gmock/gmock.h>
-
-#include <random>
-#include <string>
-
 #include "tests/coordinator/page/page_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -13,8 +9,6 @@ namespace {
 using test::campaign_snapshot;
 using test::hostile_name;
 using test::worker_snapshot;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// All that a page has, as if it were one.
 std::string text_of(const PageContent& content) { return whole_page(content); }

@@ -1,13 +1,8 @@
-#include <gtest/gtest.h>
-
-#include <chrono>
-
 #include "coordinator/page/page.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using namespace std::chrono_literals;
 
 class SnapshotBoardTest : public ::testing::Test {
  protected:

@@ -1,21 +1,12 @@
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <random>
-#include <utility>
-#include <vector>
-
 #include "coordinator/report/standard_errors.hpp"
 #include "coordinator/table/table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using ::testing::AllOf;
 using ::testing::ContainsRegex;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// Of two sessions, the noise of which the method knows.
 ResultSchema schema_of_two() {

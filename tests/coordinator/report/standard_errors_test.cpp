@@ -1,22 +1,14 @@
 #include "coordinator/report/standard_errors.hpp"
 
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <vector>
-
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/table/table.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 const std::vector<double> pulls{-3.0, -1.0, 0.5, 1.5, 2.0};
 
