@@ -182,9 +182,7 @@ CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std
   std::filesystem::remove_all(answers(), ignored);
 }
 
-std::vector<std::filesystem::path> CampaignFolder::list() const {
-  return databases_in(directory_);
-}
+std::vector<std::filesystem::path> CampaignFolder::list() const { return databases_in(directory_); }
 
 ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
   Store store = Store::open(file);

@@ -6,6 +6,7 @@
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/test.hpp"
 
