@@ -18,7 +18,7 @@ class Interrupted : public Error {
   Interrupted() : Error("interrupted") {}
 };
 
-/// Asked now and then, on any thread, by what takes long; true ends it with Interrupted.
-using IsStopped = std::function<bool()>;
+/// Called now and then, on any thread, by what takes long. @throws Interrupted to end it.
+using HeedStop = std::function<void()>;
 
 }  // namespace proofmass::coordinator

@@ -232,13 +232,13 @@ std::string why_not_compared(const ComparedCampaign& first, const ComparedCampai
 
 /// @param store  Of which one state is read; outlives ComparedCampaign::open_results.
 ComparedCampaign open_campaign(const Store& store, const std::filesystem::path& file,
-                               const IsStopped& is_stopped) {
-  if (is_stopped()) throw Interrupted();
+                               const HeedStop& heed_stop) {
+  heed_stop();
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-  const auto open_results = [&store, is_stopped]() -> ResultStream {
+  const auto open_results = [&store, heed_stop]() -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
-    return [reader = std::make_shared<ResultReader>(store.results()), is_stopped] {
-      if (is_stopped()) throw Interrupted();
+    return [reader = std::make_shared<ResultReader>(store.results()), heed_stop] {
+      heed_stop();
       return reader->next();
     };
   };
@@ -296,16 +296,16 @@ std::vector<Quantity> lacking(std::span<const Quantity> first, std::span<const Q
 }
 
 std::vector<ComparedCampaign> compare_several(std::span<const std::filesystem::path> files,
-                                              const IsStopped& is_stopped) {
+                                              const HeedStop& heed_stop) {
   PROOFMASS_EXPECT(files.size() >= 2);
   std::vector<ComparedCampaign> members;
   const Store first_store = Store::open_read_only(files.front());
   first_store.read_one_state([&] {
-    members.push_back(open_campaign(first_store, files.front(), is_stopped));
+    members.push_back(open_campaign(first_store, files.front(), heed_stop));
     for (const std::filesystem::path& file : files.subspan(1)) {
       const Store store = Store::open_read_only(file);
       store.read_one_state([&] {
-        members.push_back(open_campaign(store, file, is_stopped));
+        members.push_back(open_campaign(store, file, heed_stop));
         members.back().comparison = compare_campaigns(members.front(), members.back());
         members.back().open_results = nullptr;
       });

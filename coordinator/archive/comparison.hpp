@@ -112,7 +112,7 @@ struct ComparedCampaign {
 /// @throws StoreError or DefinitionError if a file cannot be read or holds other results than were
 ///         stored, see check_digest(); Interrupted.
 [[nodiscard]] std::vector<ComparedCampaign> compare_several(
-    std::span<const std::filesystem::path> files, const IsStopped& is_stopped);
+    std::span<const std::filesystem::path> files, const HeedStop& heed_stop);
 
 /// Corrects the p-values of all parameters and all campaigns together, see adjusted_changes(): the
 /// more campaigns are compared, the larger a change must be to be significant. What was not

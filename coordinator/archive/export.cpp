@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "coordinator/archive/detail/hdf5_file.hpp"
-#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/result_columns.hpp"
 #include "core/model.hpp"
 
@@ -127,12 +126,12 @@ class Columns {
   std::vector<GrowingDataset> columns_;
 };
 
-void write_results(const Hdf5File& file, const Store& store, const IsStopped& is_stopped,
+void write_results(const Hdf5File& file, const Store& store, const HeedStop& heed_stop,
                    DrawColumns draws) {
   const bool has_draws = draws == DrawColumns::included;
   Columns columns(file, store.schema(), has_draws ? store.campaign() : nullptr);
   const WalkedResults walked =
-      walk_results(store, is_stopped, [&](const RunResult& result) { columns.add(result); });
+      walk_results(store, heed_stop, [&](const RunResult& result) { columns.add(result); });
   columns.flush();
   file.set_count(file.root(), "num_finished", walked.num_results);
   file.set_text(file.root(), "digest", walked.digest);
@@ -140,38 +139,38 @@ void write_results(const Hdf5File& file, const Store& store, const IsStopped& is
 
 }  // namespace
 
-void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
+void export_hdf5(const Store& store, const std::filesystem::path& file, const HeedStop& heed_stop,
                  DrawColumns draws) {
   wire::DraftFile draft("output", file);
   Hdf5File output(draft);
   store.read_one_state([&] {
     check_definition_digest(store);
     describe_campaign(output, store);
-    write_results(output, store, is_stopped, draws);
+    write_results(output, store, heed_stop, draws);
   });
   output.close();
   draft.publish(wire::IfThere::replace);
 }
 
-std::function<void(const RunResult&)> stoppable(const IsStopped& is_stopped,
+std::function<void(const RunResult&)> stoppable(const HeedStop& heed_stop,
                                                 std::function<void(const RunResult&)> visit) {
-  return [&is_stopped, visit = std::move(visit),
+  return [&heed_stop, visit = std::move(visit),
           num_visits = std::uint64_t{0}](const RunResult& result) mutable {
     constexpr std::uint64_t visits_between_questions = 1024;
-    if (num_visits++ % visits_between_questions == 0 && is_stopped()) throw Interrupted();
+    if (num_visits++ % visits_between_questions == 0) heed_stop();
     visit(result);
   };
 }
 
-WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
+WalkedResults walk_results(const Store& store, const HeedStop& heed_stop,
                            const std::function<void(const RunResult&)>& visit) {
-  return walk_checked(store, stoppable(is_stopped, visit));
+  return walk_checked(store, stoppable(heed_stop, visit));
 }
 
 void export_sqlite(const Store& store, const std::filesystem::path& file,
-                   const IsStopped& is_stopped) {
+                   const HeedStop& heed_stop) {
   check_definition_digest(store);
-  (void)walk_results(store, is_stopped, [](const RunResult&) {});
+  (void)walk_results(store, heed_stop, [](const RunResult&) {});
   wire::DraftFile draft("output", file);
   store.write_plain(draft.draft());
   draft.publish(wire::IfThere::replace);

@@ -30,20 +30,20 @@ enum class DrawColumns : std::uint8_t { left_out, included };
 
 /// A dataset a column, the unit an attribute, NaN where there is no meaning; what defines the
 /// campaign are attributes of the root. A file of this name is replaced.
-void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
+void export_hdf5(const Store& store, const std::filesystem::path& file, const HeedStop& heed_stop,
                  DrawColumns draws = DrawColumns::left_out);
 
 /// An SQLite file with the tables and views of the campaign, see Store::write_plain(). A file of
 /// this name is replaced.
 void export_sqlite(const Store& store, const std::filesystem::path& file,
-                   const IsStopped& is_stopped);
+                   const HeedStop& heed_stop);
 
-/// A visitor of results that throws Interrupted soon after `is_stopped` says so.
+/// A visitor of results that calls `heed_stop` now and then.
 [[nodiscard]] std::function<void(const RunResult&)> stoppable(
-    const IsStopped& is_stopped, std::function<void(const RunResult&)> visit);
+    const HeedStop& heed_stop, std::function<void(const RunResult&)> visit);
 
 /// walk_checked() with a stoppable visitor.
-WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
+WalkedResults walk_results(const Store& store, const HeedStop& heed_stop,
                            const std::function<void(const RunResult&)>& visit);
 
 /// Makes a campaign database of truths and estimates that another program computed, complete or not
@@ -56,10 +56,10 @@ WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
 /// @param database  A new file.
 /// @return How many runs have no estimate, and why.
 /// @throws DefinitionError naming file, line and rule; StoreError if the database exists or cannot
-///         be written; what `is_stopped` throws.
+///         be written; what `heed_stop` throws.
 [[nodiscard]] MissingEstimates import_results(const std::filesystem::path& results,
                                               const std::filesystem::path& schema,
                                               const std::filesystem::path& database,
-                                              const IsStopped& is_stopped);
+                                              const HeedStop& heed_stop);
 
 }  // namespace proofmass::coordinator

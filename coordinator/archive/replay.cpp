@@ -64,13 +64,13 @@ RunResult Replay::stored_result(RunIndex run) const {
       is_given_up ? "has no result: it was given up after it had crashed" : "has no result yet"));
 }
 
-std::vector<RunResult> Replay::worst_results(std::size_t count, const IsStopped& is_stopped) const {
+std::vector<RunResult> Replay::worst_results(std::size_t count, const HeedStop& heed_stop) const {
   const std::vector<double> objectives = campaign_->objectives();
   if (std::ranges::none_of(objectives, [](double limit) { return std::isfinite(limit); })) {
     throw ArchiveError("no run is the worst: the errors of this campaign have no objectives");
   }
   std::vector<RunValue> worst;
-  (void)walk_results(store_, is_stopped, [&](const RunResult& result) {
+  (void)walk_results(store_, heed_stop, [&](const RunResult& result) {
     if (!result.is_completed()) return;
     keep_largest({result.run, largest_ratio(result, objectives)}, count, worst);
   });
@@ -81,15 +81,12 @@ std::vector<RunResult> Replay::worst_results(std::size_t count, const IsStopped&
 }
 
 std::vector<ResultDifference> Replay::run(const RunResult& stored, SeriesOutput* output,
-                                          const IsStopped& is_stopped) const {
+                                          const HeedStop& heed_stop) const {
   const SampleSink pass_on = [&](const RecordedSample& sample) {
     if (output != nullptr) output->add(sample);
   };
-  const auto stop_if_asked = [&](int /*num_steps*/) {
-    if (is_stopped()) throw Interrupted();
-  };
-  const RunResult computed =
-      plan_->replay({stored.run, campaign_->table_values(stored.run)}, pass_on, stop_if_asked);
+  const RunResult computed = plan_->replay({stored.run, campaign_->table_values(stored.run)},
+                                           pass_on, [&](int /*num_steps*/) { heed_stop(); });
   std::vector<ResultDifference> differences = differences_of(stored, computed, store_.schema());
   if (!differences.empty() || output == nullptr) return differences;
   if (stored.status == RunStatus::no_draw) {
@@ -97,7 +94,7 @@ std::vector<ResultDifference> Replay::run(const RunResult& stored, SeriesOutput*
         "run = {} (has no accepted draw: nothing is simulated, and there are no series)",
         stored.run.value));
   }
-  stop_if_asked(0);
+  heed_stop();
   output->finish();
   return differences;
 }
@@ -198,7 +195,7 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
 
 std::vector<ResultDifference> simulate_again(const Campaign& campaign,
                                              std::span<const RunResult> stored,
-                                             std::size_t num_threads, const IsStopped& is_stopped) {
+                                             std::size_t num_threads, const HeedStop& heed_stop) {
   const std::unique_ptr<const Plan> plan = campaign.prepare();
   const ResultSchema schema = campaign.results();
   const std::size_t batch_size = campaign.model().batch_size();
@@ -210,9 +207,7 @@ std::vector<ResultDifference> simulate_again(const Campaign& campaign,
     for (const RunResult& result : batch) {
       requests.push_back({result.run, campaign.table_values(result.run)});
     }
-    const auto on_progress = [&](int /*num_steps*/) {
-      if (is_stopped()) throw Interrupted();
-    };
+    const auto on_progress = [&](int /*num_steps*/) { heed_stop(); };
     const std::vector<RunResult> computed =
         plan->simulate_batch(requests, best_instruction_set(), on_progress);
     for (std::size_t k = 0; k < batch.size(); ++k) {
@@ -226,11 +221,11 @@ std::vector<ResultDifference> simulate_again(const Campaign& campaign,
 }
 
 Redraw redraw_runs(const Store& store, const Campaign& campaign, std::size_t num_threads,
-                   const IsStopped& is_stopped) {
+                   const HeedStop& heed_stop) {
   Redraw redraw;
   std::vector<RunResult> results;
   const auto compare = [&] {
-    if (is_stopped()) throw Interrupted();
+    heed_stop();
     redraw.num_drawn += results.size();
     std::vector<std::string> differences(results.size());
     in_threads(results.size(), num_threads, [&](std::size_t i) {

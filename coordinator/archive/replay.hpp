@@ -47,7 +47,7 @@ struct ResultDifference {
 [[nodiscard]] std::vector<ResultDifference> simulate_again(const Campaign& campaign,
                                                            std::span<const RunResult> stored,
                                                            std::size_t num_threads,
-                                                           const IsStopped& is_stopped);
+                                                           const HeedStop& heed_stop);
 
 /// What drawing all runs of a file again finds.
 struct Redraw {
@@ -64,7 +64,7 @@ struct Redraw {
 /// @param campaign  The definition in the file.
 /// @throws StoreError if the file cannot be read, Interrupted.
 [[nodiscard]] Redraw redraw_runs(const Store& store, const Campaign& campaign,
-                                 std::size_t num_threads, const IsStopped& is_stopped);
+                                 std::size_t num_threads, const HeedStop& heed_stop);
 
 /// What of a recording goes to files: all of it, or some sessions and groups of signals.
 class SignalSelection {
@@ -156,7 +156,7 @@ class Replay {
   /// @throws ArchiveError if no run has an estimate or no quantity has an objective; StoreError as
   /// walk_checked() does; Interrupted.
   [[nodiscard]] std::vector<RunResult> worst_results(std::size_t count,
-                                                     const IsStopped& is_stopped) const;
+                                                     const HeedStop& heed_stop) const;
 
   /// Simulates a run again. If the result is the stored one to the bit, the files of `output`
   /// appear.
@@ -167,7 +167,7 @@ class Replay {
   /// @throws ArchiveError if the files cannot be written, or are wanted of a run without a draw, of
   /// which nothing is simulated; Interrupted. Then no file appears.
   [[nodiscard]] std::vector<ResultDifference> run(const RunResult& stored, SeriesOutput* output,
-                                                  const IsStopped& is_stopped) const;
+                                                  const HeedStop& heed_stop) const;
 
  private:
   const Store& store_;
@@ -185,7 +185,7 @@ inline constexpr std::size_t num_spectrum_samples_max = std::size_t{1} << 23;
 /// replay differs from the stored result there are none, and the reasons say so.
 /// @throws as Replay::run() and Replay::stored_result().
 [[nodiscard]] RunSpectra replayed_spectra(const Replay& replay, RunIndex run,
-                                          const IsStopped& is_stopped);
+                                          const HeedStop& heed_stop);
 
 /// The spectra of the run that is the farthest off; nothing of a model of a program, which
 /// describes none. None, and the reason, where there is no such run or this program cannot replay
@@ -193,7 +193,7 @@ inline constexpr std::size_t num_spectrum_samples_max = std::size_t{1} << 23;
 /// @param store  That of the review.
 /// @throws StoreError; Interrupted.
 [[nodiscard]] std::optional<RunSpectra> worst_run_spectra(const Store& store, const Review& review,
-                                                          const IsStopped& is_stopped);
+                                                          const HeedStop& heed_stop);
 
 /// `spectrum:SESSION` for each session that has a spectrum: the names of their charts.
 [[nodiscard]] std::vector<std::string> spectrum_names(const Recording& recording);

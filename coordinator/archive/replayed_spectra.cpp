@@ -236,11 +236,11 @@ RunSpectra none_of(RunIndex run, std::string reason) {
 
 }  // namespace
 
-RunSpectra replayed_spectra(const Replay& replay, RunIndex run, const IsStopped& is_stopped) {
+RunSpectra replayed_spectra(const Replay& replay, RunIndex run, const HeedStop& heed_stop) {
   const RunResult stored = replay.stored_result(run);
   if (replay.recording().spectra.empty()) return none_of(run, "The model describes no spectrum.");
   SpectraOutput output(replay.recording());
-  const std::vector<ResultDifference> differences = replay.run(stored, &output, is_stopped);
+  const std::vector<ResultDifference> differences = replay.run(stored, &output, heed_stop);
   if (const std::size_t count = differences.size(); count > 0) {
     return none_of(run, fmt::format("A replay of run {} does not give the stored result: {} of its "
                                     "values {}. proofmass verify tells more.",
@@ -252,12 +252,12 @@ RunSpectra replayed_spectra(const Replay& replay, RunIndex run, const IsStopped&
 }
 
 std::optional<RunSpectra> worst_run_spectra(const Store& store, const Review& review,
-                                            const IsStopped& is_stopped) {
+                                            const HeedStop& heed_stop) {
   if (review.is_of_program) return std::nullopt;
   const std::optional<RunIndex> worst = worst_run_of(review);
   if (!worst) return none_of({}, "No run has an estimate, or no quantity an objective.");
   try {
-    return replayed_spectra(Replay(store), *worst, is_stopped);
+    return replayed_spectra(Replay(store), *worst, heed_stop);
   } catch (const ArchiveError& error) {
     return none_of(*worst,
                    fmt::format("Run {} cannot be replayed: {}.", worst->value, error.what()));

@@ -18,7 +18,6 @@
 #include "coordinator/store/store.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
-#include "core/result_rules.hpp"
 #include "core/statistics/independence.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
@@ -141,7 +140,7 @@ double number_in(const CsvReader& reader, const ResultColumn& column) {
 /// Reads the values of all columns.
 /// @return The number of runs.
 std::size_t read_columns(const std::filesystem::path& file, ImportSchema& schema,
-                         const IsStopped& is_stopped) {
+                         const HeedStop& heed_stop) {
   const std::string name = file.string();
   const std::string text =
       detail::read_definition_text(file, results_size_max, detail::Pipes::accepted);
@@ -156,7 +155,7 @@ std::size_t read_columns(const std::filesystem::path& file, ImportSchema& schema
     }
   }
   while (reader.next_row()) {
-    if (is_stopped()) throw Interrupted();
+    heed_stop();
     reader.expect_cells(num_cells);
     for (ResultColumn* const column : columns) column->values.push_back(number_in(reader, *column));
   }
@@ -257,8 +256,7 @@ std::vector<Entry> entries_of(const ImportSchema& schema, std::uint64_t first_ru
 
 MissingEstimates import_results(const std::filesystem::path& results,
                                 const std::filesystem::path& schema_file,
-                                const std::filesystem::path& database,
-                                const IsStopped& is_stopped) {
+                                const std::filesystem::path& database, const HeedStop& heed_stop) {
   Document document(
       schema_file.string(),
       detail::read_definition_text(schema_file, schema_size_max, detail::Pipes::refused), {});
@@ -266,13 +264,13 @@ MissingEstimates import_results(const std::filesystem::path& results,
   wire::DescribedCampaign campaign(
       wire::described_model(schema.description.dump(), 0, schema_file.string()));
   campaign.name = schema.name;
-  campaign.num_runs = read_columns(results, schema, is_stopped);
+  campaign.num_runs = read_columns(results, schema, heed_stop);
   for (const ResultColumn& column : schema.drawn) campaign.table_columns.push_back(column.values);
   check(schema, campaign, schema_file.string());
   MissingEstimates missing;
   std::uint64_t next_run = 0;
   const auto next_entries = [&] {
-    if (is_stopped()) throw Interrupted();
+    heed_stop();
     constexpr std::uint64_t batch_size = 10'000;
     const std::uint64_t end_run = std::min(campaign.num_runs, next_run + batch_size);
     return entries_of(schema, std::exchange(next_run, end_run), end_run, campaign.num_runs,

@@ -15,7 +15,6 @@
 #include "coordinator/report/json.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/wire/names.hpp"
 
@@ -58,6 +57,21 @@ bool has_campaign_mark(const std::filesystem::path& file) {
   return bytes.starts_with(format) && bytes.substr(application_at) == application;
 }
 
+std::vector<std::filesystem::path> databases_in(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".db") files.push_back(entry->path());
+  }
+  if (error) {
+    throw ArchiveError(
+        fmt::format("directory = {} (cannot be read: {})", directory.string(), error.message()));
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
 std::shared_ptr<const Campaign> stored_campaign(const Store& store) {
   std::shared_ptr<const Campaign> campaign;
   store.read_one_state([&] {
@@ -81,22 +95,6 @@ CampaignRecord listed(const std::filesystem::path& file) {
   }
 }
 
-std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path& directory) {
-  std::error_code error;
-  std::vector<std::filesystem::path> files;
-  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (entry->path().extension() != ".db" || !may_be_campaign(entry->path())) continue;
-    files.push_back(entry->path());
-  }
-  if (error) {
-    throw ArchiveError(
-        fmt::format("directory = {} (cannot be read: {})", directory.string(), error.message()));
-  }
-  std::ranges::sort(files);
-  return files;
-}
-
 Json record_json(const CampaignRecord& campaign) {
   const std::string file = campaign.file.string();
   if (!campaign.problem.empty()) return {{"file", file}, {"problem", campaign.problem}};
@@ -117,7 +115,9 @@ std::vector<CampaignRecord> list_campaigns(std::span<const std::filesystem::path
   for (const std::filesystem::path& place : places) {
     std::error_code ignored;
     if (std::filesystem::is_directory(place, ignored)) {
-      for (const auto& file : campaign_files_in(place)) campaigns.push_back(listed(file));
+      for (const std::filesystem::path& file : databases_in(place)) {
+        if (may_be_campaign(file)) campaigns.push_back(listed(file));
+      }
       continue;
     }
     require_campaign_file(place);

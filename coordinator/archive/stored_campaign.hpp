@@ -20,6 +20,11 @@ namespace proofmass::coordinator {
 /// @throws ArchiveError unless the file is there and has the mark, or this user may not read it.
 void require_campaign_file(const std::filesystem::path& file);
 
+/// The files *.db of a directory, not of those below it, by name.
+/// @throws ArchiveError if it cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> databases_in(
+    const std::filesystem::path& directory);
+
 /// The campaign that a campaign database holds.
 /// @throws DefinitionError if its definition is not one or another one's, StoreError if it cannot
 /// be read or is not the one that was stored, see check_definition_digest().

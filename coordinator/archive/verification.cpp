@@ -55,10 +55,10 @@ struct ResultScan {
 class Verification {
  public:
   Verification(const std::filesystem::path& file, const VerifyOptions& options,
-               const std::function<void(const Check&)>& report, const IsStopped& is_stopped)
-      : file_(file), options_(options), report_(report), is_stopped_(is_stopped) {}
+               const std::function<void(const Check&)>& report, const HeedStop& heed_stop)
+      : file_(file), options_(options), report_(report), heed_stop_(heed_stop) {}
 
-  bool run() {
+  void run() {
     make("file", [this] { return check_file(); });
     make("integrity", [this] { return check_integrity(); });
     make("definition", [this] { return check_definition(); });
@@ -70,7 +70,6 @@ class Verification {
       run_result_checks();
     }
     make("simulation", [this] { return check_simulation(); });
-    return holds_;
   }
 
  private:
@@ -85,7 +84,7 @@ class Verification {
 
   template <typename Make>
   void make(std::string_view name, const Make& make_check) {
-    if (is_stopped_()) throw Interrupted();
+    heed_stop_();
     Check check;
     try {
       check =
@@ -96,7 +95,6 @@ class Verification {
       check = Check::fails(error.what());
     }
     check.name = name;
-    holds_ = holds_ && check.verdict != CheckOutcome::fails;
     report_(check);
   }
 
@@ -166,7 +164,7 @@ class Verification {
     const std::vector<ValueColumn> columns = value_columns(schema);
     const std::int64_t num_rounds_max = campaign_->num_rounds_max();
     Digest digest(schema);
-    store_->for_each_result(stoppable(is_stopped_, [&](const RunResult& result) {
+    store_->for_each_result(stoppable(heed_stop_, [&](const RunResult& result) {
       for (const std::string& broken :
            broken_count_rules(result, schema.num_draws_max, num_rounds_max)) {
         scan.violate(result.run, broken);
@@ -291,7 +289,7 @@ class Verification {
   Check check_draws() {
     if (!is_same_model_) return Check::not_checked("another model made the file");
     if (!scan_) return Check::not_checked("the results cannot be read");
-    const Redraw redraw = redraw_runs(*store_, *campaign_, options_.num_threads, is_stopped_);
+    const Redraw redraw = redraw_runs(*store_, *campaign_, options_.num_threads, heed_stop_);
     if (scan_->runs.empty()) return Check::not_checked("no run is finished");
     if (redraw.num_drawn == 0) return Check::holds("no run has one");
     if (redraw.num_different == 0) {
@@ -318,7 +316,7 @@ class Verification {
       const auto some =
           std::span(chosen).subspan(done, std::min(chosen.size() - done, num_at_a_time));
       std::ranges::move(
-          simulate_again(*campaign_, results_of(some), options_.num_threads, is_stopped_),
+          simulate_again(*campaign_, results_of(some), options_.num_threads, heed_stop_),
           std::back_inserter(differences));
     }
     const std::string runs = fmt::format("{} of {} runs", chosen.size(), num_runs_in(scan_->runs));
@@ -349,7 +347,7 @@ class Verification {
   [[nodiscard]] std::vector<RunResult> results_of(std::span<const RunIndex> runs) const {
     std::vector<RunResult> results;
     for (const RunIndex run : runs) {
-      if (is_stopped_()) throw Interrupted();
+      heed_stop_();
       const std::optional<RunResult> result = store_->results({run, 1}).next();
       if (!result) {
         store_->refuse_as_damaged(fmt::format("the result of run {} went away", run.value));
@@ -362,9 +360,8 @@ class Verification {
   const std::filesystem::path& file_;
   const VerifyOptions& options_;
   const std::function<void(const Check&)>& report_;
-  const IsStopped& is_stopped_;
+  const HeedStop& heed_stop_;
 
-  bool holds_ = true;
   std::optional<Store> store_;
   std::shared_ptr<const Campaign> campaign_;
   bool is_same_model_ = false;
@@ -377,10 +374,10 @@ constexpr std::size_t verdict_width = 13;
 
 }  // namespace
 
-bool verify(const std::filesystem::path& file, const VerifyOptions& options,
-            const std::function<void(const Check&)>& report, const IsStopped& is_stopped) {
+void verify(const std::filesystem::path& file, const VerifyOptions& options,
+            const std::function<void(const Check&)>& report, const HeedStop& heed_stop) {
   require_campaign_file(file);
-  return Verification(file, options, report, is_stopped).run();
+  Verification(file, options, report, heed_stop).run();
 }
 
 Check Check::fails(std::string finding, std::vector<std::string> details,

@@ -60,11 +60,9 @@ struct VerifyOptions {
 /// coordinator may write meanwhile.
 ///
 /// @param report  Called with each check as soon as it is made.
-/// @return True if no check fails.
 /// @throws ArchiveError if there is no such file or it is no campaign database; Interrupted.
-[[nodiscard]] bool verify(const std::filesystem::path& file, const VerifyOptions& options,
-                          const std::function<void(const Check&)>& report,
-                          const IsStopped& is_stopped);
+void verify(const std::filesystem::path& file, const VerifyOptions& options,
+            const std::function<void(const Check&)>& report, const HeedStop& heed_stop);
 
 /// `ok`, `FAILS` or `not checked`.
 [[nodiscard]] std::string_view word_for(CheckOutcome verdict);
@@ -83,18 +81,15 @@ struct VerifyOptions {
 ///         Interrupted. Then no file appears.
 void publish(const std::filesystem::path& database, const std::filesystem::path& archive,
              wire::IfThere if_there, std::span<const std::string> authors,
-             const IsStopped& is_stopped);
+             const HeedStop& heed_stop);
 
 /// Checks an archive from elsewhere: `checksums`, `campaign`, then all of verify(). It is unpacked
 /// to the temporary directory, where nothing of it remains.
 ///
 /// @param report  As of verify().
-/// @return True if no check fails.
 /// @throws ArchiveError `archive = FILE (why)` if it is not one folder with plain files, is damaged
 ///         or unpacks to over 256 MiB and 64 times its size; Interrupted.
-[[nodiscard]] bool check_publication(const std::filesystem::path& archive,
-                                     const VerifyOptions& options,
-                                     const std::function<void(const Check&)>& report,
-                                     const IsStopped& is_stopped);
+void check_publication(const std::filesystem::path& archive, const VerifyOptions& options,
+                       const std::function<void(const Check&)>& report, const HeedStop& heed_stop);
 
 }  // namespace proofmass::coordinator

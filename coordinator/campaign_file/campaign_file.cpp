@@ -7,12 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <limits>
 #include <map>
 #include <set>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "core/campaign/definition.hpp"
@@ -66,6 +63,9 @@ std::string read_beginning(const std::filesystem::path& file, std::size_t size_m
 // One byte more than allowed tells a file that is too large, also one without a known size.
 std::string read_text_file(const std::filesystem::path& file, std::size_t size_max, Pipes pipes) {
   std::string text = read_beginning(file, size_max + 1, pipes);
+  if (text.starts_with("SQLite format 3")) {  // A mistake that is made easily.
+    throw UnreadableFile("is a database; give the text file");
+  }
   if (text.size() > size_max) {
     throw UnreadableFile(fmt::format("is larger than {} bytes", size_max));
   }
@@ -92,10 +92,6 @@ namespace {
 
 Assignment count_assignment(std::string_view option, std::string_view path, std::uint64_t count) {
   const std::string origin = fmt::format("{} {}", option, count);
-  if (count > std::numeric_limits<std::int64_t>::max()) {
-    throw DefinitionError(
-        fmt::format("{}: must be in [0, {}]", origin, std::numeric_limits<std::int64_t>::max()));
-  }
   return {origin, std::string(path), toml::table{{"value", static_cast<std::int64_t>(count)}}};
 }
 
@@ -140,23 +136,8 @@ class DataFilesIn final : public DataFiles {
   std::map<std::string, std::string> texts_;
 };
 
-/// A mistake that is made easily. Nothing is read from a pipe: it would be missing afterwards. What
-/// the kernel makes up, as in /proc, has no size, and reading it might wait for ever.
-bool is_database(const std::filesystem::path& file) {
-  constexpr std::string_view format{"SQLite format 3\0", 16};
-  std::string beginning(format.size(), '\0');
-  std::error_code error;
-  return std::filesystem::is_regular_file(file, error) &&
-         std::filesystem::file_size(file, error) >= format.size() && !error &&
-         std::ifstream(file).read(beginning.data(), 16) && beginning == format;
-}
-
 std::string read_campaign_text(const std::filesystem::path& file) {
-  if (!is_database(file)) {
-    return detail::read_definition_text(file, campaign_file_size_max, detail::Pipes::accepted);
-  }
-  throw DefinitionError(fmt::format(
-      "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
+  return detail::read_definition_text(file, campaign_file_size_max, detail::Pipes::accepted);
 }
 
 /// The model that a campaign file names; null if it names none.

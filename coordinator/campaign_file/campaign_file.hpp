@@ -44,9 +44,9 @@ enum class Pipes : std::uint8_t {
 
 /// What a command line changes in a campaign file.
 struct Overrides {
-  std::vector<std::string> assignments = {};  ///< `estimation.correction=second_order`.
-  std::optional<std::uint64_t> num_runs = {};
-  std::optional<std::uint64_t> seed = {};
+  std::vector<std::string> assignments = {};   ///< `estimation.correction=second_order`.
+  std::optional<std::uint64_t> num_runs = {};  ///< At most num_runs_max.
+  std::optional<std::uint64_t> seed = {};      ///< At most seed_max.
 };
 
 /// Largest campaign file that is read; those with every key have some 12 kB.

@@ -10,6 +10,7 @@
 
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/charts/plot.hpp"
+#include "coordinator/table/table.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -160,9 +161,7 @@ std::string marker_path(Point centre, Shape shape) {
 }  // namespace
 
 std::string coordinate(double value) {
-  std::string text = fmt::format("{:.2f}", value);
-  while (text.ends_with('0')) text.pop_back();
-  if (text.ends_with('.')) text.pop_back();
+  const std::string text = without_end_zeros(fmt::format("{:.2f}", value));
   return text == "-0" ? "0" : text;
 }
 
@@ -269,14 +268,9 @@ std::string with_exponent(std::string_view mantissa, int exponent) {
 }
 
 /// Of `{:.Ne}`, without zeros that say nothing.
-std::string from_scientific(std::string_view text) {
+std::string from_scientific(const std::string& text) {
   const std::size_t e = text.find('e');
-  std::string_view mantissa = text.substr(0, e);
-  if (mantissa.find('.') != std::string_view::npos) {
-    while (mantissa.ends_with('0')) mantissa.remove_suffix(1);
-    if (mantissa.ends_with('.')) mantissa.remove_suffix(1);
-  }
-  return with_exponent(mantissa, std::stoi(std::string(text.substr(e + 1))));
+  return with_exponent(without_end_zeros(text.substr(0, e)), std::stoi(text.substr(e + 1)));
 }
 
 /// The label of a multiple of a step, whose last digit counts.

@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <exception>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/read_results.hpp"
@@ -182,17 +182,7 @@ CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std
   std::filesystem::remove_all(answers(), ignored);
 }
 
-std::vector<std::filesystem::path> CampaignFolder::list() const {
-  std::vector<std::filesystem::path> files;
-  std::error_code error;
-  std::filesystem::directory_iterator item(directory_, error);
-  for (; !error && item != std::filesystem::directory_iterator(); item.increment(error)) {
-    if (item->path().extension() == ".db") files.push_back(item->path());
-  }
-  if (error) refuse(directory_, error.message());
-  std::sort(files.begin(), files.end());
-  return files;
-}
+std::vector<std::filesystem::path> CampaignFolder::list() const { return databases_in(directory_); }
 
 ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
   Store store = Store::open(file);

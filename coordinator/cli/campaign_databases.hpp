@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <memory>
 #include <set>
 #include <string>
 #include <system_error>
@@ -17,7 +17,6 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/net/answers.hpp"
-#include "coordinator/report/json.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/table/table.hpp"
@@ -36,8 +35,8 @@ constexpr double timeout_s_max = 86400.0;
 
 /// Declares --keys and --insecure-plain.
 void add_key_options(CLI::App& command, ClientConnectionConfig& connection) {
-  command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
-      ->type_name(wire::directory_type)
+  add_path(command, wire::directory_type, "--keys", connection.keys,
+           "Directory with client.key and coordinator.pub")
       ->envname("PROOFMASS_KEYS");
   command.add_flag("--insecure-plain", connection.is_plain_waived,
                    "Allow an address beyond this machine without keys");
@@ -73,10 +72,10 @@ void warn_if_plain(const ClientOptions& options) {
       connection.endpoint));
 }
 
-int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {
-  ClientConnection connection(options.connection);
+Ask connected(const ClientOptions& options) {
+  const auto connection = std::make_shared<ClientConnection>(options.connection);
   warn_if_plain(options);
-  return work([&](const proto::RequestEnvelope& request) { return connection.ask(request); });
+  return [connection](const proto::RequestEnvelope& request) { return connection->ask(request); };
 }
 
 proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
@@ -186,15 +185,13 @@ std::string answer_bytes(const Ask& ask, const proto::AnswerReply& answer) {
 
 int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
                  void (*print)(std::string_view)) {
-  return with_connection({.connection = connection}, [&](const Ask& ask) {
-    const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
-    const proto::AnswerReply& answer = reply.answer();
-    const std::string bytes = answer_bytes(ask, answer);
-    print(bytes);
-    flush_standard_output();
-    if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
-    return static_cast<int>(answer.exit_code());
-  });
+  const Ask ask = connected({.connection = connection});
+  const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
+  const proto::AnswerReply& answer = reply.answer();
+  print(answer_bytes(ask, answer));
+  flush_standard_output();
+  if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
+  return static_cast<int>(answer.exit_code());
 }
 
 namespace {

@@ -38,11 +38,9 @@ using Ask = std::function<proto::ReplyEnvelope(const proto::RequestEnvelope&)>;
 [[nodiscard]] proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
                                             proto::ReplyEnvelope::ReplyCase kind);
 
-/// Connects, and lets `work` ask.
-/// @return What `work` returns.
-/// @throws What ClientConnection and `work` throw.
-[[nodiscard]] int with_connection(const ClientOptions& options,
-                                  const std::function<int(const Ask&)>& work);
+/// Connects in the background.
+/// @throws What ClientConnection throws.
+[[nodiscard]] Ask connected(const ClientOptions& options);
 
 /// All campaigns, which a coordinator tells in several replies if they are too many for one.
 /// @throws Error if the coordinator refuses.
@@ -87,7 +85,7 @@ void read_answer(const Ask& ask, const proto::AnswerReply& answer,
 /// @param print  Gets what is for standard output: print_lines(), or write_standard_output() for
 ///               every byte unchanged.
 /// @return The exit code of that command.
-/// @throws As reply_of() and with_connection() do; Error if the answer arrived damaged.
+/// @throws As reply_of() and connected() do; Error if the answer arrived damaged.
 [[nodiscard]] int print_answer(const ClientConnectionConfig& connection,
                                const proto::RequestEnvelope& question,
                                void (*print)(std::string_view) = print_lines);

@@ -21,10 +21,8 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/dispatch/outbox.hpp"
-#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/page/page.hpp"
-#include "coordinator/report/report.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -292,45 +290,35 @@ void add_addresses(CLI::App& app, ServeOptions& options) {
   app.add_option("--bind-clients", options.service.clients_endpoint,
                  "Where clients connect; a socket in the\ndirectory by default")
       ->envname("PROOFMASS_BIND_CLIENTS");
-  app.add_option("--keys", options.service.keys, "Directory of keys, made by `proofmass keygen`")
-      ->type_name(wire::directory_type)
+  add_path(app, wire::directory_type, "--keys", options.service.keys,
+           "Directory of keys, made by `proofmass keygen`")
       ->envname("PROOFMASS_KEYS");
   app.add_flag("--insecure-plain", options.service.is_plain_waived,
                "Serve other machines without keys: on a\nnetwork that you trust");
 }
 
 void add_service(CLI::App& app, ServeOptions& options) {
-  app.add_option("FILE", options.campaign_files, "Campaign files (TOML) to serve as well")
-      ->type_name(campaign_file_type);
-  app.add_option("--directory", options.directory, "Directory of the campaigns, one NAME.db each")
-      ->type_name(wire::directory_type)
+  add_path(app, campaign_file_type, "FILE", options.campaign_files,
+           "Campaign files (TOML) to serve as well");
+  add_path(app, wire::directory_type, "--directory", options.directory,
+           "Directory of the campaigns, one NAME.db each")
       ->envname("PROOFMASS_DIRECTORY")
       ->required();
   app.add_flag_callback(
       "--exit-when-done", [&end = options.service.end] { end = ServiceEnd::when_done; },
       "End when every campaign is finished");
-  app.add_option("--drain-time", options.drain_time_s,
-                 "Seconds that workers have after SIGTERM to\ndeliver what they hold")
-      ->check(wire::in_range(0.0, drain_time_s_max))
-      ->capture_default_str();
-  app.add_option(
-         "--memory-max", options.memory_mib_max,
-         "Memory in MiB; near this limit it closes all\nconnections, and peers connect again")
-      ->check(wire::in_range(memory_mib_min, memory_mib_max))
-      ->envname("PROOFMASS_MEMORY_MAX")
-      ->capture_default_str();
-  app.add_option("--workers-max", options.service.dispatch.num_workers_max,
-                 "Workers that may be registered at a time;\nothers are refused and ask again")
-      ->check(wire::in_range(std::size_t{1}, workers_max_max))
-      ->capture_default_str();
-  app.add_option("--campaigns-per-key", options.service.limits.campaigns_max,
-                 "Unfinished campaigns that a client's key may\nhave, at most")
-      ->check(wire::in_range(std::size_t{1}, campaigns_per_key_max))
-      ->capture_default_str();
-  app.add_option("--bytes-per-key", options.service.limits.size_max,
-                 "Bytes of the definitions of these campaigns,\nat most")
-      ->check(wire::in_range(std::uint64_t{1}, bytes_per_key_max))
-      ->capture_default_str();
+  add_number(app, "--drain-time", options.drain_time_s, {0.0, drain_time_s_max},
+             "Seconds that workers have after SIGTERM to\ndeliver what they hold");
+  add_number(app, "--memory-max", options.memory_mib_max, {memory_mib_min, memory_mib_max},
+             "Memory in MiB; near this limit it closes all\nconnections, and peers connect again")
+      ->envname("PROOFMASS_MEMORY_MAX");
+  add_number(app, "--workers-max", options.service.dispatch.num_workers_max, {1, workers_max_max},
+             "Workers that may be registered at a time;\nothers are refused and ask again");
+  add_number(app, "--campaigns-per-key", options.service.limits.campaigns_max,
+             {1, campaigns_per_key_max},
+             "Unfinished campaigns that a client's key may\nhave, at most");
+  add_number(app, "--bytes-per-key", options.service.limits.size_max, {1, bytes_per_key_max},
+             "Bytes of the definitions of these campaigns,\nat most");
   app.add_option("--on-finish", options.commands.on_finish,
                  "Command for `sh` when a campaign is finished;\n$PROOFMASS_DATABASE is its file")
       ->type_name("COMMAND");

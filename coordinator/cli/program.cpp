@@ -35,7 +35,6 @@
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "core/result_rules.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
@@ -226,10 +225,12 @@ const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate) {
   return request;
 }
 
-int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
+int run_until_stopped(const std::function<int(const HeedStop&)>& work) {
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   try {
-    return work([&stop] { return stop != StopRequest::none; });
+    return work([&stop] {
+      if (stop != StopRequest::none) throw Interrupted();
+    });
   } catch (const Interrupted&) {
   } catch (const StoreError&) {
     // A database that is being made says so of whatever ends its making.
@@ -261,10 +262,9 @@ sigset_t SignalThread::signals() {
 }
 
 void add_override_options(CLI::App& command, Overrides& overrides) {
-  command.add_option("--runs", overrides.num_runs, "Number of runs; more than before extends")
-      ->check(wire::in_range(std::uint64_t{1}, num_runs_max));
-  command.add_option("--seed", overrides.seed, "Seed of the campaign")
-      ->check(wire::in_range(std::uint64_t{0}, seed_max));
+  add_number(command, "--runs", overrides.num_runs, {1, num_runs_max},
+             "Number of runs; more than before extends");
+  add_number(command, "--seed", overrides.seed, {0, seed_max}, "Seed of the campaign");
   command
       .add_option("--set", overrides.assignments,
                   "Replace a value of the file: TABLE.KEY=VALUE;\nmay be repeated")
@@ -297,26 +297,21 @@ void add_stop_options(CLI::App& command, StopPlan& options) {
                      fmt::format("Stop as soon as the rule holds, as in\n\"std({}) within 5%\",\n"
                                  "\"all objectives within 2%\" or\n\"{} decided\"",
                                  example_quantity(example_results()).name, example_requirement()));
-  command
-      .add_option("--failures", options.failures_max,
-                  "Cancel when more runs than this lack an estimate")
-      ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
+  add_number(command, "--failures", options.failures_max, {0, num_runs_max},
+             "Cancel when more runs than this lack an estimate");
 }
 
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {
-  command
-      .add_option("--audit", audit_fraction,
-                  "Fraction of the runs to compute a second time,\nelsewhere, and compare")
-      ->check(wire::in_range(0.0, 1.0));
+  add_number(command, "--audit", audit_fraction, {0.0, 1.0},
+             "Fraction of the runs to compute a second time,\nelsewhere, and compare");
 }
 
 void add_page_options(CLI::App& app, PageConfig& page) {
   app.add_flag("--page", page.address,
                "Serve the live page, at 127.0.0.1:5557 or at\n--page=HOST:PORT")
       ->envname("PROOFMASS_PAGE");
-  app.add_option("--page-token-file", page.token_file,
-                 "File with a secret that visitors of the page\nmust show; needed beyond loopback")
-      ->type_name(wire::file_type)
+  add_path(app, wire::file_type, "--page-token-file", page.token_file,
+           "File with a secret that visitors of the page\nmust show; needed beyond loopback")
       ->envname("PROOFMASS_PAGE_TOKEN_FILE");
 }
 

@@ -76,7 +76,7 @@ enum class OnTerminate : std::uint8_t { stop_now, drain };
 /// Does what reads or makes a database and may take long; SIGINT and SIGTERM end it in order: what
 /// they make it throw, an Interrupted or a StoreError, is no failure.
 /// @return The ExitCode of `work`, or exit_interrupted.
-[[nodiscard]] int run_until_stopped(const std::function<int(const IsStopped&)>& work);
+[[nodiscard]] int run_until_stopped(const std::function<int(const HeedStop&)>& work);
 
 /// While it lives, SIGINT and SIGTERM interrupt no call of the thread that made it, nor of any
 /// thread that is started after it: a thread of its own runs their handlers. libzmq needs that: any

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"

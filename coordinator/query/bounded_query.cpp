@@ -10,7 +10,6 @@
 #include <mutex>
 #include <new>
 #include <thread>
-#include <utility>
 
 #include "coordinator/query/query.hpp"
 #include "proto/link/machine.hpp"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "core/model.hpp"
 #include "proto/model_program/described_model.hpp"
 
 SQLITE_EXTENSION_INIT3

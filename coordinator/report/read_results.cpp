@@ -313,12 +313,6 @@ ResultDigests Digest::finish() {
   return digests;
 }
 
-std::string digest_of(const Store& store) {
-  Digest digest(store.schema());
-  store.for_each_result([&](const RunResult& result) { digest.add(result); });
-  return digest.finish().results;
-}
-
 namespace {
 
 /// What is stored with the statistics of all these results; empty if that is of fewer results, or

@@ -273,9 +273,6 @@ class Digest {
   bool has_health_ = false;
 };
 
-/// Digest of the results in a campaign database, without that of their health.
-[[nodiscard]] std::string digest_of(const Store& store);
-
 /// Holds the results of a file against the digest that is stored with its statistics.
 ///
 /// @param num_results  All results of the file, in the state of the file that is being read.

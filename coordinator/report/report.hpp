@@ -108,9 +108,6 @@ void add_ends(Table& table, Column from, Column to,
 /// A name, or the symbol of the quantity that has it: sessions are called after what they are for.
 [[nodiscard]] std::string name_in_symbols(const ResultSchema& schema, std::string_view name);
 
-/// True of a requirement that nobody stated: an objective of the campaign, or all together.
-[[nodiscard]] bool is_default(const RequirementAnswer& row);
-
 /// The id of a requirement; of an objective of the campaign, the symbol of its parameter.
 [[nodiscard]] std::string requirement_name(const RequirementAnswer& row);
 

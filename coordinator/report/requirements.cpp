@@ -214,10 +214,7 @@ std::string_view name_of(RequirementVerdict verdict) {
 
 // Thirteen decimals are those that a double near 1 has.
 std::string given_percent(double fraction) {
-  std::string percent = fmt::format("{:.13f}", 100.0 * fraction);
-  percent.erase(percent.find_last_not_of('0') + 1);
-  if (percent.back() == '.') percent.pop_back();
-  return percent + " %";
+  return without_end_zeros(fmt::format("{:.13f}", 100.0 * fraction)) + " %";
 }
 
 std::string interval_percent(const Interval& interval) {
@@ -280,18 +277,21 @@ std::vector<StatedRequirement> requirements_of_objectives(const ResultSchema& sc
         {.id = name,
          .text = fmt::format("Objective of {}", quantities[i].symbol),
          // The shortest text that reads back to the same bits.
-         .requirement = fmt::format("{} <= {} {}", name, objectives[i], default_tolerance_text())});
+         .requirement = fmt::format("{} <= {} {}", name, objectives[i], default_tolerance_text()),
+         .is_default = true});
   }
   return stated;
 }
 
-}  // namespace
-
+/// All objectives together, with the default tolerance.
 StatedRequirement joint_requirement() {
   return {.id = "all",
           .text = "All objectives together",
-          .requirement = "all objectives " + default_tolerance_text()};
+          .requirement = "all objectives " + default_tolerance_text(),
+          .is_default = true};
 }
+
+}  // namespace
 
 std::vector<StatedRequirement> numbered_requirements(std::span<const std::string> requirements) {
   std::vector<StatedRequirement> stated;

@@ -10,7 +10,6 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/stated_requirement.hpp"
-#include "coordinator/store/store.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
@@ -127,9 +126,6 @@ struct RequirementAnswer {
 /// What is asked where nobody says what a requirement demands: each objective in 95 % of all draws,
 /// shown with 90 % confidence.
 inline constexpr Tolerance default_tolerance{.coverage = 0.95, .confidence = 0.90};
-
-/// All objectives together, with the default tolerance.
-[[nodiscard]] StatedRequirement joint_requirement();
 
 /// Requirements that were given without ids: R1, R2 ...
 [[nodiscard]] std::vector<StatedRequirement> numbered_requirements(

@@ -316,7 +316,7 @@ std::string question(const Review& review) {
   }
   std::vector<std::string> names;
   for (const RequirementAnswer& row : review.matrix) {
-    if (!is_default(row)) names.push_back(requirement_name(row));
+    if (!row.stated.is_default) names.push_back(requirement_name(row));
   }
   if (names.empty()) {
     return fmt::format(

@@ -214,8 +214,9 @@ std::string statement_of(const RequirementAnswer& row) {
   const std::string text =
       fmt::format("{}, for {} with {}", subject_of(row), given_percent(tolerance.coverage),
                   given_percent(tolerance.confidence));
-  return row.stated.text.empty() || is_default(row) ? text
-                                                    : fmt::format("{} ({})", row.stated.text, text);
+  return row.stated.text.empty() || row.stated.is_default
+             ? text
+             : fmt::format("{} ({})", row.stated.text, text);
 }
 
 Row matrix_cells(const RequirementAnswer& row) {
@@ -269,7 +270,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
         "All objectives together: limit and bound are of the largest ratio of an |error| to its "
         "objective in a draw.");
   }
-  if (std::ranges::any_of(review.matrix, is_default)) {
+  if (std::ranges::any_of(review.matrix, [](const auto& row) { return row.stated.is_default; })) {
     notes.push_back(fmt::format(
         "Rows made of the objectives of the campaign ask for {} of all draws with {} confidence, "
         "which is the default of the program and not a demand of a project.",
@@ -280,13 +281,8 @@ std::vector<std::string> matrix_notes(const Review& review) {
 
 }  // namespace
 
-bool is_default(const RequirementAnswer& row) {
-  return row.stated.text.starts_with("Objective of ") ||
-         row.stated.text == joint_requirement().text;
-}
-
 std::string requirement_name(const RequirementAnswer& row) {
-  return is_default(row) && !row.is_joint() ? std::string(row.subject.symbol) : row.stated.id;
+  return row.stated.is_default && !row.is_joint() ? std::string(row.subject.symbol) : row.stated.id;
 }
 
 Table matrix_table(const Review& review) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <string_view>
+#include <utility>
 
 #include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
@@ -188,9 +189,11 @@ std::string signed_figure(double value) {
 
 std::string given_figure(double value) {
   std::string figure = measured_figure(value);
-  const bool has_fraction =
-      figure.find('.') != std::string::npos && figure.find('e') == std::string::npos;
-  if (!has_fraction) return figure;
+  return figure.find('e') == std::string::npos ? without_end_zeros(std::move(figure)) : figure;
+}
+
+std::string without_end_zeros(std::string figure) {
+  if (figure.find('.') == std::string::npos) return figure;
   figure.erase(figure.find_last_not_of('0') + 1);
   if (figure.back() == '.') figure.pop_back();
   return figure;

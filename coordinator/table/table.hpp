@@ -89,6 +89,9 @@ struct Table {
 /// A number ≥ 0 that somebody gave, without zeros that say nothing: `7.3`, `2000`.
 [[nodiscard]] std::string given_figure(double value);
 
+/// A decimal fraction without zeros at its end, and without a point that would be last.
+[[nodiscard]] std::string without_end_zeros(std::string figure);
+
 /// `1,234,567`
 [[nodiscard]] std::string grouped(std::uint64_t count);
 

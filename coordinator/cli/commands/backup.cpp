@@ -13,11 +13,8 @@ struct BackupOptions {
   OutputFormat format = OutputFormat::text;
 };
 
-int back_up_database(const BackupOptions& options, const IsStopped& is_stopped) {
+int back_up_database(const BackupOptions& options, const HeedStop& heed_stop) {
   check_new_file("destination", options.destination);
-  const auto heed_stop = [&] {
-    if (is_stopped()) throw Interrupted();
-  };
   const Store store = Store::open_read_only(options.database);
   // A copy may be all that is left some day: one of a damaged file must not pass for a good one.
   check_definition_digest(store);
@@ -33,9 +30,7 @@ void add_backup(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<BackupOptions>(
       app, chosen, "backup", "Copy a database, even while it is written", back_up_database);
   add_database(command, options.database);
-  command.add_option("DESTINATION", options.destination, "File to make")
-      ->type_name(database_type)
-      ->required();
+  add_path(command, database_type, "DESTINATION", options.destination, "File to make")->required();
   add_json_flag(command, options.format);
 }
 

@@ -11,12 +11,14 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/page/page.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/table/table.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/link/whole_file.hpp"
 
 namespace proofmass {
@@ -117,9 +119,9 @@ Declared<Options> add_command(CLI::App& app, Command& chosen, const std::string&
 template <typename Options>
 Declared<Options> add_stoppable_command(CLI::App& app, Command& chosen, const std::string& name,
                                         const std::string& description,
-                                        int (*run)(const Options&, const IsStopped&)) {
+                                        int (*run)(const Options&, const HeedStop&)) {
   const auto work = [run](const Options& options) {
-    return run_until_stopped([&](const IsStopped& is_stopped) { return run(options, is_stopped); });
+    return run_until_stopped([&](const HeedStop& heed_stop) { return run(options, heed_stop); });
   };
   const auto declared = add_command<Options>(app, chosen, name, description, work);
   declared.command.footer(exit_codes_text({exit_interrupted}));
@@ -144,19 +146,50 @@ inline void add_force_flag(CLI::App& command, wire::IfThere& if_there) {
 inline constexpr const char* database_type = "FILE.db";
 inline constexpr const char* campaign_file_type = "FILE.toml";
 
+/// Declares an option or argument that names one file or several.
+/// @param type   One of these types, or of wire.
+/// @param paths  Lives as long as the command, as the targets of the functions below do.
+template <typename Paths>
+CLI::Option* add_path(CLI::App& command, const char* type, const std::string& name, Paths& paths,
+                      const std::string& description) {
+  return command.add_option(name, paths, description)->type_name(type);
+}
+
 /// Declares an argument that names a campaign database.
 inline void add_database(CLI::App& command, std::filesystem::path& database,
                          const std::string& name = "DB") {
-  command.add_option(name, database, "Database of a campaign")
-      ->type_name(database_type)
-      ->required();
+  add_path(command, database_type, name, database, "Database of a campaign")->required();
 }
 
 /// Declares the argument FILE, a campaign file.
 inline void add_campaign_file(CLI::App& command, std::filesystem::path& file) {
-  command.add_option("FILE", file, "Campaign file (TOML)")
-      ->type_name(campaign_file_type)
-      ->required();
+  add_path(command, campaign_file_type, "FILE", file, "Campaign file (TOML)")->required();
+}
+
+/// The ends of the closed range that a number is in, see wire::in_range().
+template <typename Number>
+struct NumberRange {
+  Number minimum;
+  Number maximum;
+};
+
+/// Declares an option that takes a number; `--help` shows what the target has.
+template <typename Number>
+CLI::Option* add_number(CLI::App& command, const std::string& name, Number& target,
+                        const std::type_identity_t<NumberRange<Number>>& range,
+                        const std::string& description) {
+  return command.add_option(name, target, description)
+      ->check(wire::in_range(range.minimum, range.maximum))
+      ->capture_default_str();
+}
+
+/// Declares one without a default.
+template <typename Number>
+CLI::Option* add_number(CLI::App& command, const std::string& name, std::optional<Number>& target,
+                        const std::type_identity_t<NumberRange<Number>>& range,
+                        const std::string& description) {
+  return command.add_option(name, target, description)
+      ->check(wire::in_range(range.minimum, range.maximum));
 }
 
 // Each of these functions declares the command of its name, see add_command(). What a command

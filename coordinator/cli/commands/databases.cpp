@@ -39,7 +39,7 @@ void refuse_same_files(std::span<const std::filesystem::path> files) {
   }
 }
 
-int compare_databases(const CompareOptions& options, const IsStopped& is_stopped) {
+int compare_databases(const CompareOptions& options, const HeedStop& heed_stop) {
   std::vector<std::filesystem::path> files{options.first, options.second};
   files.insert(files.end(), options.others.begin(), options.others.end());
   if (files.size() > num_compared_max) {
@@ -47,7 +47,7 @@ int compare_databases(const CompareOptions& options, const IsStopped& is_stopped
         fmt::format("DB = {} files (must be at most {})", files.size(), num_compared_max));
   }
   refuse_same_files(files);
-  const std::vector<ComparedCampaign> members = compare_several(files, is_stopped);
+  const std::vector<ComparedCampaign> members = compare_several(files, heed_stop);
   if (options.format == OutputFormat::json) {
     print_json(comparison_json(members));
   } else {
@@ -70,8 +70,8 @@ void add_compare(CLI::App& app, Command& chosen) {
       app, chosen, "compare", "Compare the results of campaigns", compare_databases);
   add_database(command, options.first, "A");
   add_database(command, options.second, "B");
-  command.add_option("DB", options.others, "Further databases: each is compared with A")
-      ->type_name(database_type);
+  add_path(command, database_type, "DB", options.others,
+           "Further databases: each is compared with A");
   add_json_flag(command, options.format);
 }
 
@@ -87,7 +87,7 @@ struct ExportOptions {
   DrawColumns draws = DrawColumns::left_out;
 };
 
-int export_results(const ExportOptions& options, const IsStopped& is_stopped) {
+int export_results(const ExportOptions& options, const HeedStop& heed_stop) {
   if (options.format == ExportFormat::sqlite && options.draws == DrawColumns::included) {
     throw UsageError("draws = (must not be given with --format sqlite)");
   }
@@ -95,9 +95,9 @@ int export_results(const ExportOptions& options, const IsStopped& is_stopped) {
   check_output_file(options.output, options.if_there, "name one that may be replaced");
   const Store store = Store::open_read_only(options.database);
   if (options.format == ExportFormat::hdf5) {
-    export_hdf5(store, options.output, is_stopped, options.draws);
+    export_hdf5(store, options.output, heed_stop, options.draws);
   } else {
-    export_sqlite(store, options.output, is_stopped);
+    export_sqlite(store, options.output, heed_stop);
   }
   return exit_done;
 }
@@ -108,10 +108,10 @@ struct ImportOptions {
   std::filesystem::path database;
 };
 
-int import_file(const ImportOptions& options, const IsStopped& is_stopped) {
+int import_file(const ImportOptions& options, const HeedStop& heed_stop) {
   check_new_file("db", options.database);
   const MissingEstimates missing =
-      import_results(options.results, options.schema, options.database, is_stopped);
+      import_results(options.results, options.schema, options.database, heed_stop);
   const Store store = Store::open_read_only(options.database);
   const std::string without = missing.total() == 0
                                   ? ""
@@ -131,9 +131,7 @@ void add_export(CLI::App& app, Command& chosen) {
       app, chosen, "export", "Write all results in a format of other programs", export_results);
   add_database(command, options.database);
   wire::add_choice(command, "--format", options.format, formats, "hdf5 by default");
-  command.add_option("--output", options.output, "File to write")
-      ->type_name(wire::file_type)
-      ->required();
+  add_path(command, wire::file_type, "--output", options.output, "File to write")->required();
   add_force_flag(command, options.if_there);
   command.add_flag_callback(
       "--draws", [&draws = options.draws] { draws = DrawColumns::included; },
@@ -145,12 +143,10 @@ void add_import(CLI::App& app, Command& chosen) {
       app, chosen, "import", "Make a database of another program's results", import_file);
   command.add_option("RESULTS", options.results, "CSV with truths and estimates, a line a run")
       ->required();
-  command.add_option("--schema", options.schema, "TOML that says what its columns are")
-      ->type_name(campaign_file_type)
+  add_path(command, campaign_file_type, "--schema", options.schema,
+           "TOML that says what its columns are")
       ->required();
-  command.add_option("--db", options.database, "Database to be made")
-      ->type_name(database_type)
-      ->required();
+  add_path(command, database_type, "--db", options.database, "Database to be made")->required();
 }
 
 namespace {
@@ -178,8 +174,8 @@ int list_databases(const ListOptions& options) {
 void add_list(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ListOptions>(
       app, chosen, "list", "List the campaigns of directories and files", list_databases);
-  command.add_option("PLACE", options.places, "Directories, databases; this directory by default")
-      ->type_name(database_type);
+  add_path(command, database_type, "PLACE", options.places,
+           "Directories, databases; this directory by default");
   add_json_flag(command, options.format);
 }
 

@@ -253,26 +253,16 @@ int keep_workers(const FactoryOptions& options) {
 
 void add_sizing(CLI::App& command, FactoryOptions& options) {
   FactoryConfig& factory = options.factory;
-  command.add_option("--workers-max", factory.workers_max, "Workers of this factory, at most")
-      ->check(wire::in_range(std::uint64_t{1}, workers_max_max))
-      ->capture_default_str();
-  command
-      .add_option("--workers-min", factory.workers_min, "Workers, at least, while any run is open")
-      ->check(wire::in_range(std::uint64_t{0}, workers_max_max))
-      ->capture_default_str();
-  command
-      .add_option("--backlog", factory.backlog,
-                  "Workers in the queue that have not registered,\nat most")
-      ->check(wire::in_range(std::uint64_t{1}, workers_max_max))
-      ->capture_default_str();
-  command
-      .add_option("--utilisation-min", factory.utilisation_min,
-                  "A worker is asked for if there is work for this\nshare of its walltime")
-      ->check(wire::in_range(0.001, 1.0))
-      ->capture_default_str();
-  command.add_option("--interval", factory.interval_s, "Seconds between two looks")
-      ->check(wire::in_range(std::uint64_t{1}, wire::factory_interval_s_max))
-      ->capture_default_str();
+  add_number(command, "--workers-max", factory.workers_max, {1, workers_max_max},
+             "Workers of this factory, at most");
+  add_number(command, "--workers-min", factory.workers_min, {0, workers_max_max},
+             "Workers, at least, while any run is open");
+  add_number(command, "--backlog", factory.backlog, {1, workers_max_max},
+             "Workers in the queue that have not registered,\nat most");
+  add_number(command, "--utilisation-min", factory.utilisation_min, {0.001, 1.0},
+             "A worker is asked for if there is work for this\nshare of its walltime");
+  add_number(command, "--interval", factory.interval_s, {1, wire::factory_interval_s_max},
+             "Seconds between two looks");
   command.add_flag("--exit-when-done", options.ends_when_done,
                    "End when every campaign is finished; end with\nan error instead of pausing");
 }
@@ -284,18 +274,12 @@ void add_workers_of(CLI::App& command, FactoryOptions& options) {
       ->required();
   command.add_option("--worker-keys", options.worker_keys,
                      "Directory of the worker's keys, on its node");
-  command.add_option("--walltime", options.walltime_min, "Minutes that a worker has")
-      ->check(wire::in_range(walltime_min_min, walltime_min_max))
-      ->capture_default_str();
-  command
-      .add_option("--idle-timeout", options.idle_timeout_s,
-                  "Seconds without work after which a worker ends")
-      ->check(wire::in_range(std::uint64_t{1}, std::uint64_t{24 * 3600}))
-      ->capture_default_str();
-  command
-      .add_option("--processors", options.factory.num_processors,
-                  "Processors of a worker; by default it has a\nnode of its own")
-      ->check(wire::in_range(1U, 256U));
+  add_number(command, "--walltime", options.walltime_min, {walltime_min_min, walltime_min_max},
+             "Minutes that a worker has");
+  add_number(command, "--idle-timeout", options.idle_timeout_s, {1, 24 * 3600},
+             "Seconds without work after which a worker ends");
+  add_number(command, "--processors", options.factory.num_processors, {1, 256},
+             "Processors of a worker; by default it has a\nnode of its own");
   command.add_option("--worker-start-cmd", options.start_command,
                      "Line of bash before the worker starts, e.g.\n'module load proofmass'");
   command.add_option("--worker-wrap-cmd", options.wrap_command,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -98,7 +99,7 @@ class FilesOfOneSet {
   bool is_whole_ = false;
 };
 
-void make_whole_set(const std::filesystem::path& directory, const IsStopped& is_stopped) {
+void make_whole_set(const std::filesystem::path& directory, const HeedStop& heed_stop) {
   FilesOfOneSet files(
       directory, {"coordinator.key", "coordinator.pub", "worker.key", "worker.pub", "client.key",
                   "client.pub", "authorized_workers", "authorized_clients"});
@@ -107,7 +108,7 @@ void make_whole_set(const std::filesystem::path& directory, const IsStopped& is_
   wire::write_key_pair(directory, to_text(KeyRole::coordinator), KeyRole::coordinator,
                        wire::make_key_pair());
   for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
-    if (is_stopped()) throw Interrupted();
+    heed_stop();
     const wire::KeyPair pair = wire::make_key_pair();
     // The person who sets a coordinator up may control all of its campaigns.
     const std::string_view rights = role == KeyRole::client ? "observe,submit,control" : "";
@@ -128,6 +129,18 @@ std::string read_list(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
+void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
+                       std::string_view name) {
+  const bool is_renamed = name != to_text(role);
+  fmt::print(
+      "{0} needs\na directory with two files, readable by its user alone:\n  {1}{2}\n  {3}\n",
+      role == KeyRole::worker ? "A host of workers (proofmass-worker --keys)"
+                              : "A person who submits and watches (proofmass --keys)",
+      (directory / fmt::format("{}.key", name)).string(),
+      is_renamed ? fmt::format("  as {}.key", to_text(role)) : "",
+      (directory / "coordinator.pub").string());
+}
+
 /// A pair to add, of a name that is free: nothing is written before all are known to be.
 class NewPair {
  public:
@@ -146,6 +159,7 @@ class NewPair {
     files_.emplace(directory, std::vector<std::string>{name + ".key", name + ".pub"});
   }
 
+  /// Says what to copy where, too.
   void write() {
     const wire::KeyPair pair = wire::make_key_pair();
     wire::write_key_pair(directory_, name_, role_, pair);
@@ -153,6 +167,7 @@ class NewPair {
     wire::write_whole_file("allow-list", list_, text_ + list_line(pair, name_), wire::trusted_mode,
                            wire::IfThere::replace);
     files_->keep();
+    say_where_to_copy(directory_, role_, name_);
   }
 
  private:
@@ -169,46 +184,28 @@ class NewPair {
   std::optional<FilesOfOneSet> files_;
 };
 
-void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
-                       std::string_view name) {
-  const bool is_renamed = name != to_text(role);
-  fmt::print(
-      "{0} needs\na directory with two files, readable by its user alone:\n  {1}{2}\n  {3}\n",
-      role == KeyRole::worker ? "A host of workers (proofmass-worker --keys)"
-                              : "A person who submits and watches (proofmass --keys)",
-      (directory / fmt::format("{}.key", name)).string(),
-      is_renamed ? fmt::format("  as {}.key", to_text(role)) : "",
-      (directory / "coordinator.pub").string());
-}
-
 /// Makes a directory with the keys of a coordinator, of workers and of clients, and the lists of
 /// who may connect; or adds pairs to one. Says what to copy where.
-int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
+int make_keys(const KeygenOptions& options, const HeedStop& heed_stop) {
   const std::filesystem::path& directory = options.directory;
   if (options.worker && options.worker == options.client) {
     throw UsageError(
         fmt::format("--client = {} (must be another name than that of --worker)", *options.client));
   }
-  std::optional<NewPair> of_worker, of_client;
-  if (options.worker) of_worker.emplace(directory, KeyRole::worker, *options.worker);
-  if (options.client) of_client.emplace(directory, KeyRole::client, *options.client);
-  if (of_worker) {
-    of_worker->write();
-    say_where_to_copy(directory, KeyRole::worker, *options.worker);
-  }
-  if (of_client) {
-    of_client->write();
-    say_where_to_copy(directory, KeyRole::client, *options.client);
-  }
-  if (of_worker || of_client) return exit_done;
-  make_whole_set(directory, is_stopped);
+  std::deque<NewPair> pairs;
+  if (options.worker) pairs.emplace_back(directory, KeyRole::worker, *options.worker);
+  if (options.client) pairs.emplace_back(directory, KeyRole::client, *options.client);
+  for (NewPair& pair : pairs) pair.write();
+  if (!pairs.empty()) return exit_done;
+  make_whole_set(directory, heed_stop);
   fmt::print(
       "wrote {0}\nKeep this directory on the coordinator's machine:\n"
       "  proofmass-coordinator --keys {0}\n"
       "The coordinator admits the keys in authorized_workers and authorized_clients.\n",
       directory.string());
-  say_where_to_copy(directory, KeyRole::worker, to_text(KeyRole::worker));
-  say_where_to_copy(directory, KeyRole::client, to_text(KeyRole::client));
+  for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
+    say_where_to_copy(directory, role, to_text(role));
+  }
   return exit_done;
 }
 
@@ -217,8 +214,8 @@ int make_keys(const KeygenOptions& options, const IsStopped& is_stopped) {
 void add_keygen(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<KeygenOptions>(
       app, chosen, "keygen", "Make keys of a coordinator, workers, clients", make_keys);
-  command.add_option("DIRECTORY", options.directory, "Directory to make, or to add a key to")
-      ->type_name(wire::directory_type)
+  add_path(command, wire::directory_type, "DIRECTORY", options.directory,
+           "Directory to make, or to add a key to")
       ->required();
   command.add_option("--worker", options.worker, "Add a key of this name for a worker");
   command.add_option("--client", options.client, "Add a key of this name for a client");

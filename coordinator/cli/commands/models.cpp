@@ -121,8 +121,8 @@ int list_models(const ModelsOptions& options) {
 void add_init(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<InitOptions>(
       app, chosen, "init", "Write an example of a campaign file, commented", write_example);
-  command.add_option("FILE", options.file, "File to write; - for standard output")
-      ->type_name(campaign_file_type)
+  add_path(command, campaign_file_type, "FILE", options.file,
+           "File to write; - for standard output")
       ->capture_default_str();
   add_force_flag(command, options.if_there);
 }
@@ -131,15 +131,15 @@ void add_environment(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<EnvironmentOptions>(
       app, chosen, "environment", "Compute an environment file from physics", write_environment);
   add_campaign_file(command, options.file);
-  command.add_option("--output", options.output, "File (CSV) to write; - for standard output")
-      ->type_name(wire::file_type)
+  add_path(command, wire::file_type, "--output", options.output,
+           "File (CSV) to write; - for standard output")
       ->required();
   command
       .add_option("--session", options.request.session,
                   "Session that it is for, if their spins differ")
       ->type_name("NAME");
-  command.add_option("--physics", options.request.physics, "File (TOML) of what is not nominal")
-      ->type_name(wire::file_type);
+  add_path(command, wire::file_type, "--physics", options.request.physics,
+           "File (TOML) of what is not nominal");
   add_force_flag(command, options.if_there);
   add_override_options(command, options.overrides);
 }

@@ -21,7 +21,6 @@
 #include "core/campaign/allocation.hpp"
 #include "core/campaign/plan_study.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/option_checks.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -395,15 +394,11 @@ void add_plan(CLI::App& app, Command& chosen) {
                          "campaign file; Ctrl-C ends\nthe search with the best found so far");
   optimise->type_name(campaign_file_type);
   const std::string steps(built_in_model().step_name());
-  command
-      .add_option("--" + steps, options.num_steps,
-                  "Number to allocate; by default that of the file")
-      ->check(wire::in_range(1, 1'000'000))
+  add_number(command, "--" + steps, options.num_steps, {1, 1'000'000},
+             "Number to allocate; by default that of the file")
       ->needs(optimise);
-  command.add_option("--minimum", options.minimum, "Least number of a session")
-      ->needs(optimise)
-      ->check(wire::in_range(1, 10'000))
-      ->capture_default_str();
+  add_number(command, "--minimum", options.minimum, {1, 10'000}, "Least number of a session")
+      ->needs(optimise);
   command
       .add_option("--for", options.goal,
                   "What is to be best: the chance that all objectives\nhold, or the mean budget")

@@ -178,17 +178,13 @@ void add_query(CLI::App& app, Command& chosen) {
                   "NAME.run_result and so on; may be repeated")
       ->allow_extra_args(false);
   wire::add_choice(command, "--format", options.format, formats(), "table by default");
-  command.add_option("--timeout", options.timeout_s, "Seconds that the answer may take")
-      ->check(wire::in_range(0.001, timeout_s_max))
-      ->capture_default_str();
-  command.add_option("--rows-max", options.num_rows_max, "Rows that a table shows")
-      ->check(wire::in_range(std::size_t{1}, table_rows_max))
-      ->capture_default_str();
-  command
-      .add_option("--columns", options.num_columns,
-                  "Characters that a line of a table may take; by\ndefault as the terminal has, in "
-                  "a pipe any number")
-      ->check(wire::in_range(std::size_t{20}, table_columns_max));
+  add_number(command, "--timeout", options.timeout_s, {0.001, timeout_s_max},
+             "Seconds that the answer may take");
+  add_number(command, "--rows-max", options.num_rows_max, {1, table_rows_max},
+             "Rows that a table shows");
+  add_number(command, "--columns", options.num_columns, {20, table_columns_max},
+             "Characters that a line of a table may take; by\ndefault as the terminal has, in "
+             "a pipe any number");
   add_optional_connection(command, options.connection);
 }
 

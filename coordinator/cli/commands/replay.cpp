@@ -141,14 +141,14 @@ std::unique_ptr<SeriesOutput> output_of(const ReplayOptions& options, const Stor
 }
 
 /// Simulates the runs one after the other. What was written of a run stays if a later one fails.
-int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
+int replay_runs(const ReplayOptions& options, const HeedStop& heed_stop) {
   check_arguments(options);
   const Store store = Store::open_read_only(options.database);
   const Replay replay(store);
   const SignalSelection selection(replay.recording(), options.sessions, options.groups);
   const std::vector<RunResult> results =
       options.run ? std::vector{replay.stored_result(RunIndex{*options.run})}
-                  : replay.worst_results(*options.num_worst, is_stopped);
+                  : replay.worst_results(*options.num_worst, heed_stop);
   for (const RunResult& result : results) {
     for (const auto& file : files_of(options, result.run, selection)) {
       check_output_file(file, options.if_there, "series are written to files");
@@ -160,7 +160,7 @@ int replay_runs(const ReplayOptions& options, const IsStopped& is_stopped) {
   Json json{{"runs", Json::array()}};
   for (const RunResult& stored : results) {
     const std::unique_ptr<SeriesOutput> output = output_of(options, store, stored, selection);
-    ReplayedRun run{.stored = stored, .differences = replay.run(stored, output.get(), is_stopped)};
+    ReplayedRun run{.stored = stored, .differences = replay.run(stored, output.get(), heed_stop)};
     if (run.differences.empty()) run.files = files_of(options, stored.run, selection);
     if (is_json) json["runs"].push_back(replayed_json(run));
     if (!is_json) print_lines(replayed_text(run, store.schema()));
@@ -185,16 +185,11 @@ void add_replay(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<ReplayOptions>(
       app, chosen, "replay", "Simulate runs again, write their time series", replay_runs);
   add_database(command, options.database);
-  command.add_option("--run", options.run, "The run")
-      ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
-  command
-      .add_option("--worst", options.num_worst,
-                  "Instead the runs with the largest |error|\nbeside its objective")
-      ->check(wire::in_range(std::size_t{1}, num_worst_max));
-  command
-      .add_option("--output", options.output,
-                  "File, or directory for csv and --worst;\nby default nothing is written")
-      ->type_name(wire::file_type);
+  add_number(command, "--run", options.run, {0, num_runs_max - 1}, "The run");
+  add_number(command, "--worst", options.num_worst, {1, num_worst_max},
+             "Instead the runs with the largest |error|\nbeside its objective");
+  add_path(command, wire::file_type, "--output", options.output,
+           "File, or directory for csv and --worst;\nby default nothing is written");
   wire::add_choice(command, "--format", options.format, formats, "hdf5 by default");
   command.add_option("--session", options.sessions, "Write this session only; may be repeated")
       ->allow_extra_args(false);

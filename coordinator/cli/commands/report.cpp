@@ -127,8 +127,8 @@ int write_documents(const ReportOptions& options, const Store& store,
     return exit_code_of(review, stated);
   };
   if (options.html.empty()) return write();
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    review.spectra = worst_run_spectra(store, review, is_stopped);
+  return run_until_stopped([&](const HeedStop& heed_stop) {
+    review.spectra = worst_run_spectra(store, review, heed_stop);
     return write();
   });
 }
@@ -172,19 +172,13 @@ void add_report(CLI::App& app, Command& chosen) {
                      fmt::format("Answer whether this requirement is met, as in\n\"{}\" or\n"
                                  "\"all objectives for 95% with 90%\"; may be repeated",
                                  example_requirement()));
-  command
-      .add_option("--requirements", options.requirements_file,
-                  "File (TOML) of requirements, each with id, text\nand requirement")
-      ->type_name(wire::file_type);
-  command
-      .add_option("--html", options.html,
-                  "Write a report for a review, with charts, as\n"
-                  "one HTML file; - for standard output")
-      ->type_name(wire::file_type);
-  command
-      .add_option("--markdown", options.markdown,
-                  "The same without charts, as Markdown; - for\nstandard output")
-      ->type_name(wire::file_type);
+  add_path(command, wire::file_type, "--requirements", options.requirements_file,
+           "File (TOML) of requirements, each with id, text\nand requirement");
+  add_path(command, wire::file_type, "--html", options.html,
+           "Write a report for a review, with charts, as\n"
+           "one HTML file; - for standard output");
+  add_path(command, wire::file_type, "--markdown", options.markdown,
+           "The same without charts, as Markdown; - for\nstandard output");
   add_force_flag(command, options.if_there);
   add_json_flag(command, options.format);
   add_optional_connection(command, options.connection);
@@ -272,8 +266,8 @@ void print_names(const Review& review, const Campaign& campaign) {
 /// The spectra of the worst run, which is simulated for them.
 /// @throws ArchiveError if it has no spectrum of that name.
 void add_spectra(const Store& store, const std::string& chart, Review& review,
-                 const IsStopped& is_stopped) {
-  review.spectra = worst_run_spectra(store, review, is_stopped);
+                 const HeedStop& heed_stop) {
+  review.spectra = worst_run_spectra(store, review, heed_stop);
   const RunSpectra& spectra = *review.spectra;
   if (std::ranges::any_of(spectra.sessions, [&](const SessionSpectrum& spectrum) {
         return spectrum_name(spectrum.session) == chart;
@@ -301,8 +295,8 @@ int plot(const PlotOptions& options) {
   };
   const std::vector<std::string> spectra = spectrum_names_of(*campaign);
   if (std::ranges::find(spectra, options.chart) == spectra.end()) return write();
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    add_spectra(store, options.chart, review, is_stopped);
+  return run_until_stopped([&](const HeedStop& heed_stop) {
+    add_spectra(store, options.chart, review, heed_stop);
     return write();
   });
 }
@@ -317,10 +311,8 @@ void add_plot(CLI::App& app, Command& chosen) {
   command.add_option("--chart", options.chart,
                      fmt::format("Which one, as in errors or histogram:{};\nsee --list",
                                  example_quantity(example_results()).name));
-  command
-      .add_option("--output", options.output,
-                  "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output")
-      ->type_name(wire::file_type);
+  add_path(command, wire::file_type, "--output", options.output,
+           "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output");
   command.add_flag("--list", options.is_list, "Print the names of all charts");
   add_force_flag(command, options.if_there);
 }
@@ -411,13 +403,10 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
   command.add_option("--parameter", options.parameter,
                      "Parameter; all by default, or with --run the one\n"
                      "with the largest error beside its objective");
-  command.add_option("--run", options.run, "Explain the error of this run")
-      ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
-  command
-      .add_option("--rows", options.num_rows,
-                  "Quantities to name for each error; by default 5,\n"
-                  "or none if chance explains all influences")
-      ->check(wire::in_range(std::size_t{1}, num_rows_max));
+  add_number(command, "--run", options.run, {0, num_runs_max - 1}, "Explain the error of this run");
+  add_number(command, "--rows", options.num_rows, {1, num_rows_max},
+             "Quantities to name for each error; by default 5,\n"
+             "or none if chance explains all influences");
   add_json_flag(command, options.format);
   add_optional_connection(command, options.connection);
 }

@@ -32,7 +32,6 @@
 #include "coordinator/store/records.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
-#include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/model_choice.hpp"
@@ -380,9 +379,8 @@ void add_run_options(CLI::App& command, RunOptions& options) {
   add_override_options(command, options.overrides);
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);
-  command
-      .add_option("--workers", options.num_workers, "Worker processes; one a processor by default")
-      ->check(wire::in_range(1U, workers_max));
+  add_number(command, "--workers", options.num_workers, {1, workers_max},
+             "Worker processes; one a processor by default");
   command
       .add_option(
           "--gpu", options.gpus,
@@ -399,8 +397,8 @@ void add_run(CLI::App& app, Command& chosen) {
       });
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_campaign_file(command, options.campaign_file);
-  command.add_option("--db", options.database, "Database; by default FILE's stem with .db, here")
-      ->type_name(database_type);
+  add_path(command, database_type, "--db", options.database,
+           "Database; by default FILE's stem with .db, here");
   add_range_option(command, options.part);
   add_run_options(command, options);
   add_page_options(command, options.page);

@@ -20,7 +20,6 @@
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/name.hpp"
-#include "proto/command_line/option_checks.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
@@ -29,29 +28,25 @@ namespace proofmass::coordinator {
 namespace {
 
 int show_status(const ClientOptions& options) {
-  return with_connection(options, [&](const Ask& ask) {
-    const proto::StatusReply status = whole_status(ask);
-    if (options.format == OutputFormat::json) {
-      print_json(status_json(status));
-    } else {
-      TerminalStyle style = style_of(stdout);
-      style.wraps_cells = true;
-      write_standard_output(status_text(status, style));
-    }
-    return exit_done;
-  });
+  const proto::StatusReply status = whole_status(connected(options));
+  if (options.format == OutputFormat::json) {
+    print_json(status_json(status));
+  } else {
+    TerminalStyle style = style_of(stdout);
+    style.wraps_cells = true;
+    write_standard_output(status_text(status, style));
+  }
+  return exit_done;
 }
 
 int show_workers(const ClientOptions& options) {
-  return with_connection(options, [&](const Ask& ask) {
-    const proto::WorkersReply workers = all_workers(ask);
-    if (options.format == OutputFormat::json) {
-      print_json(workers_json(workers));
-    } else {
-      write_standard_output(terminal_text(workers_table(workers), style_of(stdout)));
-    }
-    return exit_done;
-  });
+  const proto::WorkersReply workers = all_workers(connected(options));
+  if (options.format == OutputFormat::json) {
+    print_json(workers_json(workers));
+  } else {
+    write_standard_output(terminal_text(workers_table(workers), style_of(stdout)));
+  }
+  return exit_done;
 }
 
 }  // namespace
@@ -76,26 +71,20 @@ struct ControlOptions {
   ClientOptions client;
   ControlAction action = proto::CONTROL_ACTION_PAUSE;
   std::string campaign;
-  int priority = 0;  ///< For set_priority.
+  std::optional<int> priority;  ///< For set_priority.
 };
-
-int ask_for(const ClientOptions& client, const proto::RequestEnvelope& request,
-            const ActionTaken& action) {
-  return with_connection(client, [&](const Ask& ask) {
-    print_done(ask, request, action, client.format);
-    return exit_done;
-  });
-}
 
 int control_campaign(const ControlOptions& options) {
   proto::RequestEnvelope request;
   proto::ControlRequest& control = *request.mutable_control();
   control.set_action(options.action);
   control.set_campaign(checked_campaign_name(options.campaign));
-  control.set_priority(options.priority);
-  return ask_for(
-      options.client, request,
-      {.name = wire::name_of(options.action), .kind = "campaign", .target = options.campaign});
+  control.set_priority(options.priority.value_or(0));
+  print_done(
+      connected(options.client), request,
+      {.name = wire::name_of(options.action), .kind = "campaign", .target = options.campaign},
+      options.client.format);
+  return exit_done;
 }
 
 void add_action(CLI::App& app, Command& chosen, ControlAction action,
@@ -105,8 +94,8 @@ void add_action(CLI::App& app, Command& chosen, ControlAction action,
   options.action = action;
   command.add_option("NAME", options.campaign, "Campaign")->required();
   if (action == proto::CONTROL_ACTION_SET_PRIORITY) {
-    command.add_option("PRIORITY", options.priority, "-100 to 100; higher ones are computed first")
-        ->check(wire::in_range(-wire::priority_max, wire::priority_max))
+    add_number(command, "PRIORITY", options.priority, {-wire::priority_max, wire::priority_max},
+               "-100 to 100; higher ones are computed first")
         ->required();
   }
   add_client_options(command, options.client);
@@ -123,8 +112,9 @@ int release_host(const ReleaseOptions& options) {
   }
   proto::RequestEnvelope request;
   request.mutable_release_host()->set_host(options.host);
-  return ask_for(options.client, request,
-                 {.name = "release", .kind = "host", .target = options.host});
+  print_done(connected(options.client), request,
+             {.name = "release", .kind = "host", .target = options.host}, options.client.format);
+  return exit_done;
 }
 
 }  // namespace
@@ -301,19 +291,18 @@ int fetch_database(const FetchOptions& options) {
   const std::filesystem::path file = options.file.value_or(name + ".db");
   check_new_file("file", file);
   Store::check_absence(file);
-  return with_connection(options.client, [&](const Ask& ask) {
-    ArrivedPart part(std::filesystem::path(file).concat(".part"));
-    proto::RequestEnvelope question = question_about(name, proto::QUESTION_DATABASE);
-    question.mutable_answer()->set_known_size(part.size());
-    if (part.size() > 0) question.mutable_answer()->set_known_sha256(part.sha256());
-    complete(part, ask, reply_of(ask, question, proto::ReplyEnvelope::kAnswer).answer());
-    Store::check_absence(file);  // Again: completing it may have taken long.
-    if (const int error = wire::publish_file(part.path(), file, wire::IfThere::keep); error != 0) {
-      throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
-    }
-    print_fetched(file, options.client.format);
-    return exit_done;
-  });
+  const Ask ask = connected(options.client);
+  ArrivedPart part(std::filesystem::path(file).concat(".part"));
+  proto::RequestEnvelope question = question_about(name, proto::QUESTION_DATABASE);
+  question.mutable_answer()->set_known_size(part.size());
+  if (part.size() > 0) question.mutable_answer()->set_known_sha256(part.sha256());
+  complete(part, ask, reply_of(ask, question, proto::ReplyEnvelope::kAnswer).answer());
+  Store::check_absence(file);  // Again: completing it may have taken long.
+  if (const int error = wire::publish_file(part.path(), file, wire::IfThere::keep); error != 0) {
+    throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
+  }
+  print_fetched(file, options.client.format);
+  return exit_done;
 }
 
 }  // namespace
@@ -322,8 +311,7 @@ void add_fetch(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<FetchOptions>(
       app, chosen, "fetch", "Copy a campaign's database from a coordinator", fetch_database);
   command.add_option("NAME", options.campaign, "Campaign")->required();
-  command.add_option("FILE", options.file, "File to make; NAME.db by default")
-      ->type_name(database_type);
+  add_path(command, database_type, "FILE", options.file, "File to make; NAME.db by default");
   add_client_options(command, options.client);
 }
 

@@ -23,7 +23,6 @@
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/option_checks.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -88,15 +87,14 @@ void say_failures(const Ask& ask, const std::string& name, std::uint64_t failure
 int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
   const proto::RequestEnvelope request = submit_request(options, *campaign);
-  return with_connection(options.client, [&](const Ask& ask) {
-    print_done(ask, request, {.name = "submit", .kind = "campaign", .target = campaign->name},
-               options.client.format);
-    if (!options.waits) return static_cast<int>(exit_done);
-    flush_standard_output();
-    const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);
-    if (options.stop.failures_max) say_failures(ask, campaign->name, *options.stop.failures_max);
-    return exit_code;
-  });
+  const Ask ask = connected(options.client);
+  print_done(ask, request, {.name = "submit", .kind = "campaign", .target = campaign->name},
+             options.client.format);
+  if (!options.waits) return exit_done;
+  flush_standard_output();
+  const int exit_code = watch_on_standard_output(ask, campaign->name, options.client.format);
+  if (options.stop.failures_max) say_failures(ask, campaign->name, *options.stop.failures_max);
+  return exit_code;
 }
 
 }  // namespace
@@ -106,11 +104,8 @@ void add_submit(CLI::App& app, Command& chosen) {
       app, chosen, "submit", "Hand a campaign or more runs to a coordinator", submit_campaign);
   add_campaign_file(command, options.campaign_file);
   command.add_option("--name", options.name, "Name of the campaign; the one in FILE by default");
-  command
-      .add_option(
-          "--priority", options.priority,
-          "Higher priorities come first; by default 0, or\nunchanged if the campaign exists")
-      ->check(wire::in_range(-wire::priority_max, wire::priority_max));
+  add_number(command, "--priority", options.priority, {-wire::priority_max, wire::priority_max},
+             "Higher priorities come first; by default 0, or\nunchanged if the campaign exists");
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);
   add_override_options(command, options.overrides);
@@ -273,9 +268,8 @@ struct WatchOptions {
 
 int watch_campaigns(const WatchOptions& options) {
   if (options.campaign) (void)checked_campaign_name(*options.campaign);
-  return with_connection(options.client, [&](const Ask& ask) {
-    return watch_on_standard_output(ask, options.campaign, options.client.format);
-  });
+  return watch_on_standard_output(connected(options.client), options.campaign,
+                                  options.client.format);
 }
 
 }  // namespace

@@ -191,14 +191,14 @@ int run_all(const Sweep& sweep, bool is_quiet) {
   return gravest;
 }
 
-void print_comparison(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
+void print_comparison(const Sweep& sweep, OutputFormat format, const HeedStop& heed_stop) {
   std::vector<std::filesystem::path> files;
   std::vector<SweptValues> values;
   for (const SweptCampaign& swept : sweep) {
     files.push_back(*swept.run.database);
     values.push_back(swept.values);
   }
-  const std::vector<ComparedCampaign> members = compare_several(files, is_stopped);
+  const std::vector<ComparedCampaign> members = compare_several(files, heed_stop);
   if (format == OutputFormat::json) return print_json(comparison_json(members, values));
   write_standard_output(comparison_text(members, sweep_names(values), style_of(stdout).paint));
 }
@@ -213,8 +213,8 @@ int sweep_campaigns(const SweepOptions& options) {
     wire::say("proofmass: the same command continues the sweep\n");
     return exit_code;
   }
-  return run_until_stopped([&](const IsStopped& is_stopped) {
-    print_comparison(sweep, options.format, is_stopped);
+  return run_until_stopped([&](const HeedStop& heed_stop) {
+    print_comparison(sweep, options.format, heed_stop);
     return exit_code;
   });
 }
@@ -233,10 +233,8 @@ void add_sweep(CLI::App& app, Command& chosen) {
       ->required()
       ->take_all()
       ->allow_extra_args(false);
-  command
-      .add_option("--directory", options.directory,
-                  "Directory of the databases; by default FILE's\nstem with -sweep, here")
-      ->type_name(wire::directory_type);
+  add_path(command, wire::directory_type, "--directory", options.directory,
+           "Directory of the databases; by default FILE's\nstem with -sweep, here");
   add_run_options(command, options.run);
   add_json_flag(command, options.format);
 }

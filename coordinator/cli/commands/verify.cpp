@@ -45,8 +45,8 @@ VerifyOptions how_to_verify(const std::optional<double>& fraction) {
 
 CLI::Option* add_fraction(CLI::App& command, std::optional<double>& fraction,
                           const std::string& whose = "the runs") {
-  return command.add_option("--fraction", fraction, "Fraction of " + whose + " to simulate again")
-      ->check(wire::in_range(0.0, 1.0))
+  return add_number(command, "--fraction", fraction, {0.0, 1.0},
+                    "Fraction of " + whose + " to simulate again")
       ->default_str(fmt::format("{}", fraction_by_default));
 }
 
@@ -58,15 +58,15 @@ Json json_of_check(const Check& check) {
 }
 
 /// Prints checks of a file as soon as they are made, and what came of them.
-/// @param make_checks  Calls its argument with each, and returns true if none fails.
+/// @param make_checks  Calls its argument with each.
 int print_checks(const CheckedFileOptions& options,
-                 const std::function<bool(const std::function<void(const Check&)>&)>& make_checks) {
+                 const std::function<void(const std::function<void(const Check&)>&)>& make_checks) {
   const std::filesystem::path& file = options.file;
   const bool is_json = options.format == OutputFormat::json;
   bool is_simulated = true;
   std::size_t num_failing = 0, num_checks = 0;
   Json checks = Json::array();
-  const bool holds = make_checks([&](const Check& check) {
+  make_checks([&](const Check& check) {
     ++num_checks;
     if (check.verdict == CheckOutcome::fails) ++num_failing;
     if (check.verdict == CheckOutcome::not_checked && check.name == "simulation") {
@@ -82,6 +82,7 @@ int print_checks(const CheckedFileOptions& options,
   if (is_json) {
     print_json({{"file", file.string()}, {"num_failing", num_failing}, {"checks", checks}});
   }
+  const bool holds = num_failing == 0;
   if (holds && !is_simulated && options.fraction.value_or(0.0) > 0.0) {
     wire::say(fmt::format("proofmass: error: {}: no run was simulated again, as --fraction asks\n",
                           file.string()));
@@ -93,22 +94,22 @@ int print_checks(const CheckedFileOptions& options,
   return exit_cannot_be_done;
 }
 
-int verify_database(const CheckedFileOptions& options, const IsStopped& is_stopped) {
+int verify_database(const CheckedFileOptions& options, const HeedStop& heed_stop) {
   return print_checks(options, [&](const auto& report) {
-    return verify(options.file, how_to_verify(options.fraction), report, is_stopped);
+    verify(options.file, how_to_verify(options.fraction), report, heed_stop);
   });
 }
 
-int publish_campaign(const CheckedFileOptions& options, const IsStopped& is_stopped) {
+int publish_campaign(const CheckedFileOptions& options, const HeedStop& heed_stop) {
   if (options.is_check) {
     return print_checks(options, [&](const auto& report) {
-      return check_publication(options.file, how_to_verify(options.fraction), report, is_stopped);
+      check_publication(options.file, how_to_verify(options.fraction), report, heed_stop);
     });
   }
   std::filesystem::path output = options.output;
   if (output.empty()) output = options.file.stem().string() + ".tar.gz";
   check_output_file(output, options.if_there, "name one to replace");
-  publish(options.file, output, options.if_there, options.authors, is_stopped);
+  publish(options.file, output, options.if_there, options.authors, heed_stop);
   print_written(output, options.format);
   return exit_done;
 }
@@ -126,14 +127,12 @@ void add_verify(CLI::App& app, Command& chosen) {
 void add_publish(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<CheckedFileOptions>(
       app, chosen, "publish", "Write an archive to cite, or check one", publish_campaign);
-  command.add_option("FILE", options.file, "Database; with --check an archive")
-      ->type_name(wire::file_type)
+  add_path(command, wire::file_type, "FILE", options.file, "Database; with --check an archive")
       ->required();
   CLI::Option* const check =
       command.add_flag("--check", options.is_check, "Check an archive, simulate some runs again");
-  command
-      .add_option("--output", options.output, "Archive; by default FILE's stem with .tar.gz, here")
-      ->type_name(wire::file_type)
+  add_path(command, wire::file_type, "--output", options.output,
+           "Archive; by default FILE's stem with .tar.gz, here")
       ->excludes(check);
   command.add_option("--author", options.authors, "Of the results, for citations; may be repeated")
       ->excludes(check);
@@ -183,7 +182,7 @@ void require_part(const std::filesystem::path& part, const LargestPart& largest)
 
 /// @throws ArchiveError with the checks that fail.
 void require_sound(const std::filesystem::path& part, const MergeOptions& options,
-                   const IsStopped& is_stopped) {
+                   const HeedStop& heed_stop) {
   std::string failing;
   const auto collect = [&](const Check& check) {
     const bool is_skipped =
@@ -193,7 +192,8 @@ void require_sound(const std::filesystem::path& part, const MergeOptions& option
     }
     if (check.verdict == CheckOutcome::fails) failing += "\n" + check_text(check);
   };
-  if (verify(part, how_to_verify(options.fraction), collect, is_stopped) && failing.empty()) return;
+  verify(part, how_to_verify(options.fraction), collect, heed_stop);
+  if (failing.empty()) return;
   while (failing.ends_with('\n')) failing.pop_back();
   throw ArchiveError(fmt::format("{} fails these checks:{}", part.string(), failing));
 }
@@ -245,16 +245,16 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
   print_json(json);
 }
 
-int merge_databases(const MergeOptions& options, const IsStopped& is_stopped) {
+int merge_databases(const MergeOptions& options, const HeedStop& heed_stop) {
   check_new_file("output", options.whole);
   const LargestPart largest = largest_part(options.parts);
   for (const std::filesystem::path& part : options.parts) require_part(part, largest);
-  for (const std::filesystem::path& part : options.parts) require_sound(part, options, is_stopped);
+  for (const std::filesystem::path& part : options.parts) require_sound(part, options, heed_stop);
   const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
   std::vector<MergedPart> parts;
   Store whole = Store::merge(options.whole, *largest.campaign, definition, options.parts,
                              [&](const MergedPart& part) {
-                               if (is_stopped()) throw Interrupted();
+                               heed_stop();
                                parts.push_back(part);
                              });
   update_statistics(whole, *largest.campaign);
@@ -267,11 +267,10 @@ int merge_databases(const MergeOptions& options, const IsStopped& is_stopped) {
 void add_merge(CLI::App& app, Command& chosen) {
   auto [command, options] = add_stoppable_command<MergeOptions>(
       app, chosen, "merge", "Join databases of parts of a campaign", merge_databases);
-  command.add_option("OUT", options.whole, "Database to be made of all parts")
-      ->type_name(database_type)
+  add_path(command, database_type, "OUT", options.whole, "Database to be made of all parts")
       ->required();
-  command.add_option("PART", options.parts, "Databases of one campaign, as of `run --range`")
-      ->type_name(database_type)
+  add_path(command, database_type, "PART", options.parts,
+           "Databases of one campaign, as of `run --range`")
       ->required();
   add_fraction(command, options.fraction, "each part's runs");
   add_json_flag(command, options.format);

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "coordinator/archive/archive_error.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
@@ -59,7 +59,8 @@ inline std::vector<RunResult> results_of_each_status(std::uint64_t count) {
 
 inline std::uint64_t bits_of(double value) { return std::bit_cast<std::uint64_t>(value); }
 
-inline bool never_stopped() { return false; }
+inline void never_stopped() {}
+[[noreturn]] inline void stopped_at_once() { throw coordinator::Interrupted(); }
 
 /// Text of the Error that `action` throws; empty if it throws none.
 inline std::string error_of(const std::function<void()>& action) {

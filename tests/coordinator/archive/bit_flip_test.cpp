@@ -1,15 +1,13 @@
 // A disk that changes bits: whatever is read from a campaign database is what was stored, or is
 // refused.
 
-#include <exception>
-
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/support/microscope_results.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {
@@ -158,10 +156,12 @@ TEST_F(BitFlips, LeaveAComparisonAsItIsOrMakeItRefused) {
 TEST_F(BitFlips, EndNoVerificationAndNoListing) {
   for_each_flip(5, 100, [&](const std::filesystem::path& path, const std::string& what) {
     (void)printed([&] {
-      const bool holds = verify(
-          path, {.model_version = "another, so that nothing is simulated"}, [](const Check&) {},
+      std::size_t num_failing = 0;
+      verify(
+          path, {.model_version = "another, so that nothing is simulated"},
+          [&](const Check& check) { num_failing += check.verdict == CheckOutcome::fails ? 1 : 0; },
           test::never_stopped);
-      EXPECT_FALSE(holds) << what;
+      EXPECT_GT(num_failing, 0U) << what;
       return std::string();
     });
     (void)printed([&] { return terminal_text(listing_table(list_campaigns(std::vector{path}))); });
@@ -196,12 +196,12 @@ TEST_F(RowsOutOfOrder, OfResultsAreRefused) {
   swap_keys(file(), "run_result", 5, 2);
   expect_refusal("result of run 3 comes after that of run 5");
   std::string results;
-  EXPECT_FALSE(verify(
+  verify(
       file(), {},
       [&](const Check& check) {
         if (check.name == "results") results = check.finding;
       },
-      test::never_stopped));
+      test::never_stopped);
   EXPECT_NE(results.find("is damaged: result of run 3 comes after that of run 5"),
             std::string::npos)
       << results;

@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/table/table.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/error_change.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
@@ -357,7 +356,7 @@ TEST_F(ComparedFile, IsReadWithAllThatCountsAndHeldAgainstItsDigest) {
         (MissingEstimates{
             .num_not_converged = 1, .num_not_finite = 1, .num_no_draw = 1, .num_given_up = 1}));
   }
-  EXPECT_THROW((void)compare_several(files, [] { return true; }), Interrupted);
+  EXPECT_THROW((void)compare_several(files, test::stopped_at_once), Interrupted);
   test::change(file(), "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 0");
   EXPECT_THAT(test::error_of([&] { (void)compare_several(files, test::never_stopped); }),
               HasSubstr("the digest of its 5 results is "));

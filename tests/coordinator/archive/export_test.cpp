@@ -4,7 +4,6 @@
 
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/table/table.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -33,7 +32,7 @@ class Export : public test::StoreTest {
 };
 
 TEST_F(Export, CanBeInterrupted) {
-  EXPECT_THROW(export_hdf5(store_, output(), [] { return true; }), Interrupted);
+  EXPECT_THROW(export_hdf5(store_, output(), test::stopped_at_once), Interrupted);
   EXPECT_FALSE(file_names().contains("output"));
   EXPECT_THAT(file_names(), Each(Not(EndsWith(".new"))));
 }
@@ -52,16 +51,15 @@ TEST_F(Export, IsOfOneInstant) {
 
 // A campaign that grows while it is exported, run by run, is drawn as it was when the export began.
 TEST_F(Export, OfDrawsIsOfTheStateThatTheRunsAreOf) {
-  const auto exported = [&](const IsStopped& is_stopped) {
-    export_hdf5(Store::open_read_only(file()), output(), is_stopped, DrawColumns::included);
+  const auto exported = [&](const HeedStop& heed_stop) {
+    export_hdf5(Store::open_read_only(file()), output(), heed_stop, DrawColumns::included);
     return read_by_h5py(output(), directory() / "read");
   };
   const nlohmann::json before = exported(test::never_stopped);
   const auto grow = [&, is_first = true]() mutable {
-    if (!std::exchange(is_first, false)) return false;
+    if (!std::exchange(is_first, false)) return;
     store_.extend(test::campaign_of(6), canonical_definition(test::campaign_of(6)));
     (void)store_.commit(test::deliveries_of(5, 6));
-    return false;
   };
   EXPECT_EQ(exported(grow), before);
   EXPECT_EQ(exported(test::never_stopped)["run_index"].size(), 6U);
@@ -158,11 +156,10 @@ TEST(Resimulation, EndsWithTheFirstFailureOfAnyThread) {
   const std::vector<RunResult> results = test::simulated(campaign);
   for (const std::size_t num_threads : {std::size_t{1}, std::size_t{3}}) {
     std::atomic<int> num_questions = 0;
-    const auto is_stopped = [&]() -> bool {
+    const auto heed_stop = [&] {
       if (++num_questions == 2) throw std::runtime_error("no clock");
-      return false;
     };
-    EXPECT_THAT([&] { (void)simulate_again(campaign, results, num_threads, is_stopped); },
+    EXPECT_THAT([&] { (void)simulate_again(campaign, results, num_threads, heed_stop); },
                 ThrowsMessage<std::runtime_error>("no clock"));
   }
 }

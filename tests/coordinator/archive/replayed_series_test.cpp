@@ -436,7 +436,7 @@ TEST_F(ReplayedSpectra, HaveNoRatioWithoutNoise) {
 
 TEST_F(ReplayedSpectra, EndWhenAsked) {
   const Store store = store_with(test::quick_campaign(1));
-  EXPECT_THROW((void)replayed_spectra(Replay(store), RunIndex{0}, [] { return true; }),
+  EXPECT_THROW((void)replayed_spectra(Replay(store), RunIndex{0}, test::stopped_at_once),
                Interrupted);
 }
 

@@ -3,7 +3,6 @@
 #include "coordinator/archive/verification.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 
@@ -24,11 +23,14 @@ class VerificationTest : public StoreTest {
     coordinator::update_statistics(store, campaign_);
   }
 
-  bool verify_all(double fraction = 1.0) {
+  /// Verifies the file. @return Names of the checks that fail, in alphabetical order.
+  std::vector<std::string> failing(const coordinator::VerifyOptions& options = {.fraction = 1.0,
+                                                                                .num_threads = 2}) {
     checks_.clear();
-    return coordinator::verify(
-        file(), {.fraction = fraction, .num_threads = 2},
-        [&](const Check& check) { checks_.emplace(check.name, check); }, never_stopped);
+    coordinator::verify(
+        file(), options, [&](const Check& check) { checks_.emplace(check.name, check); },
+        never_stopped);
+    return names(CheckOutcome::fails);
   }
 
   [[nodiscard]] const Check& check(const std::string& name) const { return checks_.at(name); }

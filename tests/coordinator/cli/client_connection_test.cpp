@@ -2,30 +2,20 @@
 
 #include "coordinator/net/client_connection.hpp"
 
-#include <gmock/gmock.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <cstdint>
-#include <future>
-#include <memory>
-#include <string>
-#include <utility>
-#include <variant>
-
 #include "coordinator/net/private_endpoint.hpp"
 #include "core/error.hpp"
-#include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/played_coordinator.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using test::PlayedCoordinator;
-using ::testing::StartsWith;
 
 /// Takes connections to a socket file and breaks them off, as the near end of a tunnel does while
 /// there is no coordinator at its far end.

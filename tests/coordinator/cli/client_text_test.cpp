@@ -1,14 +1,9 @@
 #include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <sstream>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/report/json.hpp"
-#include "coordinator/report/status_notes.hpp"
 #include "core/runs.hpp"
 #include "tests/proto/wire/requests.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

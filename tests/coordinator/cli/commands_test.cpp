@@ -3,7 +3,6 @@
 #include "coordinator/cli/program.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/microscope/simulation/run.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
 #include "tests/proto/link/scratch_directory.hpp"

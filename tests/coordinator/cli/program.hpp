@@ -1,7 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include "coordinator/cli/program.hpp"
 #include "tests/test.hpp"
 

@@ -2,17 +2,9 @@
 // it asks: what that program answers is tested in tests/system/remote_results_test.cpp.
 
 #include <fcntl.h>
-#include <gmock/gmock.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/net/answers.hpp"

@@ -3,14 +3,11 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 
 #include "coordinator/cli/local_run.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/store/records.hpp"
-#include "core/error.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/test.hpp"
 

@@ -1,19 +1,11 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstddef>
 #include <cstdio>
-#include <limits>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/program.hpp"
 #include "proto/wire/names.hpp"
 #include "tests/coordinator/cli/display_output.hpp"
 #include "tests/proto/wire/requests.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -1,21 +1,13 @@
 #include "coordinator/page/campaign_details.hpp"
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
-#include <cmath>
 #include <condition_variable>
 #include <ctime>
-#include <map>
-#include <memory>
-#include <mutex>
 #include <new>
-#include <string>
-#include <vector>
 
 #include "coordinator/report/report.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
@@ -24,8 +16,6 @@
 
 namespace proofmass::coordinator {
 namespace {
-
-using namespace std::chrono_literals;
 
 TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
   const TimePoint ended{1000s};

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <exception>
-
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/query/query.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"

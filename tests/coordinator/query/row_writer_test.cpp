@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/error.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass::coordinator {

@@ -1,7 +1,6 @@
 // The results of the paper's campaign to the last bit, seed 1: whoever changes one of them changes
 // the model, and with it model_version.
 
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/read_results.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/test.hpp"

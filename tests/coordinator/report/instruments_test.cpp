@@ -1,19 +1,11 @@
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/table/table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::HasSubstr;
 
 const std::vector<double>& objectives() {
   static const std::vector<double> all = test::campaign_of(1).objectives();

@@ -1,21 +1,10 @@
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <optional>
-#include <vector>
-
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/table/table.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 constexpr SamplingDesign of_four{.kind = DesignKind::sobol, .points = 4};
 

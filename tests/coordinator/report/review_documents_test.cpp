@@ -194,7 +194,9 @@ TEST_F(ReviewSummary, NamesRequirementsThatAreNotMet) {
   const Store store = store_with(100);
   const std::vector<std::string> sentences = sentences_of(
       review_of(store, 100,
-                {{.id = "A", .text = "", .requirement = "k2c < 901 for 99% with 90%"},
+                {{.id = "A",
+                  .text = "Objective of the mission",  // As the program says of its own ones.
+                  .requirement = "k2c < 901 for 99% with 90%"},
                  {.id = "B", .text = "", .requirement = "k2c < 901 for 90% with 90%"}}));
   EXPECT_EQ(sentences[0],
             "It was asked whether 2 requirements hold: A, B, and all objectives together.");

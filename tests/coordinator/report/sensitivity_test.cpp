@@ -1,6 +1,5 @@
 #include "coordinator/report/sensitivity.hpp"
 
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"

@@ -1,22 +1,16 @@
 #include "coordinator/report/standard_errors.hpp"
 
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <vector>
-
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/table/table.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
+#include "tests/test.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
+using ::testing::ContainsRegex;
 
 const std::vector<double> pulls{-3.0, -1.0, 0.5, 1.5, 2.0};
 
@@ -65,7 +59,7 @@ TEST(StandardErrors, HaveNoRatioWhereTheyAreZero) {
     EXPECT_EQ(of.squared_ratio_error, std::nullopt);
   }
   EXPECT_THAT(terminal_text(standard_error_table(test::schema(), statistics), {}),
-              ::testing::ContainsRegex("a_c12 +1e-4 rad +0 .* - +- .*0 +0 +52.2"));
+              ContainsRegex("a_c12 +1e-4 rad +0 .* - +- .*0 +0 +52.2"));
 }
 
 // 3 of 5 by Clopper and Pearson: 14.7 % to 94.7 %.
@@ -73,8 +67,7 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
   const StandardErrorStatistics statistics = of_five_runs();
   const std::string text = terminal_text(standard_error_table(test::schema(), statistics), {});
   EXPECT_THAT(text, HasSubstr("Standard errors σ of the estimates of 5 runs"));
-  EXPECT_THAT(text, ::testing::ContainsRegex(
-                        "a_c12 +1e-4 rad +0.900 .* +3.30 +0.632 .* +60.0 +14.7 +94.7"));
+  EXPECT_THAT(text, ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 +0.632 .* +60.0 +14.7 +94.7"));
   const std::string svg = svg_of(*pull_overview(test::schema(), statistics), SvgUse::embedded);
   EXPECT_EQ(test::malformed_part(svg), "");
   EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law"),
@@ -86,7 +79,7 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
 TEST(StandardErrors, HaveNoColumnsOfIntervalsOfDrawsThatAreNotIndependent) {
   const StandardErrorStatistics statistics = of_five_runs(false);
   const std::string text = terminal_text(standard_error_table(test::schema(), statistics), {});
-  EXPECT_THAT(text, ::testing::ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 .* +60.0\n"));
+  EXPECT_THAT(text, ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 .* +60.0\n"));
   EXPECT_THAT(text, AllOf(Not(HasSubstr("±")), Not(HasSubstr("interval"))));
 }
 
@@ -123,6 +116,111 @@ TEST_F(StandardErrorsTest, AreInNoReportWithoutThem) {
   EXPECT_THAT(review_html(review_of(store, 5)), Not(HasSubstr("tandard error")));
   EXPECT_THAT(review_markdown(review_of(store, 5)), Not(HasSubstr("tandard error")));
   EXPECT_THAT(report_json(review_of(store, 5)).dump(2), HasSubstr("\"standard_errors\": null"));
+}
+
+/// Of two sessions, the noise of which the method knows.
+ResultSchema schema_of_two() {
+  ResultSchema schema = test::schema();
+  schema.fit_parts = {"a_c12", "a_c13"};
+  schema.fit_tolerance = 0.0;
+  return schema;
+}
+
+RunResult result_with(std::vector<double> fit) {
+  RunResult result = test::result_off_by(0, 1.0);
+  result.fit = std::move(fit);
+  return result;
+}
+
+std::vector<FitStatistic> fit_of(const std::vector<std::vector<double>>& runs,
+                                 const ResultSchema& schema = schema_of_two(),
+                                 bool are_draws_independent = true) {
+  RunningStandardErrors running(schema, are_draws_independent);
+  for (const std::vector<double>& fit : runs) running.add(result_with(fit));
+  return running.statistics().fit;
+}
+
+// χ² of 4 degrees is above x with the chance e^(−x/2) (1 + x/2), and of 2 degrees e^(−x/2). Each is
+// doubled, as ratios below 1 count too, and taken three times.
+TEST(Fit, HasTheChanceOfTheChiSquareLaw) {
+  const std::vector<FitStatistic> fit = fit_of({{20.1, 6.0, 20.0, 4.0, 0.1, 2.0}});
+  ASSERT_EQ(fit.size(), 3U);
+  EXPECT_EQ(fit[0].session, "all");
+  EXPECT_EQ(fit[1].session, "a_c12");
+  EXPECT_EQ(fit[1].ratio, 5.0);
+  EXPECT_NEAR(*fit[1].p_value, 6.0 * std::exp(-10.0) * 11.0, 1e-15);
+  EXPECT_NEAR(*fit[2].p_value, 6.0 * (1.0 - std::exp(-0.05)), 1e-14);
+  EXPECT_FALSE(fit[1].ratio_error);
+  // Twice the run: 8 degrees and 40, e^(−20) (1 + 20 + 200 + 8000/6).
+  EXPECT_NEAR(
+      *fit_of({{20.1, 6.0, 20.0, 4.0, 0.1, 2.0}, {20.1, 6.0, 20.0, 4.0, 0.1, 2.0}})[1].p_value,
+      6.0 * std::exp(-20.0) * (221.0 + 8000.0 / 6.0), 1e-18);
+}
+
+// The noise may be off by the tolerance, either way.
+TEST(Fit, AllowsForWhatTheNoiseIsOffBy) {
+  ResultSchema schema = schema_of_two();
+  schema.fit_tolerance = 0.25;
+  const std::vector<FitStatistic> fit = fit_of({{20.0, 6.0, 20.0, 4.0, 0.12, 2.0}}, schema);
+  EXPECT_NEAR(*fit[1].p_value, 6.0 * std::exp(-8.0) * 9.0, 1e-15);
+  EXPECT_NEAR(*fit[2].p_value, 6.0 * (1.0 - std::exp(-0.08)), 1e-14);
+}
+
+// Ratios 1.5 and 0.5 with equal degrees: their mean 1 has the standard deviation √(1/2)/√2.
+TEST(Fit, HasTheStandardErrorOfTheRatio) {
+  const std::vector<FitStatistic> fit =
+      fit_of({{6.0, 4.0, 6.0, 4.0, 0.0, 0.0}, {2.0, 4.0, 2.0, 4.0, 0.0, 0.0}});
+  EXPECT_EQ(fit[1].ratio, 1.0);
+  EXPECT_EQ(fit[1].chi_squared, 4.0);
+  EXPECT_EQ(fit[1].degrees_of_freedom, 4.0);
+  EXPECT_NEAR(fit[1].ratio_error.value(), 0.5, 1e-12);
+  EXPECT_EQ(fit[2].ratio, 0.0);
+  EXPECT_FALSE(fit[2].p_value || fit[2].ratio_error);
+}
+
+// Campaigns of 5 runs in which all is as it should be: at most one in twenty has a session that
+// does not fit, and by Bonferroni's inequality for three of which one is the sum of the others, not
+// many fewer. 4000 of them tell the share to 0.0034, one standard error.
+TEST(Fit, RaisesNoFalseAlarmMoreOftenThanItSays) {
+  std::mt19937_64 random(42);
+  constexpr int num_campaigns = 4000;
+  int num_alarms = 0;
+  for (int i = 0; i < num_campaigns; ++i) {
+    std::vector<std::vector<double>> runs;
+    for (int run = 0; run < 5; ++run) {
+      const double a = std::chi_squared_distribution<>(3.0)(random);
+      const double b = std::chi_squared_distribution<>(8.0)(random);
+      runs.push_back({a + b, 11.0, a, 3.0, b, 8.0});
+    }
+    bool is_alarm = false;
+    for (const FitStatistic& of : fit_of(runs)) is_alarm = is_alarm || *of.p_value < 0.05;
+    if (is_alarm) ++num_alarms;
+  }
+  const double share = num_alarms / static_cast<double>(num_campaigns);
+  EXPECT_LT(share, 0.05 + 4.0 * 0.0034);
+  EXPECT_GT(share, 0.03);
+}
+
+// A test of the equivalence principle has a standard error where its calibration has none.
+TEST(Fit, IsNoneWhereStandardErrorsHaveNone) {
+  ResultSchema schema = test::schema();
+  schema.fit.clear();
+  EXPECT_TRUE(fit_of({{}}, schema).empty());
+}
+
+TEST(Fit, HasATableThatSaysWhatDoesNotFit) {
+  const std::vector<std::vector<double>> runs{{20.1, 6.0, 20.0, 4.0, 2.0, 2.0},
+                                              {21.0, 6.0, 19.0, 4.0, 2.0, 2.0}};
+  const auto text = [&](bool are_independent) {
+    const auto fit = fit_of(runs, schema_of_two(), are_independent);
+    return terminal_text(fit_table(schema_of_two(), fit), {});
+  };
+  EXPECT_THAT(text(true), AllOf(ContainsRegex("a_c12 +19.5 +4.00 +4.88 .* does not fit"),
+                                ContainsRegex("a_c13 +2.00 +2.00 +1.00 +0 +1.00\n"),
+                                HasSubstr("chance that one of 3 ratios")));
+  EXPECT_THAT(text(false),
+              AllOf(HasSubstr("4.88"), Not(HasSubstr("fit\n")), Not(HasSubstr("chance"))));
+  EXPECT_TRUE(fit_table(schema_of_two(), fit_of({})).rows.empty());
 }
 
 }  // namespace

@@ -1,10 +1,7 @@
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/report/report.hpp"
 #include "coordinator/report/review.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
-#include "proto/text/visible_text.hpp"
-#include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -36,16 +33,15 @@ class Summarise : public test::StoreTest {
                           [&](const std::function<void(Store&)>& action) { action(store); });
   }
 
-  static StopPlan plan_of(std::uint64_t num_runs_max) {
-    return {.stop_rule = "mean(k2c) within 5%", .num_runs_max = num_runs_max, .failures_max = {}};
+  static StopPlan plan_of(const std::string& rule) {
+    return {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}};
   }
 };
 
 // All magnitudes are 1 but for run 3, which has no estimate: one of 128 exceeds. The bound is the
 // sequential one, 5.0833 % (scipy.optimize.brentq of the evidence).
 TEST_F(Summarise, DecidesARequirement) {
-  const std::string rule = "k2c < 2 for 90% with 95% decided";
-  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 1);
+  Store store = finished(128, plan_of("k2c < 2 for 90% with 95% decided"), 1, 1);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_FALSE(is_rule_missed(store));
   EXPECT_EQ(stop_outcome(store)->text,
@@ -57,8 +53,7 @@ TEST_F(Summarise, DecidesARequirement) {
 
 // The same of all objectives, which hold in all runs but run 3: 1 − 5.0833 %.
 TEST_F(Summarise, DecidesARequirementOnAllObjectives) {
-  const std::string rule = "all objectives for 90% with 95% decided";
-  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 0, 0);
+  Store store = finished(128, plan_of("all objectives for 90% with 95% decided"), 0, 0);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_FALSE(is_rule_missed(store));
   EXPECT_EQ(stop_outcome(store)->text,
@@ -69,24 +64,20 @@ TEST_F(Summarise, DecidesARequirementOnAllObjectives) {
 
 // A requirement that is decided and not met is missed; the campaign ends all the same.
 TEST_F(Summarise, EndsWhenARequirementCannotBeMet) {
-  const std::string rule = "k2c < 2 for 90% with 95% decided";
-  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 3);
+  Store store = finished(128, plan_of("k2c < 2 for 90% with 95% decided"), 1, 3);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_TRUE(is_rule_missed(store));
 }
 
 TEST_F(Summarise, GoesOnWhileARequirementIsUndecided) {
-  const std::string rule = "k2c < 2 for 99% with 95% decided";
-  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 1);
+  Store store = finished(128, plan_of("k2c < 2 for 99% with 95% decided"), 1, 1);
   EXPECT_EQ(next_runs(store), 192U);
   EXPECT_TRUE(is_rule_missed(store));
 }
 
 // Errors of 1 exceed every objective but those of the quadratic factors.
 TEST_F(Summarise, CountsWhereAllObjectivesHold) {
-  const StopPlan plan{
-      .stop_rule = "all objectives within 50%", .num_runs_max = 1000, .failures_max = {}};
-  Store store = finished(128, plan, 0.0, 1.0);
+  Store store = finished(128, plan_of("all objectives within 50%"), 0, 1);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_EQ(store.stop_checks().back().check.estimate, 0.5);
   EXPECT_EQ(stop_outcome(store)->text,
@@ -98,7 +89,7 @@ TEST_F(Summarise, CountsWhereAllObjectivesHold) {
 
 // Or a program that stops before the check would say that the rule holds.
 TEST_F(Summarise, MissesARuleThatWasNotCheckedWithAllRuns) {
-  Store store = finished(128, plan_of(1000), 1.0, 1.01);
+  Store store = finished(128, plan_of("mean(k2c) within 5%"), 1.0, 1.01);
   EXPECT_TRUE(lacks_stop_check(store));
   EXPECT_TRUE(is_rule_missed(store));
   (void)next_runs(store);
