@@ -116,21 +116,12 @@ void Conversation::on_lease(const proto::RunLease& lease, TimePoint now) {
   if (!is_registered_) return;
   const wire::CampaignId campaign{lease.campaign()};
   const std::vector<RunRange> ranges = new_runs(lease);
-  if (leaving_) {
-    if (ranges.empty()) return;
-    proto::Envelope envelope;
-    proto::GiveBack& answer = *envelope.mutable_give_back();
-    answer.set_reason(wire::message_value(leaving_->reason));
-    proto::HeldRuns& held = *answer.add_runs();
-    held.set_campaign(lease.campaign());
-    held.set_attempt(lease.attempt());
-    wire::add_ranges(ranges, *held.mutable_ranges());
-    return send(std::move(envelope));
-  }
+  const std::vector<RunIndex> runs = indices_of(ranges);
   const auto num_values = static_cast<std::size_t>(lease.table_values_size());
-  if (!agrees_on_table(campaign, num_values / lease.num_runs())) return;
+  if (!leaving_ && !agrees_on_table(campaign, num_values / lease.num_runs())) return;
+  for (const RunIndex run : runs) unfinished_[{campaign, run}] = {lease.attempt()};
+  if (leaving_) return give_back(leaving_->reason, campaign, runs);
   if (!ranges.empty()) execution_.submit(lease, ranges);
-  for (const RunIndex run : indices_of(ranges)) unfinished_[{campaign, run}] = {lease.attempt()};
   const bool is_wanted = wanted_.contains(campaign);
   if (!execution_.is_defined(campaign) && !is_wanted) request(campaign, now);
 }
