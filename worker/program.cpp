@@ -200,10 +200,9 @@ Cards open_cards(const Options& options, std::uint64_t reference_digest, const w
           fmt::format("card {}: computes other results than processors do: {:016x}, not {:016x}",
                       card.index, proof->digest, reference_digest));
     }
-    log({.kind = "card_ready",
-         .fields = {{"card", static_cast<std::uint64_t>(card.index)},
-                    {"name", card.name},
-                    {"slots", std::uint64_t{proof->capacity}}}});
+    log(wire::Event::info("card_ready", {{"card", static_cast<std::uint64_t>(card.index)},
+                                         {"name", card.name},
+                                         {"slots", std::uint64_t{proof->capacity}}}));
     cards.devices.push_back(std::move(device));
     cards.capacity += proof->capacity;
     ++cards.num_of_kind[card.name];
@@ -218,16 +217,14 @@ void add_models(const Options& options, proto::Hello& hello, const wire::Log& lo
   for (const Model* const model : models()) {
     const std::string version(model->version());
     const bool is_program = !model->description().empty();
-    if (is_program) log({.kind = "reference_runs", .fields = {{"model", version}}});
+    if (is_program) log(wire::Event::info("reference_runs", {{"model", version}}));
     std::uint64_t digest = 0;
     try {
       digest = model->reference_digest(best_instruction_set());
       if (!options.parent) wire::require_repeatable(*model);  // Else the campaign has done so.
     } catch (const Error& error) {
       failure = error.what();
-      log({.severity = wire::Severity::warning,
-           .kind = "model_left_out",
-           .fields = {{"model", version}, Field::reason(failure)}});
+      log(wire::Event::warning("model_left_out", {{"model", version}, Field::reason(failure)}));
       continue;
     }
     if (model == &built_in_model()) {
@@ -270,10 +267,10 @@ wire::ClientSecurity security_for(const Options& options, const wire::Log& log) 
                        wire::protection_by(options.keys, options.is_plain_waived));
   if (options.keys) return wire::read_client_security(*options.keys, wire::KeyRole::worker);
   if (!wire::is_local(options.endpoint)) {
-    log({.severity = wire::Severity::warning,
-         .kind = "insecure_plain",
-         .fields = {{"connect", options.endpoint},
-                    Field::remark("(anybody on the network can read and change messages)")}});
+    log(wire::Event::warning(
+        "insecure_plain",
+        {{"connect", options.endpoint},
+         Field::remark("(anybody on the network can read and change messages)")}));
   }
   return {};
 }
@@ -344,7 +341,7 @@ int reporting_errors(const Program& program, const std::function<int()>& what) {
 /// @return 0, or it throws.
 int say_ended(const Ending& ending, const wire::Log& log) {
   if (ending.kind == Ending::Kind::failed) throw Error(ending.reason);
-  log({.kind = "worker_ended", .fields = {Field::reason(ending.reason)}});
+  log(wire::Event::info("worker_ended", {Field::reason(ending.reason)}));
   return 0;
 }
 
@@ -375,10 +372,9 @@ int work(const Options& options, const Program& program, ServeConfig config,
                      .checked_fraction = options.gpu_check});
   const Ending ending = serve(config, executor, progress, signals);
   if (!executor.end_within(thread_end_max)) {
-    config.log(
-        {.severity = wire::Severity::error,
-         .kind = "computation_hangs",
-         .fields = {Field::reason(ending.reason), Field::remark("(the process ends without it)")}});
+    config.log(wire::Event::error(
+        "computation_hangs",
+        {Field::reason(ending.reason), Field::remark("(the process ends without it)")}));
     exit_at_once(exit_hung);
   }
   const auto conclude = [&] { return say_ended(ending, config.log); };
@@ -398,9 +394,7 @@ int run(const Options& options, const Program& program, std::span<const std::str
       wire::make_log(program.name, options.log_format,
                      options.parent ? wire::LogLevel::warning : wire::LogLevel::info);
   for (const std::string& why : left_out) {
-    log({.severity = wire::Severity::warning,
-         .kind = "model_left_out",
-         .fields = {Field::reason(why)}});
+    log(wire::Event::warning("model_left_out", {Field::reason(why)}));
   }
   if (options.parent) {
     die_with(*options.parent);

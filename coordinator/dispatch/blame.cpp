@@ -58,8 +58,7 @@ void quarantine(State& state, const HostId& host, std::uint32_t num_crashes, Out
   wire::Fields fields{{"host", state.hosts.at(host).name}, {"crashes", num_crashes}};
   if (!host.address.empty()) fields.emplace_back("address", host.address);
   if (!host.key.empty()) fields.emplace_back("key", host.key);
-  outbox.log(
-      {.severity = Severity::error, .kind = "host_quarantined", .fields = std::move(fields)});
+  outbox.log(Event::error("host_quarantined", std::move(fields)));
 }
 
 bool is_proven(const State& state, const HostId& id) {
@@ -91,10 +90,7 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
   if (num_crashes < state.config.crashes_per_run_max) return;
   take_off(state, *campaign.audits.find(run), {run, 1});
   campaign.audit_crashes.erase(run);
-  outbox.log({.severity = Severity::error,
-              .kind = "audit_given_up",
-              .fields = {{"run", run.value}, {"crashes", num_crashes}}},
-             id);
+  outbox.log(Event::error("audit_given_up", {{"run", run.value}, {"crashes", num_crashes}}), id);
 }
 
 /// If several runs may be the cause, runs that are suspects already are left out: they will be
@@ -205,11 +201,9 @@ void pause_crashing_campaigns(State& state, Outbox& outbox) {
       crashes.paused_until = state.ticked_at + state.config.quarantine_duration;
       // What a host says that has never computed anything must not keep others from trying.
       if (!is_proven(state, worker.host)) withdraw(state, id, worker.host);
-      outbox.log({.severity = Severity::error,
-                  .kind = "campaign_paused_at_worker",
-                  .fields = {{"worker", worker_id.value},
-                             {"name", worker.name},
-                             {"crashes", crashes.num_in_a_row}}},
+      outbox.log(Event::error("campaign_paused_at_worker", {{"worker", worker_id.value},
+                                                            {"name", worker.name},
+                                                            {"crashes", crashes.num_in_a_row}}),
                  id);
     }
   }
@@ -250,9 +244,7 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   campaign.suspects.erase(run);
   campaign.given_up.add({run, 1});
   outbox.write(id, GivenUpRun{run});
-  outbox.log({.severity = Severity::error,
-              .kind = "run_given_up",
-              .fields = {{"run", run.value}, {"crashes", suspicion.num_crashes}}},
+  outbox.log(Event::error("run_given_up", {{"run", run.value}, {"crashes", suspicion.num_crashes}}),
              id);
 }
 

@@ -123,7 +123,7 @@ void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
   }
   detail::make_pending(state, id, runs, {1}, outbox);
   if (campaign.phase == Phase::finished && !runs.empty()) campaign.phase = Phase::active;
-  outbox.log({.kind = "given_up_runs_retried", .fields = {{"runs", runs.size()}}}, id);
+  outbox.log(Event::info("given_up_runs_retried", {{"runs", runs.size()}}), id);
   detail::sort_served(state);
   detail::settle(state, now, outbox);
 }

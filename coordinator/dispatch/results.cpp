@@ -257,9 +257,8 @@ void on_results(State& state, WorkerId id, CampaignId campaign_id, Attempt attem
   const RunSet foreign = foreign_runs(campaign, results);
   if (!foreign.empty()) detail::send_not_served(id, campaign_id, foreign.ranges(), outbox);
   if (const std::string broken = broken_rule(state, campaign, results, id); !broken.empty()) {
-    outbox.log({.severity = Severity::error,
-                .kind = "results_refused",
-                .fields = {{"worker", id.value}, {"name", worker->name}, Field::reason(broken)}},
+    outbox.log(Event::error("results_refused",
+                            {{"worker", id.value}, {"name", worker->name}, Field::reason(broken)}),
                campaign_id);
     outbox.send(id, wire::rejection(proto::REJECT_REASON_MALFORMED, broken));
     return on_gone(state, id, LossReason::protocol, now, outbox);
@@ -315,10 +314,7 @@ void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, boo
   ++campaign.num_audited;
   if (!is_equal) {
     ++campaign.num_mismatches;
-    outbox.log({.severity = Severity::error,
-                .kind = "result_mismatch",
-                .fields = {{"run", run.value}, {"worker", worker.value}}},
-               id);
+    outbox.log(Event::error("result_mismatch", {{"run", run.value}, {"worker", worker.value}}), id);
   }
   detail::finish_if_done(state, id, outbox);
   if (was_backed_up) detail::lend_to_hungry(state, now, outbox);
@@ -328,19 +324,14 @@ void on_store_failed(State& state, CampaignId id, const std::string& reason, Out
   CampaignState& campaign = state.campaigns.at(id);
   if (campaign.storage_failure == reason) return;
   campaign.storage_failure = reason;
-  outbox.log(
-      {.severity = Severity::error, .kind = "storage_failed", .fields = {Field::reason(reason)}},
-      id);
+  outbox.log(Event::error("storage_failed", {Field::reason(reason)}), id);
 }
 
 void on_store_recovered(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   if (campaign.storage_failure.empty()) return;
   campaign.storage_failure.clear();
-  outbox.log({.severity = Severity::info,
-              .kind = "storage_recovered",
-              .fields = {{"delivered", campaign.delivered.size()}}},
-             id);
+  outbox.log(Event::info("storage_recovered", {{"delivered", campaign.delivered.size()}}), id);
   detail::lend_to_hungry(state, now, outbox);
 }
 

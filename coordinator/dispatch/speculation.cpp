@@ -244,11 +244,10 @@ void copy(State& state, std::vector<WorkerId> idle, TimePoint now, Outbox& outbo
 void note_standstill(State& state, std::size_t num_idle, TimePoint now, Outbox& outbox) {
   if (state.leases.empty()) state.finished_at = now;
   if (now - state.finished_at < state.config.lease_duration_max) return;
-  outbox.log({.severity = Severity::warning,
-              .kind = "nothing_finished",
-              .fields = {{"for_s", static_cast<std::uint64_t>(seconds(now - state.finished_at))},
-                         {"leases", state.leases.size()},
-                         {"idle_workers", num_idle}}});
+  outbox.log(Event::warning(
+      "nothing_finished", {{"for_s", static_cast<std::uint64_t>(seconds(now - state.finished_at))},
+                           {"leases", state.leases.size()},
+                           {"idle_workers", num_idle}}));
   state.finished_at = now;
 }
 

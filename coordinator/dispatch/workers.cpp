@@ -160,14 +160,13 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   for (const proto::OtherModel& other : hello.other_models()) {
     fields.emplace_back("model", other.version());
   }
-  outbox.log({.kind = "worker_registered", .fields = std::move(fields)});
+  outbox.log(Event::info("worker_registered", std::move(fields)));
   for (const proto::OtherModel& other : hello.other_models()) {
     const std::optional<std::string> why = refusal_of(state, other);
     if (!why) continue;
     outbox.log(
-        {.severity = Severity::warning,
-         .kind = "model_left_out",
-         .fields = {{"worker", id.value}, {"name", worker.name}, wire::Field::reason(*why)}});
+        Event::warning("model_left_out",
+                       {{"worker", id.value}, {"name", worker.name}, wire::Field::reason(*why)}));
   }
 }
 
@@ -187,12 +186,10 @@ bool take_hello_allowance(State& state, TimePoint now) {
 /// reason says that one of them may be the cause. The caller settles.
 void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
   const Worker& worker = state.workers.at(id);
-  outbox.log({.severity = Severity::warning,
-              .kind = "worker_gone",
-              .fields = {{"worker", id.value},
-                         {"name", worker.name},
-                         {"reason", name_of(reason)},
-                         {"steps", worker.num_steps_done}}});
+  outbox.log(Event::warning("worker_gone", {{"worker", id.value},
+                                            {"name", worker.name},
+                                            {"reason", name_of(reason)},
+                                            {"steps", worker.num_steps_done}}));
   const detail::RunsByCampaign blamed =
       is_blamed(reason) ? detail::blame_crash(state, id, outbox) : detail::RunsByCampaign();
   detail::remove_worker(state, id, reason, blamed, outbox);
@@ -200,13 +197,11 @@ void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
 
 /// A batch of the worker hangs: tells the worker to end, and parts with it.
 void part_with_hung(State& state, WorkerId id, const Progress& batch, Outbox& outbox) {
-  outbox.log({.severity = Severity::warning,
-              .kind = "worker_gone",
-              .fields = {{"worker", id.value},
-                         {"name", state.workers.at(id).name},
-                         {"reason", "hung"},
-                         {"runs", to_text(batch.runs)},
-                         {"steps", batch.num_steps_done}}},
+  outbox.log(Event::warning("worker_gone", {{"worker", id.value},
+                                            {"name", state.workers.at(id).name},
+                                            {"reason", "hung"},
+                                            {"runs", to_text(batch.runs)},
+                                            {"steps", batch.num_steps_done}}),
              batch.campaign);
   outbox.send(id, stop_message());
   const detail::RunsByCampaign blamed = detail::blame_batch(state, id, batch, outbox);
@@ -250,7 +245,7 @@ void end_quarantines(State& state, Outbox& outbox) {
   std::erase_if(state.quarantined, [&](const auto& item) {
     const bool is_over = state.ticked_at >= item.second;
     if (is_over) {
-      outbox.log({.kind = "host_released", .fields = {{"host", state.hosts.at(item.first).name}}});
+      outbox.log(Event::info("host_released", {{"host", state.hosts.at(item.first).name}}));
     }
     return is_over;
   });
@@ -339,9 +334,8 @@ void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
     ++state.num_refusals;
     state.last_refusal = fmt::format("{}: {}", hello.worker_name(), reject->reject().text());
     state.refused_at = now;
-    outbox.log({.severity = Severity::warning,
-                .kind = "worker_refused",
-                .fields = {{"name", hello.worker_name()}, Field::reason(reject->reject().text())}});
+    outbox.log(Event::warning(
+        "worker_refused", {{"name", hello.worker_name()}, Field::reason(reject->reject().text())}));
     outbox.send(id, *std::move(reject));
   } else {
     if (is_new) register_worker(state, id, session, from, hello, now, outbox);
@@ -359,7 +353,7 @@ bool on_release_host(State& state, const std::string& host, TimePoint now, Outbo
     return true;
   });
   if (num_released == 0) return false;
-  outbox.log({.kind = "host_released", .fields = {{"host", host}}});
+  outbox.log(Event::info("host_released", {{"host", host}}));
   detail::lend_to_hungry(state, now, outbox);
   return true;
 }
@@ -427,11 +421,9 @@ void on_give_back(State& state, WorkerId id, const proto::GiveBack& give_back, T
 void on_bye(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox) {
   const auto found = state.workers.find(id);
   if (found == state.workers.end()) return;
-  outbox.log(
-      {.severity = Severity::info,
-       .kind = "worker_left",
-       .fields = {
-           {"worker", id.value}, {"name", found->second.name}, {"reason", name_of(reason)}}});
+  outbox.log(Event::info(
+      "worker_left",
+      {{"worker", id.value}, {"name", found->second.name}, {"reason", name_of(reason)}}));
   detail::remove_worker(state, id, reason, {}, outbox);
   detail::settle(state, now, outbox);
 }

@@ -239,11 +239,10 @@ void cancel(const std::string& id, const BatchSystem& system, const wire::Log& l
     BatchCommand command{system.canceller};
     command.arguments.push_back(id);
     (void)output_of(command);
-    log({.kind = "allocation_cancelled", .fields = {{"allocation", id}}});
+    log(wire::Event::info("allocation_cancelled", {{"allocation", id}}));
   } catch (const Error& error) {
-    log({.severity = wire::Severity::warning,
-         .kind = "cancellation_failed",
-         .fields = {{"allocation", id}, wire::Field::reason(error.what())}});
+    log(wire::Event::warning("cancellation_failed",
+                             {{"allocation", id}, wire::Field::reason(error.what())}));
   }
 }
 
@@ -255,7 +254,7 @@ bool submit(FactoryState& state, const BatchSystem& system, const FactoryConfig&
     const BatchCommand command = system.submission(config);
     const std::string id = id_in(output_of(command), command.arguments.front());
     on_submitted(state, id, now);
-    log({.kind = "worker_requested", .fields = {{"allocation", id}}});
+    log(wire::Event::info("worker_requested", {{"allocation", id}}));
     return true;
   } catch (const Error& error) {
     on_submission_failed(state, error.what(), now, log);

@@ -29,9 +29,7 @@ void count_failed_start(FactoryState& state, const FactoryConfig& config, const 
   if (!config.workers_log.empty()) reason += fmt::format(" (its log: {})", config.workers_log);
   ++state.num_failed_starts;
   state.failure = fmt::format("allocation {}: {}", id, reason);
-  log({.severity = wire::Severity::warning,
-       .kind = "worker_start_failed",
-       .fields = {{"allocation", id}, Field::reason(reason)}});
+  log(wire::Event::warning("worker_start_failed", {{"allocation", id}, Field::reason(reason)}));
 }
 
 bool is_coming(const FactoryState::Known& known) {
@@ -149,10 +147,9 @@ void on_submission_failed(FactoryState& state, const std::string& reason, Factor
   ++state.num_failed_submissions;
   state.next_submission = now + waits[step];
   state.failure = "submission: " + reason;
-  log({.severity = wire::Severity::warning,
-       .kind = "submission_failed",
-       .fields = {{"retry_min", static_cast<std::uint64_t>(waits[step].count())},
-                  Field::reason(reason)}});
+  log(wire::Event::warning(
+      "submission_failed",
+      {{"retry_min", static_cast<std::uint64_t>(waits[step].count())}, Field::reason(reason)}));
 }
 
 std::optional<std::string> reason_to_pause(const FactoryState& state) {

@@ -253,11 +253,9 @@ void CampaignService::review_failures(CampaignId id, const Served& served) {
   on_cancel(state_, id, outbox_);
   tell(served, fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
                            *served.plan.failures_max));
-  outbox_.log(
-      {.severity = Severity::error,
-       .kind = "too_many_failures",
-       .fields = {{"without_estimate", num_failures}, {"failures_max", *served.plan.failures_max}}},
-      id);
+  outbox_.log(Event::error("too_many_failures", {{"without_estimate", num_failures},
+                                                 {"failures_max", *served.plan.failures_max}}),
+              id);
 }
 
 void CampaignService::review_control(CampaignId id, Served& served) {
@@ -292,16 +290,13 @@ void CampaignService::take_summary(CampaignId id, Served& served) {
     served.is_summary_due = true;
     served.summary_after = context_.now() + context_.config.writer.retry_after;
     if (!is_news) return;
-    outbox_.log({.severity = Severity::error,
-                 .kind = "statistics_failed",
-                 .fields = {Field::reason(failure)}},
-                id);
+    outbox_.log(Event::error("statistics_failed", {Field::reason(failure)}), id);
     return;
   }
   wire::Fields fields{{"runs", definition.num_runs}};
   if (num_runs) fields.emplace_back("next", *num_runs);
   if (served.extension_failure.empty()) {
-    outbox_.log({.kind = "campaign_summarised", .fields = std::move(fields)}, id);
+    outbox_.log(Event::info("campaign_summarised", std::move(fields)), id);
   }
   if (num_runs && !served.is_held && state_.campaigns.at(id).phase == Phase::finished) {
     go_on_to(id, *num_runs);
@@ -317,22 +312,21 @@ void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
     writer_.access(id, [&](Store& store) { extended = files_->extend(store, *wanted); });
     return extended;
   };
-  context_.background.post_next(
-      work_of(std::move(extend_file),
-              [this, id, num_runs](std::future<std::shared_ptr<const Campaign>> got) {
-                Served& served = served_.at(id);
-                served.is_held = false;
-                std::shared_ptr<const Campaign> extended;
-                const std::string failure = failure_of([&] { extended = got.get(); });
-                const bool is_news = failure != std::exchange(served.extension_failure, failure);
-                if (extended != nullptr) return extend(id, extended);
-                served.summary_after = context_.now() + context_.config.writer.retry_after;
-                if (!is_news) return;
-                outbox_.log({.severity = Severity::error,
-                             .kind = "campaign_not_extended",
-                             .fields = {{"runs", num_runs}, Field::reason(failure)}},
-                            id);
-              }));
+  context_.background.post_next(work_of(
+      std::move(extend_file),
+      [this, id, num_runs](std::future<std::shared_ptr<const Campaign>> got) {
+        Served& served = served_.at(id);
+        served.is_held = false;
+        std::shared_ptr<const Campaign> extended;
+        const std::string failure = failure_of([&] { extended = got.get(); });
+        const bool is_news = failure != std::exchange(served.extension_failure, failure);
+        if (extended != nullptr) return extend(id, extended);
+        served.summary_after = context_.now() + context_.config.writer.retry_after;
+        if (!is_news) return;
+        outbox_.log(
+            Event::error("campaign_not_extended", {{"runs", num_runs}, Field::reason(failure)}),
+            id);
+      }));
 }
 
 void CampaignService::begin_summary(CampaignId id, Served& served) {

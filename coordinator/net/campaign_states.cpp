@@ -66,7 +66,7 @@ void CampaignService::take(FileLook look) {
     const std::string failure = failure_of([&] { add(std::move(look)); });
     if (failure.empty()) {
       if (unserved_.erase(file) == 0) return;
-      return outbox_.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
+      return outbox_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
     }
     look = {.record = {.file = file, .problem = failure}};
   }
@@ -74,9 +74,7 @@ void CampaignService::take(FileLook look) {
   const bool is_news =
       known == unserved_.end() || known->second.record.problem != look.record.problem;
   if (is_news) {
-    outbox_.log({.severity = Severity::error,
-                 .kind = "campaign_not_served",
-                 .fields = {Field::reason(look.record.problem)}});
+    outbox_.log(Event::error("campaign_not_served", {Field::reason(look.record.problem)}));
   }
   unserved_.insert_or_assign(file, std::move(look));
 }
@@ -152,7 +150,7 @@ void CampaignService::take_findings(Findings findings) {
     if (!files_now.contains(file)) {
       log_gone(file, Severity::info);
     } else {
-      outbox_.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
+      outbox_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
     }
     return true;
   });
@@ -265,17 +263,17 @@ void CampaignService::close_ended(CampaignId id) {
     }  // Which may change the file.
     return stamp_of(file);
   };
-  context_.background.post_next(work_of(close, [this,
-                                                id](std::future<std::optional<FileStamp>> stamp) {
-    const auto found = closed_.find(id);
-    if (found == closed_.end()) return;
-    // The stamp of no file has a file looked at again, which serves one whose log is still
-    // needed.
-    found->second.stamp = FileStamp{};
-    const std::string failure = failure_of([&] { found->second.stamp = stamp.get(); });
-    if (!failure.empty()) return say_not_closed(failure);
-    outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name()}}});
-  }));
+  context_.background.post_next(
+      work_of(close, [this, id](std::future<std::optional<FileStamp>> stamp) {
+        const auto found = closed_.find(id);
+        if (found == closed_.end()) return;
+        // The stamp of no file has a file looked at again, which serves one whose log is still
+        // needed.
+        found->second.stamp = FileStamp{};
+        const std::string failure = failure_of([&] { found->second.stamp = stamp.get(); });
+        if (!failure.empty()) return say_not_closed(failure);
+        outbox_.log(Event::info("campaign_closed", {{"campaign", found->second.status.name()}}));
+      }));
 }
 
 std::set<CampaignId> CampaignService::abandoned() const {
@@ -325,16 +323,14 @@ void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
       const std::string place = moved.get().string();
       // Looking at the directory may have found out before that the file is gone.
       if (closed_.contains(id)) unlist(id);
-      outbox_.log({.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place}}});
+      outbox_.log(Event::info("campaign_archived", {{"campaign", name}, {"file", place}}));
       respond(wire::done_reply(fmt::format("campaign {}: its database is {} now", name, place)));
     });
   }));
 }
 
 void CampaignService::say_not_closed(std::string_view reason) {
-  outbox_.log({.severity = Severity::warning,
-               .kind = "campaign_not_closed",
-               .fields = {Field::reason(reason)}});
+  outbox_.log(Event::warning("campaign_not_closed", {Field::reason(reason)}));
 }
 
 std::vector<ServedCampaign> CampaignService::close() {

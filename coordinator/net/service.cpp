@@ -127,12 +127,12 @@ class Service::Impl final : public Outbox {
     std::size_t& num_workers_max = state_.config.num_workers_max;
     if (!config_.clients_endpoint || descriptors.num_workers_max >= num_workers_max) return;
     num_workers_max = descriptors.num_workers_max;
-    log({.severity = Severity::warning,
-         .kind = "few_descriptors",
-         .fields = {{"limit", descriptors.limit},
-                    {"workers_max", num_workers_max},
-                    Field::remark("(raise the limit of open files, ulimit -n or LimitNOFILE, to "
-                                  "serve more)")}});
+    log(Event::warning(
+        "few_descriptors",
+        {{"limit", descriptors.limit},
+         {"workers_max", num_workers_max},
+         Field::remark("(raise the limit of open files, ulimit -n or LimitNOFILE, to "
+                       "serve more)")}));
   }
 
   /// Campaigns that are handed over are served or end the start; those of the directory may wait.
@@ -176,7 +176,7 @@ class Service::Impl final : public Outbox {
   bool is_over(const std::atomic<StopRequest>& stop) {
     if (stop == StopRequest::now || stop == StopRequest::leave) return true;
     if (stop == StopRequest::drain && !drained_until_) {
-      log({.kind = "coordinator_draining"});
+      log(Event::info("coordinator_draining"));
       drained_until_ = now() + config_.drain_max;
       on_drain(state_, *this);
     }
@@ -214,9 +214,7 @@ class Service::Impl final : public Outbox {
     worker_gateway_.review(reviewed_at_, *this);
     const std::uint64_t num_unsent = worker_gateway_.num_unsent();
     if (num_unsent == num_unsent_logged_) return;
-    log({.severity = Severity::warning,
-         .kind = "messages_unsent",
-         .fields = {{"count", num_unsent - num_unsent_logged_}}});
+    log(Event::warning("messages_unsent", {{"count", num_unsent - num_unsent_logged_}}));
     num_unsent_logged_ = num_unsent;
   }
 
@@ -255,9 +253,7 @@ class Service::Impl final : public Outbox {
     try {
       action();
     } catch (const std::exception& error) {
-      log({.severity = Severity::error,
-           .kind = "request_failed",
-           .fields = {{"of", who}, Field::reason(error.what())}});
+      log(Event::error("request_failed", {{"of", who}, Field::reason(error.what())}));
     }
   }
 
@@ -317,9 +313,8 @@ class Service::Impl final : public Outbox {
   void note_unstored(CampaignId id, const CampaignState& campaign) {
     if (campaign.storage_failure.empty() && campaign.delivered.empty()) return;
     has_storage_failed_ = true;
-    log({.severity = Severity::error,
-         .kind = "results_not_stored",
-         .fields = {{"runs", campaign.delivered.size()}, Field::reason(campaign.storage_failure)}},
+    log(Event::error("results_not_stored", {{"runs", campaign.delivered.size()},
+                                            Field::reason(campaign.storage_failure)}),
         id);
   }
 

@@ -197,8 +197,7 @@ void WorkerGateway::close_out(const Address& from, proto::RejectReason reason,
                               const std::string& text, TimePoint now, Outbox& outbox) {
   wire::Fields fields = fields_of(from);
   fields.push_back(Field::reason(text));
-  outbox.log(
-      {.severity = Severity::warning, .kind = "peer_closed_out", .fields = std::move(fields)});
+  outbox.log(Event::warning("peer_closed_out", std::move(fields)));
   proto::Envelope reject = wire::rejection(reason, text);
   const auto worker = peers_.worker_at(from.routing_id);
   if (worker) {

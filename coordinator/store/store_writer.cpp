@@ -200,12 +200,10 @@ void StoreWriter::fold(wire::CampaignId campaign, Lock& lock) {
   }
   if (reason.has_value() == open_file.is_log_kept) return;
   open_file.is_log_kept = reason.has_value();
-  completions_.emplace_back(
-      FileEvent{.campaign = campaign,
-                .event = reason ? wire::Event{.severity = wire::Severity::warning,
-                                              .kind = "write_ahead_log_kept",
-                                              .fields = {wire::Field::reason(*reason)}}
-                                : wire::Event{.kind = "write_ahead_log_folded"}});
+  completions_.emplace_back(FileEvent{
+      .campaign = campaign,
+      .event = reason ? wire::Event::warning("write_ahead_log_kept", {wire::Field::reason(*reason)})
+                      : wire::Event::info("write_ahead_log_folded")});
   lock.unlock();
   wake_();
   lock.lock();
@@ -222,10 +220,9 @@ void StoreWriter::take(OpenFile& file, std::size_t num_max) {
   file.due.reset();
   if (!file.waiting.empty()) file.due = std::chrono::steady_clock::now();
   if (file.num_dropped == 0) return;
-  file.writing.push_back(
-      entry_of({.kind = "records_dropped",
-                .fields = {{"losses_and_events", std::exchange(file.num_dropped, 0)},
-                           wire::Field::remark("(the disk did not take them for too long)")}}));
+  file.writing.push_back(entry_of(wire::Event::info(
+      "records_dropped", {{"losses_and_events", std::exchange(file.num_dropped, 0)},
+                          wire::Field::remark("(the disk did not take them for too long)")})));
 }
 
 /// Tries to write what failed before or, if nothing did, up to `num_max` more entries. The file
@@ -282,12 +279,12 @@ void StoreWriter::watch_log(wire::CampaignId campaign, OpenFile& open_file,
   const bool is_large = log_size > config_.log_size_max;
   if (is_large == open_file.has_large_log) return;
   open_file.has_large_log = is_large;
-  wire::Event event{.kind = "write_ahead_log_shrunk"};
+  wire::Event event = wire::Event::info("write_ahead_log_shrunk");
   if (is_large) {
-    event = {.severity = wire::Severity::warning,
-             .kind = "write_ahead_log_grown",
-             .fields = {{"size_bytes", log_size},
-                        wire::Field::remark("(somebody reads an old state of the file)")}};
+    event =
+        wire::Event::warning("write_ahead_log_grown",
+                             {{"size_bytes", log_size},
+                              wire::Field::remark("(somebody reads an old state of the file)")});
   }
   completions_.emplace_back(FileEvent{.campaign = campaign, .event = std::move(event)});
 }

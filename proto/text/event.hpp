@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -38,6 +39,16 @@ using Fields = std::vector<Field>;
 
 /// Something that happened: one line of a log.
 struct Event {
+  [[nodiscard]] static Event info(std::string_view kind, Fields fields = {}) {
+    return {Severity::info, kind, std::move(fields)};
+  }
+  [[nodiscard]] static Event warning(std::string_view kind, Fields fields = {}) {
+    return {Severity::warning, kind, std::move(fields)};
+  }
+  [[nodiscard]] static Event error(std::string_view kind, Fields fields = {}) {
+    return {Severity::error, kind, std::move(fields)};
+  }
+
   Severity severity = Severity::info;
   std::string_view kind;  ///< A literal: `runs_lost`.
   Fields fields = {};

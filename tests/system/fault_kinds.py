@@ -11,7 +11,10 @@ import time
 
 
 class Fault:
-    """begin() returns False where the fault cannot happen now; nothing must be mended then."""
+    """What is in `needs` is taken before it starts, and the campaign is given back after it has
+    ended. start() returns False where the fault cannot happen now."""
+
+    needs = ()
 
     def __init__(self, world):
         self.world = world
@@ -32,30 +35,58 @@ class Fault:
         self.world.look(self.campaign)
         return True
 
-    def release_campaign(self):
-        self.campaign.is_busy = False
-
     def take_coordinator(self):
-        coordinator = self.world.coordinator
-        if coordinator.has_ended() or coordinator.is_end_expected or coordinator.is_stopped:
-            return None
-        return coordinator
+        self.coordinator = self.world.coordinator
+        return is_free(self.coordinator)
+
+    def take_worker(self):
+        free = [worker for worker in self.world.workers if is_free(worker)]
+        if not free:
+            return False
+        self.worker = self.world.random.choice(free)
+        return True
+
+    def begin(self):
+        """Whether the fault has begun; if not, nothing must be mended."""
+        if not all(getattr(self, f"take_{needed}")() for needed in self.needs):
+            return False
+        if self.start() is False:
+            self.release()
+            return False
+        return True
+
+    def end_coordinator(self, signals):
+        self.coordinator.is_end_expected = True
+        self.coordinator.signal(self.world.random.choice(signals))
+        self.coordinator.wait()
+
+    def mend(self):
+        self.end()
+        self.release()
+
+    def release(self):
+        if "campaign" in self.needs:
+            self.campaign.is_busy = False
+
+    def end(self):
+        pass
+
+
+def is_free(process):
+    return not (process.has_ended() or process.is_end_expected or process.is_stopped)
 
 
 class CoordinatorKilled(Fault):
+    needs = ("coordinator",)
     number = signal.SIGKILL
 
-    def begin(self):
-        self.coordinator = self.take_coordinator()
-        if self.coordinator is None:
-            return False
+    def start(self):
         self.coordinator.is_end_expected = True
         self.coordinator.signal(self.number)
         code = self.coordinator.wait()
         if code < 0 and code not in (-self.number, -signal.SIGKILL):
             raise RuntimeError(f"{self.coordinator.name} ended with {code}")
         self.world.restart_at = None
-        return True
 
     def end(self):
         self.world.start_coordinator()
@@ -70,49 +101,35 @@ class CoordinatorInterrupted(CoordinatorKilled):
 
 
 class CoordinatorStopped(Fault):
-    def begin(self):
-        self.coordinator = self.take_coordinator()
-        if self.coordinator is None:
-            return False
+    needs = ("coordinator",)
+
+    def start(self):
         self.coordinator.is_stopped = True
         self.coordinator.signal(signal.SIGSTOP)
-        return True
 
     def end(self):
         self.coordinator.signal(signal.SIGCONT)
         self.coordinator.is_stopped = False
 
 
-class WorkerFault(Fault):
-    def take_worker(self):
-        free = [worker for worker in self.world.workers
-                if not (worker.has_ended() or worker.is_end_expected or worker.is_stopped)]
-        if not free:
-            return False
-        self.worker = self.world.random.choice(free)
-        return True
+class WorkerKilled(Fault):
+    needs = ("worker",)
 
-
-class WorkerKilled(WorkerFault):
-    def begin(self):
-        if not self.take_worker():
-            return False
+    def start(self):
         self.worker.kill()
-        return True
 
     def end(self):
         self.world.replace_worker(self.worker)
 
 
-class WorkerTerminated(WorkerFault):
+class WorkerTerminated(Fault):
     """It delivers what it can, and ends without an error in any case."""
 
-    def begin(self):
-        if not self.take_worker():
-            return False
+    needs = ("worker",)
+
+    def start(self):
         self.worker.signal(signal.SIGTERM)
         self.worker.is_end_expected = True
-        return True
 
     def end(self):
         self.worker.wait()
@@ -120,31 +137,26 @@ class WorkerTerminated(WorkerFault):
         self.world.replace_worker(self.worker)
 
 
-class WorkerChildKilled(WorkerFault):
+class WorkerChildKilled(Fault):
     """The process that computes; the one that watches it starts another."""
 
-    def begin(self):
-        if not self.take_worker():
-            return False
+    needs = ("worker",)
+
+    def start(self):
         parent = self.worker.process.pid
         with contextlib.suppress(OSError):
             with open(f"/proc/{parent}/task/{parent}/children") as children:
                 for child in children.read().split():
                     os.kill(int(child), signal.SIGKILL)
-        return True
-
-    def end(self):
-        pass
 
 
-class WorkerStopped(WorkerFault):
-    def begin(self):
-        if not self.take_worker():
-            return False
+class WorkerStopped(Fault):
+    needs = ("worker",)
+
+    def start(self):
         self.worker.is_stopped = True
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.worker.process.pid, signal.SIGSTOP)
-        return True
 
     def end(self):
         with contextlib.suppress(ProcessLookupError):
@@ -153,7 +165,7 @@ class WorkerStopped(WorkerFault):
 
 
 class DiskFull(Fault):
-    def begin(self):
+    def start(self):
         if (self.world.served / "ballast").exists():
             return False
         self.world.fill_disk()
@@ -166,7 +178,7 @@ class DiskFull(Fault):
 class CallsFail(Fault):
     """Some system calls of the coordinator on its files."""
 
-    def begin(self):
+    def start(self):
         if self.world.orders.memory[0:4] != bytes(4):
             return False
         draw = self.world.random
@@ -186,35 +198,28 @@ class CallsFail(Fault):
 class FileMoved(Fault):
     """Renamed, and renamed back."""
 
-    def begin(self):
-        if not self.take_campaign():
-            return False
+    needs = ("campaign",)
+
+    def start(self):
         file = self.world.file_of(self.campaign)
         self.away = self.world.served / f"{self.campaign.name}.away"
         file.rename(self.away)
-        return True
 
     def end(self):
         self.away.rename(self.world.file_of(self.campaign))
-        self.release_campaign()
 
 
 class FileRemoved(Fault):
+    needs = ("campaign",)
     with_log = False
 
-    def begin(self):
-        if not self.take_campaign():
-            return False
+    def start(self):
         file = self.world.file_of(self.campaign)
         file.unlink()
         if self.with_log:
             for suffix in ("-wal", "-shm"):
                 with contextlib.suppress(FileNotFoundError):
                     file.with_name(file.name + suffix).unlink()
-        return True
-
-    def end(self):
-        self.release_campaign()
 
 
 class FileAndLogRemoved(FileRemoved):
@@ -224,15 +229,11 @@ class FileAndLogRemoved(FileRemoved):
 class BackupRestored(Fault):
     """An older state takes the file's place by `mv`, as rsync and most tools restore files."""
 
-    def begin(self):
-        if not self.take_campaign():
-            return False
+    needs = ("campaign",)
+
+    def start(self):
         self.backup = self.world.backups / f"{self.campaign.name}.db"
-        if not self.make():
-            self.release_campaign()
-            return False
-        self.num_runs = self.campaign.num_runs
-        return True
+        return self.make()
 
     def make(self):
         self.backup.unlink(missing_ok=True)
@@ -243,7 +244,6 @@ class BackupRestored(Fault):
         """The state is as old as this fault is long, and often from before an extension."""
         self.world.look(self.campaign)
         self.restore()
-        self.release_campaign()
 
     def restore(self, *, removes_log=False):
         there = self.world.served / f"{self.campaign.name}.incoming"
@@ -261,10 +261,10 @@ class BackupRestored(Fault):
 
 
 class BackupRestoredAfterExtension(BackupRestored):
-    def begin(self):
-        if not super().begin():
+    def make(self):
+        if not super().make():
             return False
-        self.is_extended = extend(self.world, self.campaign)
+        extend(self.world, self.campaign)
         return True
 
 
@@ -272,66 +272,50 @@ class CopyRestored(BackupRestored):
     """Not `proofmass backup`, but the file alone, copied while nobody writes to it."""
 
     def make(self):
-        coordinator = self.take_coordinator()
-        if coordinator is None:
+        if not self.take_coordinator():
             return False
-        coordinator.signal(signal.SIGSTOP)
+        self.coordinator.signal(signal.SIGSTOP)
         time.sleep(0.01)
         try:
             shutil.copy(self.world.file_of(self.campaign), self.backup)
         finally:
-            coordinator.signal(signal.SIGCONT)
+            self.coordinator.signal(signal.SIGCONT)
         return is_campaign(self.backup)
 
 
 class RestoredWhileDown(BackupRestored):
     """As the documentation says: the coordinator is ended first, and the log goes too."""
 
+    signals = [signal.SIGTERM, signal.SIGKILL]
+    removes_log = True
+
     def end(self):
-        coordinator = self.take_coordinator()
-        if coordinator is not None:
-            coordinator.is_end_expected = True
-            coordinator.signal(self.world.random.choice([signal.SIGTERM, signal.SIGKILL]))
-            coordinator.wait()
+        is_ended_here = self.take_coordinator()
+        if is_ended_here:
+            self.end_coordinator(self.signals)
         self.world.look(self.campaign)
-        self.restore(removes_log=self.world.coordinator.has_ended())
-        self.release_campaign()
-        if coordinator is not None:
+        self.restore(removes_log=self.removes_log and self.world.coordinator.has_ended())
+        if is_ended_here:
             self.world.start_coordinator()
 
 
 class RestoredBesideALog(RestoredWhileDown):
     """As it should not be done: the write-ahead log of the newer state stays."""
 
-    def end(self):
-        coordinator = self.take_coordinator()
-        if coordinator is not None:
-            coordinator.is_end_expected = True
-            coordinator.signal(signal.SIGKILL)
-            coordinator.wait()
-        BackupRestored.end(self)
-        if coordinator is not None:
-            self.world.start_coordinator()
+    signals = [signal.SIGKILL]
+    removes_log = False
 
 
 class StartFault(Fault):
     """Something is in the way when a coordinator starts."""
 
-    def begin(self):
-        self.coordinator = self.take_coordinator()
-        if self.coordinator is None or not self.take_campaign():
-            return False
-        self.coordinator.is_end_expected = True
-        self.coordinator.signal(self.world.random.choice([signal.SIGKILL, signal.SIGTERM]))
-        self.coordinator.wait()
+    needs = ("coordinator", "campaign")
+
+    def start(self):
+        self.end_coordinator([signal.SIGKILL, signal.SIGTERM])
         self.file = self.world.file_of(self.campaign)
         self.block()
         self.world.start_coordinator()
-        return True
-
-    def end(self):
-        self.unblock()
-        self.release_campaign()
 
 
 class DirectoryInPlaceOfFile(StartFault):
@@ -340,7 +324,7 @@ class DirectoryInPlaceOfFile(StartFault):
         self.file.rename(self.away)
         self.file.mkdir()
 
-    def unblock(self):
+    def end(self):
         self.file.rmdir()
         self.away.rename(self.file)
 
@@ -353,7 +337,7 @@ class LockHeld(StartFault):
         with contextlib.suppress(OSError):
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
-    def unblock(self):
+    def end(self):
         os.close(self.lock)
 
 
@@ -365,16 +349,16 @@ class CallsFailAtStart(StartFault):
                               draw.choice([1, draw.randint(1, 12)]))
         self.world.tell(f"{calls} fail at start")
 
-    def unblock(self):
+    def end(self):
         self.world.orders.clear()
 
 
 class ReaderHeld(Fault):
     """Somebody reads one state of the file for long."""
 
-    def begin(self):
-        if not self.take_campaign():
-            return False
+    needs = ("campaign",)
+
+    def start(self):
         try:
             self.connection = sqlite3.connect(
                 f"file:{self.world.file_of(self.campaign)}?mode=ro", uri=True, timeout=0.2)
@@ -382,17 +366,15 @@ class ReaderHeld(Fault):
             self.connection.execute("SELECT count(*) FROM run_result").fetchall()
         except sqlite3.Error:
             self.connection.close()
-            self.release_campaign()
             return False
         return True
 
     def end(self):
         self.connection.close()
-        self.release_campaign()
 
 
 class Extended(Fault):
-    def begin(self):
+    def start(self):
         free = [campaign for campaign in self.world.campaigns
                 if not campaign.is_busy and campaign.next_size()]
         if not free:
@@ -400,15 +382,12 @@ class Extended(Fault):
         self.campaign = self.world.random.choice(free)
         return extend(self.world, self.campaign)
 
-    def end(self):
-        pass
-
 
 class Paused(Fault):
-    def begin(self):
+    def start(self):
         free = [campaign for campaign in self.world.campaigns
                 if not campaign.is_paused and not campaign.is_busy]
-        if not free or self.take_coordinator() is None:
+        if not free or not self.take_coordinator():
             return False
         self.campaign = self.world.random.choice(free)
         done = self.world.ask("pause", self.campaign.name)

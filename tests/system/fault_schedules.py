@@ -150,7 +150,7 @@ def act_out(world, moments):
             world.num_active += 1
             begun.append(fault)
         elif fault in begun:
-            fault.end()
+            fault.mend()
             world.tell(f"{fault} ends")
             world.watch()  # What the fault ended is not held against it later.
             world.num_active -= 1

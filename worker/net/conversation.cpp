@@ -96,11 +96,10 @@ void Conversation::on_forget(const proto::Forget& forget) {
     execution_.forget(campaign);
   }
   if (const std::size_t count = unacknowledged_.drop(campaign, known); count > 0) {
-    note({.severity = wire::Severity::warning,
-          .kind = "results_forgotten",
-          .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
-                     {"results", count},
-                     wire::Field::remark("(finished or cancelled)")}});
+    note(wire::Event::warning("results_forgotten",
+                              {{"campaign", fmt::format("{:016x}", campaign.value)},
+                               {"results", count},
+                               wire::Field::remark("(finished or cancelled)")}));
   }
   leave_if_done();
 }
@@ -117,21 +116,12 @@ void Conversation::on_lease(const proto::RunLease& lease, TimePoint now) {
   if (!is_registered_) return;
   const wire::CampaignId campaign{lease.campaign()};
   const std::vector<RunRange> ranges = new_runs(lease);
-  if (leaving_) {
-    if (ranges.empty()) return;
-    proto::Envelope envelope;
-    proto::GiveBack& answer = *envelope.mutable_give_back();
-    answer.set_reason(wire::message_value(leaving_->reason));
-    proto::HeldRuns& held = *answer.add_runs();
-    held.set_campaign(lease.campaign());
-    held.set_attempt(lease.attempt());
-    wire::add_ranges(ranges, *held.mutable_ranges());
-    return send(std::move(envelope));
-  }
+  const std::vector<RunIndex> runs = indices_of(ranges);
   const auto num_values = static_cast<std::size_t>(lease.table_values_size());
-  if (!agrees_on_table(campaign, num_values / lease.num_runs())) return;
+  if (!leaving_ && !agrees_on_table(campaign, num_values / lease.num_runs())) return;
+  for (const RunIndex run : runs) unfinished_[{campaign, run}] = {lease.attempt()};
+  if (leaving_) return give_back(leaving_->reason, campaign, runs);
   if (!ranges.empty()) execution_.submit(lease, ranges);
-  for (const RunIndex run : indices_of(ranges)) unfinished_[{campaign, run}] = {lease.attempt()};
   const bool is_wanted = wanted_.contains(campaign);
   if (!execution_.is_defined(campaign) && !is_wanted) request(campaign, now);
 }
@@ -266,9 +256,8 @@ void Conversation::come_again(const proto::Reject& reject, TimePoint now) {
   const std::string how =
       fmt::format("(asks again every {} to {} s)", whole_seconds(config_.refusal_delay),
                   whole_seconds(config_.refusal_delay_max));
-  note({.severity = wire::Severity::error,
-        .kind = "refused",
-        .fields = {wire::Field::reason(reject.text()), wire::Field::remark(how)}});
+  note(wire::Event::error("refused",
+                          {wire::Field::reason(reject.text()), wire::Field::remark(how)}));
 }
 
 void Conversation::say_hello(TimePoint now) {
@@ -362,10 +351,9 @@ void Conversation::define(wire::CampaignId campaign, TimePoint now) {
     definition = execution_.read(wanted.incoming.take());
   } catch (const Error& error) {
     wanted.request_due_at = now + config_.request_again_after;
-    return note({.severity = wire::Severity::error,
-                 .kind = "malformed_definition",
-                 .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
-                            wire::Field::remark(fmt::format("{:.400}", error.what()))}});
+    return note(wire::Event::error("malformed_definition",
+                                   {{"campaign", fmt::format("{:016x}", campaign.value)},
+                                    wire::Field::remark(fmt::format("{:.400}", error.what()))}));
   }
   wanted_.erase(campaign);
   if (agrees_on_table(campaign, definition->table_quantities().size())) {
@@ -410,11 +398,10 @@ void Conversation::restore(std::vector<wire::LeasedResult> results) {
 void Conversation::set_aside(wire::CampaignId campaign, std::span<const RunRange> ranges) {
   const std::size_t count = unacknowledged_.set_aside(campaign, ranges);
   if (count == 0) return;
-  note({.severity = wire::Severity::warning,
-        .kind = "results_set_aside",
-        .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
-                   {"results", count},
-                   wire::Field::remark("(not served now)")}});
+  note(wire::Event::warning("results_set_aside",
+                            {{"campaign", fmt::format("{:016x}", campaign.value)},
+                             {"results", count},
+                             wire::Field::remark("(not served now)")}));
 }
 
 std::vector<RunKey> Conversation::keep_finished(TimePoint now) {
@@ -445,11 +432,9 @@ void Conversation::send_all_results(TimePoint now) {
 }
 
 void Conversation::give_back_crashed(const CrashedBatch& batch) {
-  note({.severity = wire::Severity::error,
-        .kind = "simulation_crashed",
-        .fields = {{"first_run", batch.runs.front().value},
-                   {"runs", batch.runs.size()},
-                   wire::Field::reason(batch.reason)}});
+  note(wire::Event::error("simulation_crashed", {{"first_run", batch.runs.front().value},
+                                                 {"runs", batch.runs.size()},
+                                                 wire::Field::reason(batch.reason)}));
   give_back(wire::LossReason::crashed, batch.campaign, batch.runs);
 }
 

@@ -192,9 +192,8 @@ class Service {
 
   Ending run() {
     if (const std::string reason = wire::reason_if_unknown(endpoint_); !reason.empty()) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "coordinator_unknown",
-            .fields = {{"connect", endpoint_}, Field::reason(reason)}});
+      log_(wire::Event::warning("coordinator_unknown",
+                                {{"connect", endpoint_}, Field::reason(reason)}));
     }
     TimePoint tick_at = time_now();
     TimePoint turned_at = tick_at;
@@ -218,17 +217,14 @@ class Service {
   void open_spool(const std::filesystem::path& path, std::string_view model) {
     spool_.emplace(path, model);
     if (!spool_->former_spool().empty()) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "spool_of_another_model",
-            .fields = {{"kept_as", spool_->former_spool().string()}}});
+      log_(wire::Event::warning("spool_of_another_model",
+                                {{"kept_as", spool_->former_spool().string()}}));
     }
     if (spool_->num_bytes_dropped() > 0) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "spool_torn",
-            .fields = {{"bytes_dropped", spool_->num_bytes_dropped()}}});
+      log_(wire::Event::warning("spool_torn", {{"bytes_dropped", spool_->num_bytes_dropped()}}));
     }
     if (spool_->former_results().empty()) return;
-    log_({.kind = "spool_read", .fields = {{"results", spool_->former_results().size()}}});
+    log_(wire::Event::info("spool_read", {{"results", spool_->former_results().size()}}));
     conversation_.restore(spool_->former_results());
   }
 
@@ -236,29 +232,24 @@ class Service {
   void keep_results() {
     if (spool_) return note_spool(spool_->finish(conversation_.unacknowledged()));
     if (conversation_.num_unacknowledged() == 0) return;
-    log_({.severity = wire::Severity::warning,
-          .kind = "results_lost",
-          .fields = {{"results", conversation_.num_unacknowledged()}, Field::reason("no spool")}});
+    log_(wire::Event::warning("results_lost", {{"results", conversation_.num_unacknowledged()},
+                                               Field::reason("no spool")}));
   }
 
   void note_spool(const std::optional<std::string>& failure) {
     if (failure && failure != spool_failure_) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "spool_failed",
-            .fields = {Field::remark(*failure)}});
+      log_(wire::Event::warning("spool_failed", {Field::remark(*failure)}));
     }
     spool_failure_ = failure;
   }
 
   void heed_link(TimePoint now) {
     if (link_.take_connected()) {
-      log_({.kind = "connected"});
+      log_(wire::Event::info("connected"));
       conversation_.on_connected(now);
     }
     if (const auto refusal = link_.take_refusal()) {
-      log_({.severity = wire::Severity::error,
-            .kind = "connection_refused",
-            .fields = {Field::reason(*refusal)}});
+      log_(wire::Event::error("connection_refused", {Field::reason(*refusal)}));
       conversation_.on_refused(*refusal);
     }
     link_.receive(now, [&](std::string_view bytes) {
@@ -270,15 +261,13 @@ class Service {
   void receive(std::string_view bytes, TimePoint now) {
     const auto decoded = wire::decode(bytes);
     if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
-      return log_({.severity = wire::Severity::error,
-                   .kind = "malformed_message",
-                   .fields = {Field::remark(error->text)}});
+      return log_(wire::Event::error("malformed_message", {Field::remark(error->text)}));
     }
     const auto& message = std::get<proto::Envelope>(decoded);
     if (message.has_run_lease()) wire::kill_point(wire::KillPoint::after_lease);
     const bool was_registered = conversation_.is_registered();
     conversation_.on_message(message, now);
-    if (conversation_.is_registered() && !was_registered) log_({.kind = "registered"});
+    if (conversation_.is_registered() && !was_registered) log_(wire::Event::info("registered"));
   }
 
   void send(proto::Envelope message) {
@@ -293,8 +282,8 @@ class Service {
     const EndRequest request = signals_.request();
     if (request == former_request_) return;
     former_request_ = request;
-    log_({.kind = "asked_to_end",
-          .fields = {{"how", request == EndRequest::drain ? "drain" : "at_once"}}});
+    log_(wire::Event::info("asked_to_end",
+                           {{"how", request == EndRequest::drain ? "drain" : "at_once"}}));
     if (request == EndRequest::drain) {
       conversation_.on_drain_request(now);
     } else {
@@ -308,11 +297,10 @@ class Service {
     if (silence < warn_after_) return;
     warn_after_ = 2 * silence;
     const auto silent_s = std::chrono::floor<std::chrono::seconds>(silence).count();
-    log_({.severity = wire::Severity::warning,
-          .kind = "coordinator_silent",
-          .fields = {{"connect", endpoint_},
-                     {"silent_s", static_cast<std::uint64_t>(silent_s)},
-                     Field::remark("(tries again)")}});
+    log_(wire::Event::warning("coordinator_silent",
+                              {{"connect", endpoint_},
+                               {"silent_s", static_cast<std::uint64_t>(silent_s)},
+                               Field::remark("(tries again)")}));
   }
 
   void on_tick(TimePoint now) {

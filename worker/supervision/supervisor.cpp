@@ -132,8 +132,7 @@ class Supervisor {
     }
     const double delay_s = std::chrono::duration<double>(*delay).count();
     fields.emplace_back("restart_in_s", std::round(10.0 * delay_s) / 10.0);
-    log_(
-        {.severity = wire::Severity::error, .kind = "worker_crashed", .fields = std::move(fields)});
+    log_(wire::Event::error("worker_crashed", std::move(fields)));
     return !is_asked_to_end_within(*delay);
   }
 

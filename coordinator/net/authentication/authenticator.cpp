@@ -80,12 +80,11 @@ RefusalLog::RefusalLog(Log log) : log_(std::move(log)) {}
 
 void RefusalLog::refused(const Refusal& refusal, TimePoint now) {
   if (lines_.empty() || now - began_at_ >= period) begin_minute(now);
-  Event event{.severity = Severity::warning,
-              .kind = "peer_refused",
-              .fields = {{"domain", or_else(refusal.domain, "none")},
-                         {"address", or_else(plain(refusal.address), "unknown")},
-                         {"key", or_else(refusal.public_key, "none")},
-                         Field::reason(refusal.reason)}};
+  Event event =
+      Event::warning("peer_refused", {{"domain", or_else(refusal.domain, "none")},
+                                      {"address", or_else(plain(refusal.address), "unknown")},
+                                      {"key", or_else(refusal.public_key, "none")},
+                                      Field::reason(refusal.reason)});
   std::string line = to_text(event);
   if (lines_.contains(line)) return;
   if (lines_.size() >= lines_per_period_max) {
@@ -98,9 +97,8 @@ void RefusalLog::refused(const Refusal& refusal, TimePoint now) {
 
 void RefusalLog::begin_minute(TimePoint now) {
   if (num_left_out_ > 0) {
-    log_({.severity = Severity::warning,
-          .kind = "peers_refused",
-          .fields = {{"count", num_left_out_}, Field::remark("without a line each")}});
+    log_(Event::warning("peers_refused",
+                        {{"count", num_left_out_}, Field::remark("without a line each")}));
   }
   num_left_out_ = 0;
   lines_.clear();

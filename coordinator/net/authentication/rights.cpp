@@ -155,15 +155,13 @@ void AllowList::refresh(TimePoint now) {
     take(read_allow_list(file_, role_), now);
     const bool was_unreadable = !std::exchange(reported_, {}).empty();
     if (keys_ == former && !was_unreadable) return;
-    log_({.kind = "allow_list_read",
-          .fields = {{"file", file_.string()},
-                     {"added", num_only_in(keys_, former)},
-                     {"removed", num_only_in(former, keys_)}}});
+    log_(wire::Event::info("allow_list_read", {{"file", file_.string()},
+                                               {"added", num_only_in(keys_, former)},
+                                               {"removed", num_only_in(former, keys_)}}));
   } catch (const Error& error) {
     if (std::exchange(reported_, error.what()) == error.what()) return;
-    log_({.severity = wire::Severity::error,
-          .kind = "allow_list_unreadable",
-          .fields = {wire::Field::remark(reported_ + "; the list before it stands")}});
+    log_(wire::Event::error("allow_list_unreadable",
+                            {wire::Field::remark(reported_ + "; the list before it stands")}));
   }
 }
 

@@ -158,9 +158,9 @@ CommitSummary EntryRows::write(std::span<const Entry> entries) {
   }
   workers_.write_counts(now_unix_s_);
   if (workers_.take_overflow()) {
-    write_entry(entry_of({.kind = "worker_table_full",
-                          .fields = {{"rows", std::uint64_t{num_workers_max}},
-                                     Field::remark("(further workers share one row)")}}));
+    write_entry(entry_of(wire::Event::info("worker_table_full",
+                                           {{"rows", std::uint64_t{num_workers_max}},
+                                            Field::remark("(further workers share one row)")})));
   }
   return std::exchange(summary_, {});
 }
@@ -221,20 +221,20 @@ bool EntryRows::has_room_for_audit(RunIndex run, std::int64_t worker, bool is_eq
   }
   if (!std::exchange(is_audit_full_, true)) {
     write_entry(entry_of(
-        {.kind = "audit_history_full",
-         .fields = {{"rows", *num_audits_},
-                    Field::remark("(further second results are compared and not kept)")}}));
+        wire::Event::info("audit_history_full",
+                          {{"rows", *num_audits_},
+                           Field::remark("(further second results are compared and not kept)")})));
   }
   return false;
 }
 
 void EntryRows::report_contradiction(const Delivery& delivery) {
   ++summary_.num_contradicting;
-  write_entry(entry_of({.kind = "contradicting_result",
-                        .fields = {{"run", delivery.result.run.value},
-                                   {"worker", workers_.name_of(delivery.worker)},
-                                   {"session", hexadecimal(delivery.worker.value)},
-                                   {"attempt", delivery.attempt.value}}}));
+  write_entry(entry_of(
+      wire::Event::info("contradicting_result", {{"run", delivery.result.run.value},
+                                                 {"worker", workers_.name_of(delivery.worker)},
+                                                 {"session", hexadecimal(delivery.worker.value)},
+                                                 {"attempt", delivery.attempt.value}})));
 }
 
 void EntryRows::write_entry(const ReturnedRuns& lost) {
@@ -243,9 +243,9 @@ void EntryRows::write_entry(const ReturnedRuns& lost) {
                       std::int64_t{lost.is_blamed}, now_unix_s_);
   trim_attempts_.run(num_attempts_max);
   if (database_.last_row() != num_attempts_max + 1) return;
-  write_entry(entry_of({.kind = "attempt_history_full",
-                        .fields = {{"rows", std::uint64_t{num_attempts_max}},
-                                   Field::remark("(older ones are dropped)")}}));
+  write_entry(entry_of(wire::Event::info(
+      "attempt_history_full",
+      {{"rows", std::uint64_t{num_attempts_max}}, Field::remark("(older ones are dropped)")})));
 }
 
 void EntryRows::write_entry(const GivenUpRun& given_up) {

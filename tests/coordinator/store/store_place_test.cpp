@@ -58,8 +58,7 @@ class StorePlace : public test::WriterTest {
   /// @param first  What the command begins with.
   void expect_copy_after(const std::function<void()>& fault, const std::string& what,
                          const std::string& first = "") {
-    StoreWriter& writer = start();
-    writer.open(id, create(100));
+    StoreWriter& writer = serve(100);
     deliver(writer, 0, 10);
     (void)take_completions();
     fault();
@@ -108,8 +107,7 @@ TEST_F(StorePlace, AFileThatComesBackStaysAbandoned) {
 // No look before the commit can see it. The copy has the results of the commit, which nobody was
 // told to be stored.
 TEST_F(StorePlace, AResultIsNotNamedThatIsCommittedWhileTheFileIsRemoved) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   deliver(writer, 0, 10);
   (void)take_completions();
   {
@@ -201,8 +199,7 @@ TEST_F(StorePlace, NoNewFileIsMadeBesideACopyOfTheOneThatIsGone) {
 
 // What was cut off cannot be had back; nothing more is stored, or named as stored.
 TEST_F(StorePlace, AFileThatIsTruncatedIsNamedAtOnceAndLeftAlone) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   deliver(writer, 0, 10);
   (void)take_completions();
   std::filesystem::resize_file(file(), 4096);
@@ -239,8 +236,7 @@ TEST_F(StorePlace, ClosingALostFileLeavesTheFileInItsPlaceAsItIs) {
 // A second hard link endangers nothing that is stored: under either name the file is refused to a
 // second coordinator, which the first one's lock of the file itself keeps away as well.
 TEST_F(StorePlace, AnotherNameOfTheFileChangesNothing) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   deliver(writer, 0, 10);
   std::filesystem::create_hard_link(file(), directory() / "second.db");
   deliver(writer, 10, 20);

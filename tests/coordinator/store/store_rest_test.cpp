@@ -160,9 +160,8 @@ TEST_F(StoreRest, NoWriteLeavesACopyThatPassesAsWholeAndIsNot) {
 }
 
 TEST_F(StoreRest, TheWriterBringsAFileToRestOnceAllIsWritten) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
-  for (std::uint64_t run = 0; run < 100; ++run) writer.write(id, delivery_of(run));
+  StoreWriter& writer = serve(100);
+  write_runs(0, 100);
   writer.rest(id);
   writer.flush();
   EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 100u);
@@ -180,8 +179,7 @@ TEST_F(StoreRest, TheWriterSaysThatAReaderKeepsTheLogAndWhenItIsFolded) {
   WriterConfig config = patient_config();
   config.commit_after = std::chrono::milliseconds(1);
   config.retry_after = std::chrono::milliseconds(1);
-  StoreWriter& writer = start(config);
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100, config);
   {
     const Reader reader(file());
     writer.write(id, delivery_of(1));
@@ -194,8 +192,7 @@ TEST_F(StoreRest, TheWriterSaysThatAReaderKeepsTheLogAndWhenItIsFolded) {
 }
 
 TEST_F(StoreRest, EndsForTheWriterWithTheNextResult) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.rest(id);
   writer.flush();
   writer.write(id, delivery_of(1));

@@ -18,8 +18,7 @@ using test::worker_1;
 using StoreWriterTest = test::WriterTest;
 
 TEST_F(StoreWriterTest, NamesResultsOnceTheyAreStored) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   for (const std::uint64_t run : {4u, 2u, 3u}) writer.write(id, delivery_of(run));
   EXPECT_THAT(take_completions(), IsEmpty());
   writer.flush();
@@ -32,24 +31,21 @@ TEST_F(StoreWriterTest, NamesResultsOnceTheyAreStored) {
 TEST_F(StoreWriterTest, CommitsAsSoonAsEnoughResultsWait) {
   WriterConfig config = patient_config();
   config.commit_runs_max = 3;
-  StoreWriter& writer = start(config);
-  writer.open(id, create(100));
-  for (std::uint64_t run = 0; run < 3; ++run) writer.write(id, delivery_of(run));
+  serve(100, config);
+  write_runs(0, 3);
   wait_for("committed 0 1 2");
 }
 
 TEST_F(StoreWriterTest, CommitsAFewResultsAfterAWhile) {
   WriterConfig config = patient_config();
   config.commit_after = std::chrono::milliseconds(1);
-  StoreWriter& writer = start(config);
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100, config);
   writer.write(id, delivery_of(7));
   wait_for("committed 7");
 }
 
 TEST_F(StoreWriterTest, CommitsAtOnceWhatNoMoreResultsFollow) {
-  StoreWriter& writer = start(patient_config());
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.hurry(id);
   writer.write(id, delivery_of(7));
   EXPECT_THAT(take_completions(), IsEmpty()) << "there was nothing to hurry with";
@@ -59,9 +55,8 @@ TEST_F(StoreWriterTest, CommitsAtOnceWhatNoMoreResultsFollow) {
 
 TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
   constexpr std::uint64_t num_runs = 20'000;
-  StoreWriter& writer = start();
-  writer.open(id, create(num_runs));
-  for (std::uint64_t run = 0; run < num_runs; ++run) writer.write(id, delivery_of(run));
+  StoreWriter& writer = serve(num_runs);
+  write_runs(0, num_runs);
   writer.flush();
   std::uint64_t next = 0;
   for (const Completion& completion : writer.take_completions()) {
@@ -71,8 +66,7 @@ TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
 }
 
 TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.write(id, delivery_of(1));
   writer.write(id, SecondDelivery{delivery_of(1)});
   writer.write(id, SecondDelivery{wrong_delivery_of(1)});
@@ -82,8 +76,7 @@ TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
 }
 
 TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.write(id, worker_1());
   writer.write(id, ReturnedRuns{.runs = {RunIndex{3}, 1},
                                 .attempt = {1},
@@ -112,8 +105,7 @@ TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
 TEST_F(StoreWriterTest, TellsOnlyTheFilesThatKnowAWorkerOfIt) {
   constexpr wire::CampaignId other{2};
   const std::filesystem::path other_file = directory() / "other.db";
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.open(other, Store::create(other_file, campaign_of(100), ""));
   writer.write(id, worker_1());
   writer.write(id, WorkerJoined{.session = {2}, .name = "gone", .host = "node-2"});
@@ -126,7 +118,7 @@ TEST_F(StoreWriterTest, TellsOnlyTheFilesThatKnowAWorkerOfIt) {
 }
 
 TEST_F(StoreWriterTest, TellsAFileOfTheEndOfAWorkerThatItKnewBefore) {
-  start().open(id, create(100));
+  serve(100);
   StoreWriter& first = start();
   first.open(id, Store::open(file()));
   first.write(id, worker_1());
@@ -142,8 +134,7 @@ TEST_F(StoreWriterTest, TellsAFileOfTheEndOfAWorkerThatItKnewBefore) {
 TEST_F(StoreWriterTest, LetsRecordsWaitLongerThanResults) {
   WriterConfig config = patient_config();
   config.commit_after = std::chrono::milliseconds(1);
-  StoreWriter& writer = start(config);
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100, config);
   writer.write(id, EventEntry{.kind = "early", .text = ""});
   writer.write(id, delivery_of(7));
   wait_for("committed 7");
@@ -159,8 +150,7 @@ TEST_F(StoreWriterTest, LetsRecordsWaitLongerThanResults) {
 
 TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
   constexpr wire::CampaignId other{2};
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.open(other, Store::create(directory() / "other.db", campaign_of(100), ""));
   writer.write(id, delivery_of(1));
   writer.write(other, delivery_of(2));
@@ -174,8 +164,7 @@ TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
 }
 
 TEST_F(StoreWriterTest, GivesTheFileBackWithAllThatWasHandedOver) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.write(id, delivery_of(5));
   {
     Store store = writer.close(id);
@@ -188,8 +177,7 @@ TEST_F(StoreWriterTest, GivesTheFileBackWithAllThatWasHandedOver) {
 }
 
 TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
-  StoreWriter& writer = start();
-  writer.open(id, create(100));
+  StoreWriter& writer = serve(100);
   writer.write(id, delivery_of(99));
   writer.access(id, [](Store& store) {
     EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{99}, 1}));
@@ -207,16 +195,15 @@ TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
 TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
   WriterConfig config = patient_config();
   config.log_size_max = 8'000'000;
-  StoreWriter& writer = start(config);
-  writer.open(id, create(50'000));
-  for (std::uint64_t run = 0; run < 10'000; ++run) writer.write(id, delivery_of(run));
+  StoreWriter& writer = serve(50'000, config);
+  write_runs(0, 10'000);
   writer.flush();
   EXPECT_THAT(take_completions(), ::testing::Not(::testing::Contains("write_ahead_log_grown")));
   {
     const Database reader(file(), Access::read_only);
     detail::Statement select = reader.prepare("SELECT * FROM run_result");
     ASSERT_TRUE(select.step());
-    for (std::uint64_t run = 10'000; run < 50'000; ++run) writer.write(id, delivery_of(run));
+    write_runs(10'000, 50'000);
     writer.flush();
     for (int i = 0; i < 3; ++i) {
       writer.write(id, EventEntry{.kind = "note", .text = ""});
@@ -238,10 +225,10 @@ TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
 }
 
 TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {
-  start().open(id, create(100));
+  serve(100);
   StoreWriter& writer = start();  // The file of the first one is free.
   writer.open(id, Store::open(file()));
-  for (std::uint64_t run = 0; run < 50; ++run) writer.write(id, delivery_of(run));
+  write_runs(0, 50);
   end();
   EXPECT_EQ(results_in(Store::open(file())).size(), 50u);
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
@@ -266,11 +253,10 @@ constexpr rlim_t small_size = 150'000;  // More than a new campaign database nee
 TEST_F(StoreWriterDisk, DropsRecordsThatNobodyWaitsForBeyondALimit) {
   WriterConfig config = patient_config();
   config.num_records_max = 3;
-  StoreWriter& writer = start(config);
-  writer.open(id, create(5000));
+  StoreWriter& writer = serve(5000, config);
   {
     const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
+    write_runs(0, 2000);
     writer.flush();
     for (const std::string kind : {"a", "b", "c", "d", "e"}) {
       writer.write(id, EventEntry{.kind = kind, .text = ""});
@@ -284,8 +270,7 @@ TEST_F(StoreWriterDisk, DropsRecordsThatNobodyWaitsForBeyondALimit) {
 }
 
 TEST_F(StoreWriterDisk, ReportsWhatNoDiskIsToBlameFor) {
-  StoreWriter& writer = start();
-  writer.open(id, create(5));
+  StoreWriter& writer = serve(5);
   writer.write(id, delivery_of(5));
   writer.flush();
   EXPECT_THAT(take_completions(),
@@ -294,8 +279,7 @@ TEST_F(StoreWriterDisk, ReportsWhatNoDiskIsToBlameFor) {
 
 TEST_F(StoreWriterDisk, ServesOtherFilesWhileOneFails) {
   constexpr wire::CampaignId other{2};
-  StoreWriter& writer = start();
-  writer.open(id, create(5));
+  StoreWriter& writer = serve(5);
   writer.open(other, Store::create(directory() / "other.db", campaign_of(100), ""));
   writer.write(id, delivery_of(5));
   writer.write(other, delivery_of(5));
@@ -305,21 +289,19 @@ TEST_F(StoreWriterDisk, ServesOtherFilesWhileOneFails) {
 }
 
 TEST_F(StoreWriterDisk, GivesBackAFileThatCannotBeWritten) {
-  StoreWriter& writer = start();
-  writer.open(id, create(5000));
+  StoreWriter& writer = serve(5000);
   const FileSizeLimit limit(small_size);
-  for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
+  write_runs(0, 2000);
   const Store store = writer.close(id);
   EXPECT_THAT(store.finished_runs(), IsEmpty());
   EXPECT_THAT(take_completions(), ElementsAre(failed(io_error)));
 }
 
 TEST_F(StoreWriterDisk, EndsWithoutWaitingForIt) {
-  StoreWriter& writer = start();
-  writer.open(id, create(5000));
+  serve(5000);
   {
     const FileSizeLimit limit(small_size);
-    for (std::uint64_t run = 0; run < 2000; ++run) writer.write(id, delivery_of(run));
+    write_runs(0, 2000);
     end();
   }
   EXPECT_THAT(Store::open(file()).finished_runs(), IsEmpty());

@@ -34,6 +34,15 @@ class WriterTest : public StoreTest {
     writer_ = std::make_unique<coordinator::StoreWriter>([this] { on_wake(); }, config);
     return *writer_;
   }
+  /// A writer of a new file for so many runs.
+  coordinator::StoreWriter& serve(std::uint64_t num_runs,
+                                  const coordinator::WriterConfig& config = patient_config()) {
+    start(config).open(id, create(num_runs));
+    return *writer_;
+  }
+  void write_runs(std::uint64_t first, std::uint64_t end) {
+    for (std::uint64_t run = first; run < end; ++run) writer_->write(id, delivery_of(run));
+  }
   /// Ends the writer.
   void end() { writer_.reset(); }
 

@@ -73,12 +73,7 @@ TEST(IncomingDefinition, RefusesDamagedBytes) {
 }
 
 std::string error_of(const std::string& bytes) {
-  try {
-    (void)decode_definition(bytes);
-    return "accepted";
-  } catch (const Error& error) {
-    return error.what();
-  }
+  return test::refusal_of<proto::Definition>(bytes).text;
 }
 
 TEST(DecodeDefinition, BoundsSizeAndFields) {
@@ -97,87 +92,51 @@ TEST(DecodeDefinition, BoundsSizeAndFields) {
 // What a peer may not send as a definition: each rule of the decoder, broken by one change. What
 // the text says is read elsewhere: core/definition/hostile_definition_test.cpp.
 
-using test::nan;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-std::string refusal_of_definition(const std::function<void(proto::Definition&)>& change) {
-  const Definition good{
-      .text = "a = 1",
-      .tables = {{.key = "environment.file", .num_columns = 2, .values = {1.0, 2.0}}},
-      .table_columns = {{1.0, 2.0}}};
-  proto::Definition message;
-  EXPECT_TRUE(message.ParseFromString(encode_definition(good)));
-  EXPECT_EQ(decode_definition(message.SerializeAsString()), good);
-  change(message);
-  return error_of(message.SerializeAsString());
+void expect_refused_definitions(std::string_view path,
+                                const std::vector<test::BadChange>& changes) {
+  test::expect_refusals<proto::Definition>(
+      "text: 'a = 1' tables { key: 'environment.file' num_columns: 2 values: [1, 2] }"
+      " table_columns { values: [1, 2] }",
+      path, changes);
 }
 
-TEST(MalformedDefinition, HasATextOfABoundedSize) {
-  EXPECT_EQ(refusal_of_definition([](auto& definition) { definition.clear_text(); }),
-            "definition.text size = 0 (must be in [1, 1048576])");
-  const auto with = [](std::size_t size) {
-    return refusal_of_definition(
-        [&](auto& definition) { definition.set_text(std::string(size, 'x')); });
-  };
-  EXPECT_EQ(with(definition_text_size_max), "accepted");
-  EXPECT_EQ(with(definition_text_size_max + 1),
-            "definition.text size = 1048577 (must be in [1, 1048576])");
-}
-
-TEST(MalformedDefinition, HasABoundedNumberOfTables) {
-  const auto with = [](int count) {
-    return refusal_of_definition([&](auto& definition) {
-      while (definition.tables_size() < count) *definition.add_tables() = definition.tables(0);
-    });
-  };
-  EXPECT_EQ(with(64), "accepted");
-  EXPECT_EQ(with(65), "definition.tables = 65 entries (must be in [0, 64])");
-}
-
-TEST(MalformedDefinition, HasABoundedNumberOfColumns) {
-  const auto with = [](int count) {
-    return refusal_of_definition([&](auto& definition) {
-      while (definition.table_columns_size() < count) definition.add_table_columns();
-    });
-  };
-  EXPECT_EQ(with(1024), "accepted");
-  EXPECT_EQ(with(1025), "definition.table_columns = 1025 entries (must be in [0, 1024])");
+TEST(MalformedDefinition, HasABoundedNumberOfEachThing) {
+  const std::string table = "tables { key: 'k' num_columns: 1 } ";
+  expect_refused_definitions(
+      "", {{"text: ''", "definition.text size = 0 (must be in [1, 1048576])"},
+           {"text: " + test::string_of(1048576), "accepted"},
+           {"text: " + test::string_of(1048577),
+            "definition.text size = 1048577 (must be in [1, 1048576])"},
+           {test::times(63, table), "accepted"},
+           {test::times(64, table), "definition.tables = 65 entries (must be in [0, 64])"},
+           {test::times(1023, "table_columns {} "), "accepted"},
+           {test::times(1024, "table_columns {} "),
+            "definition.table_columns = 1025 entries (must be in [0, 1024])"}});
 }
 
 TEST(MalformedDefinition, HasTablesOfWholeRows) {
-  const auto with = [](std::uint32_t num_columns, int num_values) {
-    return refusal_of_definition([&](auto& definition) {
-      auto& table = *definition.mutable_tables(0);
-      table.set_num_columns(num_columns);
-      table.clear_values();
-      for (int i = 0; i < num_values; ++i) table.add_values(1.0);
-    });
-  };
-  EXPECT_EQ(with(64, 128), "accepted");
-  EXPECT_EQ(with(2, 3), "definition.tables.values = 3 entries (must be rows of 2)");
-  EXPECT_EQ(with(0, 3), "definition.tables.num_columns = 0 (must be in [1, 64])");
-  EXPECT_EQ(with(65, 65), "definition.tables.num_columns = 65 (must be in [1, 64])");
+  expect_refused_definitions(
+      "tables", {{"num_columns: 64 values: [" + test::times(125, "1, ") + "1]", "accepted"},
+                 {"values: 1", "definition.tables.values = 3 entries (must be rows of 2)"},
+                 {"num_columns: 0", "definition.tables.num_columns = 0 (must be in [1, 64])"},
+                 {"num_columns: 65", "definition.tables.num_columns = 65 (must be in [1, 64])"}});
 }
 
 TEST(MalformedDefinition, HasTablesWithNamesThatMayBeLogged) {
-  for (const std::string key : {"", "a b", "a\x1b", "a\n"}) {
-    EXPECT_EQ(refusal_of_definition(
-                  [&](auto& definition) { definition.mutable_tables(0)->set_key(key); }),
-              "definition.tables.key = " + std::to_string(key.size()) +
-                  " bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
-  }
+  expect_refused_definitions("tables",
+                             {{"key: ''", "definition.tables.key = 0" + test::name_rule},
+                              {"key: 'a b'", "definition.tables.key = 3" + test::name_rule},
+                              {"key: 'a\\x1b'", "definition.tables.key = 2" + test::name_rule},
+                              {"key: 'a\\n'", "definition.tables.key = 2" + test::name_rule}});
 }
 
 TEST(MalformedDefinition, HasFiniteNumbers) {
-  for (const auto& [value, text] : {std::pair{nan, "nan"}, {infinity, "inf"}}) {
-    EXPECT_EQ(refusal_of_definition(
-                  [&](auto& definition) { definition.mutable_tables(0)->set_values(1, value); }),
-              std::string("definition.tables.values = ") + text + " (must be finite)");
-    EXPECT_EQ(refusal_of_definition([&](auto& definition) {
-                definition.mutable_table_columns(0)->set_values(1, value);
-              }),
-              std::string("definition.table_columns.values = ") + text + " (must be finite)");
+  for (const std::string value : {"nan", "inf"}) {
+    const std::string finite = value + " (must be finite)";
+    expect_refused_definitions(
+        "tables", {{"-values values: [1, " + value + "]", "definition.tables.values = " + finite}});
+    expect_refused_definitions("table_columns", {{"-values values: [1, " + value + "]",
+                                                  "definition.table_columns.values = " + finite}});
   }
 }
 

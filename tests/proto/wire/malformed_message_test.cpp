@@ -8,407 +8,301 @@
 #include <regex>
 
 #include "tests/proto/wire/refusal.hpp"
-#include "tests/support/messages.hpp"
-#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::wire {
 namespace {
 
-using test::nan;
-using test::refusal;
+using test::BadChange;
+using test::name_rule;
 using test::refusal_of;
+using test::string_of;
+using test::times;
 
-using namespace proofmass::test;
+const std::string good_hello =
+    "hello { worker_name: 'w' host: 'h' process_id: 1 num_slots: 1 model_version: 'm' build: 'b'"
+    " former { session: 1 reason: LOSS_REASON_CRASHED signal: 11 } }";
+const std::string good_lease =
+    "run_lease { campaign: 1 num_runs: 2 attempt: 1 table_values: [1, 2] }";
+const std::string good_welcome = "welcome { worker_id: 1 heartbeat_interval_s: 1 }";
+const std::string good_part =
+    "definition_part { campaign: 1 offset: 2 total_size: 5 checksum: 1 content: 'abc' }";
+const std::string good_runs = "campaign: 1 attempt: 1 ranges { count: 1 }";
+const std::string good_give_back =
+    "give_back { reason: LOSS_REASON_DRAINED runs { " + good_runs + " } }";
+const std::string good_heartbeat =
+    "heartbeat { num_runs_max: 1 held { " + good_runs +
+    " } computing { campaign: 1 ranges { count: 1 } num_steps_done: 1 } }";
+const std::string good_retract = "retract { campaign: 1 ranges { count: 1 } }";
+const std::string good_not_served = "not_served { campaign: 1 ranges { count: 1 } }";
+const std::string good_forget = "forget { campaign: 1 num_runs: 1 }";
+const std::string good_request = "campaign_request { campaign: 1 }";
+const std::string good_ack = "result_ack { campaign: 1 runs: 1 }";
+const std::string ten_numbers = "[" + times(9, "1, ") + "1]";
+const std::string good_batch =
+    "result_batch { campaign: 1 attempt: 1 results { status: RUN_STATUS_COMPLETED truth: " +
+    ten_numbers + " estimate: " + ten_numbers + " health: [1, 2, 3] } }";
 
-const proto::Hello good_hello = [] {
-  proto::Hello hello = make_hello("w", "h", 1, "m");
-  *hello.mutable_former() = make_former({1});
-  return hello;
-}();
-const auto good_lease = make_lease({1}, {{0}, 2}, {1}, {1.0, 2.0});
-const auto good_welcome = make_welcome({1}, 1.0);
-const auto good_part = make_part({1}, 2, 5, 1, "abc");
-const auto good_batch = [] {
-  RunResult result = zero_result({});
-  result.health = {1.0, 2.0, 3.0};
-  return make_result_batch({1}, {1}, {{.result = result}});
-}();
-const std::vector<RunRange> good_runs{{{0}, 1}};
-const auto good_give_back = make_give_back(LossReason::drained, {make_held({1}, {1}, good_runs)});
-const auto good_heartbeat =
-    make_heartbeat(1, {make_held({1}, {1}, good_runs)}, {make_computed_batch({1}, good_runs, 1)});
-
-std::string refusal_of_run(const std::function<void(proto::ComputedRun&)>& change) {
-  return refusal(good_batch, [&](auto& batch) { change(*batch.mutable_results(0)); });
+void expect_refusals(const std::string& good, std::string_view path,
+                     const std::vector<BadChange>& changes) {
+  test::expect_refusals<proto::Envelope>(good, path, changes);
 }
 
 // Envelopes.
 
 TEST(MalformedEnvelope, OfTooManyBytesIsNotParsed) {
-  const DecodeError error = refusal_of(std::string(message_size_max + 1, 'x'));
+  const DecodeError error = refusal_of<proto::Envelope>(std::string(message_size_max + 1, 'x'));
   EXPECT_EQ(error.fault, DecodeFault::too_large);
   EXPECT_EQ(error.text, "message size = 4194305 bytes (must be at most 4194304)");
 }
 
 TEST(MalformedEnvelope, ThatIsNoneIsUnparsable) {
-  const DecodeError error = refusal_of("GET / HTTP/1.1");
+  const DecodeError error = refusal_of<proto::Envelope>("GET / HTTP/1.1");
   EXPECT_EQ(error.fault, DecodeFault::unparsable);
   EXPECT_EQ(error.text, "message = 14 bytes (must be an envelope of at most 65536 fields)");
 }
 
 // Parsed, two bytes a field would take a hundred times their size.
 TEST(MalformedEnvelope, OfTooManyFieldsIsNotParsed) {
-  proto::Envelope envelope;
-  envelope.set_protocol_version(protocol_version);
-  envelope.set_session(1);
+  auto envelope = test::message_of<proto::Envelope>("heartbeat {}");
   for (int i = 0; i < 65536; ++i) envelope.mutable_heartbeat()->add_held();
-  const DecodeError error = refusal_of(envelope.SerializeAsString());
+  const DecodeError error = refusal_of(envelope);
   EXPECT_EQ(error.fault, DecodeFault::unparsable);
   EXPECT_EQ(error.text, "message = 131088 bytes (must be an envelope of at most 65536 fields)");
 }
 
 TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
-  proto::Envelope envelope;
+  auto envelope = test::message_of<proto::Envelope>("bye {}");
   envelope.set_protocol_version(1);
-  envelope.mutable_bye();
-  const DecodeError error = refusal_of(envelope.SerializeAsString());
+  const DecodeError error = refusal_of(envelope);
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
   EXPECT_EQ(error.text, "protocol_version = 1 (must be 8)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
-  proto::Envelope envelope;
-  envelope.set_protocol_version(protocol_version);
-  const DecodeError error = refusal_of(envelope.SerializeAsString());
+  const DecodeError error = refusal_of(test::message_of<proto::Envelope>(""));
   EXPECT_EQ(error.fault, DecodeFault::empty);
   EXPECT_EQ(error.text, "message = none (must be of a known kind)");
 }
 
-TEST(MalformedEnvelope, HasASession) {
-  EXPECT_EQ(refusal(in_envelope(good_welcome), [](auto& envelope) { envelope.clear_session(); }),
-            "session = 0 (must not be 0)");
-}
-
-TEST(MalformedEnvelope, HasOneMessage) {
-  EXPECT_EQ(refusal(in_envelope(good_welcome), [](auto& envelope) { envelope.mutable_bye(); }),
-            "message = two (must be one)");
+TEST(MalformedEnvelope, HasASessionAndOneMessage) {
+  expect_refusals(
+      good_welcome, "",
+      {{"session: 0", "session = 0 (must not be 0)"}, {"bye {}", "message = two (must be one)"}});
 }
 
 // Hello, Reject, ResultAck.
 
 TEST(MalformedHello, HasNamesThatMayBeLogged) {
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_worker_name("a b"); }),
-            "worker_name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_host(""); }),
-            "host = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
-  EXPECT_EQ(
-      refusal(good_hello, [](auto& hello) { hello.set_model_version("\n"); }),
-      "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_build("1 2"); }),
-            "build = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
+  expect_refusals(good_hello, "hello",
+                  {{"worker_name: 'a b'", "worker_name = 3" + name_rule},
+                   {"host: ''", "host = 0" + name_rule},
+                   {"model_version: '\\n'", "model_version = 1" + name_rule},
+                   {"build: '1 2'", "build = 3" + name_rule}});
 }
 
 TEST(MalformedHello, SaysOnlyOfACrashHowTheFormerProcessEnded) {
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.mutable_former()->clear_session(); }),
-            "former session = 0 (must not be 0)");
-  EXPECT_EQ(
-      refusal(good_hello,
-              [](auto& hello) { hello.mutable_former()->set_reason(proto::LOSS_REASON_SILENT); }),
-      "reason = 1 (must be one that this message may give)");
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.mutable_former()->set_signal(65); }),
-            "former signal = 65 (must be in [0, 64])");
+  expect_refusals(
+      good_hello, "hello.former",
+      {{"session: 0", "former session = 0 (must not be 0)"},
+       {"reason: LOSS_REASON_SILENT", "reason = 1 (must be one that this message may give)"},
+       {"signal: 65", "former signal = 65 (must be in [0, 64])"}});
 }
 
 TEST(MalformedHello, HasABoundedNumberOfOtherModels) {
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.add_other_models(); }),
-            "other_models.version = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit "
-            "first)");
-  EXPECT_EQ(refusal(good_hello,
-                    [](auto& hello) {
-                      for (int i = 0; i < 65; ++i) hello.add_other_models()->set_version("a-1");
-                    }),
-            "other_models = 65 entries (must be in [0, 64])");
+  expect_refusals(good_hello, "hello",
+                  {{"other_models {}", "other_models.version = 0" + name_rule},
+                   {times(65, "other_models { version: 'a-1' } "),
+                    "other_models = 65 entries (must be in [0, 64])"}});
 }
 
 TEST(MalformedHello, HasSlots) {
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(0); }),
-            "num_slots = 0 (must be in [1, 65536])");
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_num_slots(65537); }),
-            "num_slots = 65537 (must be in [1, 65536])");
-  const auto with_more_a_thread = [](auto& hello) {
-    hello.set_num_slots(5);
-    hello.set_num_card_slots(2);
-    hello.set_slots_per_thread(4);
-  };
-  EXPECT_EQ(refusal(good_hello, with_more_a_thread), "slots_per_thread = 4 (must be in [0, 3])");
-  const auto of_cards_alone = [](auto& hello) { hello.set_num_card_slots(hello.num_slots()); };
-  EXPECT_THAT(refusal(good_hello, of_cards_alone), HasSubstr("num_card_slots = "));
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_cards("H100\x1b"); }),
-            "cards = H100? (must be printable ASCII)");
-  EXPECT_EQ(refusal(good_hello, [](auto& hello) { hello.set_cards(std::string(257, 'x')); }),
-            "size of cards = 257 (must be in [0, 256])");
+  expect_refusals(good_hello, "hello",
+                  {{"num_slots: 0", "num_slots = 0 (must be in [1, 65536])"},
+                   {"num_slots: 65537", "num_slots = 65537 (must be in [1, 65536])"},
+                   {"num_slots: 5 num_card_slots: 2 slots_per_thread: 4",
+                    "slots_per_thread = 4 (must be in [0, 3])"},
+                   {"num_card_slots: 1", "num_card_slots = 1 (must be in [0, 0])"},
+                   {"cards: 'H100\\x1b'", "cards = H100? (must be printable ASCII)"},
+                   {"cards: " + string_of(257), "size of cards = 257 (must be in [0, 256])"}});
 }
 
 TEST(MalformedReject, HasAKnownReasonAndABoundedText) {
-  const auto good = make_reject(proto::REJECT_REASON_FULL);
-  EXPECT_EQ(refusal(good, [](auto& reject) { reject.clear_reason(); }),
-            "reason = 0 (must be in [1, 6])");
-  EXPECT_EQ(refusal(good, [](auto& reject) { reject.set_text(std::string(4097, 'x')); }),
-            "text = 4097 bytes (must be at most 4096)");
+  expect_refusals("reject { reason: REJECT_REASON_FULL }", "reject",
+                  {{"reason: REJECT_REASON_UNSPECIFIED", "reason = 0 (must be in [1, 6])"},
+                   {"text: " + string_of(4097), "text = 4097 bytes (must be at most 4096)"}});
 }
 
 TEST(MalformedResultAck, NamesRuns) {
-  const auto good = make_ack({1}, {{1}});
-  EXPECT_EQ(refusal(good, [](auto& ack) { ack.clear_runs(); }),
-            "runs = 0 entries (must be in [1, 4096])");
-  EXPECT_EQ(refusal(good, [](auto& ack) { ack.add_runs(1'000'000'000); }),
-            "run = 1000000000 (must be in [0, 999999999])");
+  expect_refusals(good_ack, "result_ack",
+                  {{"-runs", "runs = 0 entries (must be in [1, 4096])"},
+                   {"runs: 1000000000", "run = 1000000000 (must be in [0, 999999999])"}});
 }
 
-TEST(MalformedDefinitionPart, LiesWithinTheWhole) {
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_total_size(0); }),
-            "total_size = 0 (must be in [1, 67108864])");
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_total_size(definition_size_max + 1); }),
-            "total_size = 67108865 (must be in [1, 67108864])");
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_total_size(2); }),
-            "content size = 3 (must be in [1, 2])");
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_offset(3); }),
-            "offset = 3 (must be in [0, 2])");
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.set_offset(~0ULL); }),
-            "offset = 18446744073709551615 (must be in [0, 2])");
-}
-
-TEST(MalformedDefinitionPart, HasABoundedContent) {
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.clear_content(); }),
-            "content size = 0 (must be in [1, 5])");
-  EXPECT_EQ(refusal(good_part,
-                    [](auto& part) {
-                      part.set_total_size(definition_size_max);
-                      part.set_content(std::string(definition_part_size_max + 1, 'x'));
-                    }),
-            "content size = 262145 (must be in [1, 262144])");
+TEST(MalformedDefinitionPart, LiesWithinTheWholeAndHasABoundedContent) {
+  expect_refusals(
+      good_part, "definition_part",
+      {{"total_size: 0", "total_size = 0 (must be in [1, 67108864])"},
+       {"total_size: 67108865", "total_size = 67108865 (must be in [1, 67108864])"},
+       {"total_size: 2", "content size = 3 (must be in [1, 2])"},
+       {"offset: 3", "offset = 3 (must be in [0, 2])"},
+       {"offset: 18446744073709551615", "offset = 18446744073709551615 (must be in [0, 2])"},
+       {"content: ''", "content size = 0 (must be in [1, 5])"},
+       {"total_size: 67108864 content: " + string_of(262145),
+        "content size = 262145 (must be in [1, 262144])"}});
 }
 
 TEST(MalformedCampaignRequest, AsksForAPartThatMayExist) {
-  EXPECT_EQ(
-      refusal(make_request({1}), [](auto& request) { request.set_offset(definition_size_max); }),
-      "offset = 67108864 (must be in [0, 67108863])");
+  expect_refusals(good_request, "campaign_request",
+                  {{"offset: 67108864", "offset = 67108864 (must be in [0, 67108863])"}});
 }
 
 TEST(MalformedForget, HasANumberOfRuns) {
-  const auto with = [](std::uint64_t num_runs) {
-    return refusal(make_forget({1}), [&](auto& forget) { forget.set_num_runs(num_runs); });
-  };
-  EXPECT_EQ(with(0), "num_runs = 0 (must be in [1, 1000000000])");
-  EXPECT_EQ(with(num_runs_max + 1), "num_runs = 1000000001 (must be in [1, 1000000000])");
+  expect_refusals(good_forget, "forget",
+                  {{"num_runs: 0", "num_runs = 0 (must be in [1, 1000000000])"},
+                   {"num_runs: 1000000001", "num_runs = 1000000001 (must be in [1, 1000000000])"}});
 }
 
 TEST(MalformedNotServed, HasRangesOfRuns) {
-  const auto good = make_not_served({1}, good_runs);
-  EXPECT_EQ(refusal(good, [](auto& not_served) { not_served.mutable_ranges(0)->set_count(0); }),
-            "range count = 0 (must be in [1, 1000000000])");
-  EXPECT_EQ(refusal(good,
-                    [](auto& not_served) {
-                      for (int i = 0; i < 4096; ++i) not_served.add_ranges()->set_count(1);
-                    }),
-            "ranges = 4097 entries (must be in [0, 4096])");
+  expect_refusals(
+      good_not_served, "not_served",
+      {{"ranges { count: 0 }", "range count = 0 (must be in [1, 1000000000])"},
+       {times(4096, "ranges { count: 1 } "), "ranges = 4097 entries (must be in [0, 4096])"}});
 }
 
 TEST(MalformedCampaignNumber, IsNotZero) {
-  const std::string text = "campaign = 0 (must not be 0)";
-  EXPECT_EQ(refusal(make_request({1}), [](auto& request) { request.clear_campaign(); }), text);
-  EXPECT_EQ(refusal(good_part, [](auto& part) { part.clear_campaign(); }), text);
-  EXPECT_EQ(refusal(make_not_served({1}), [](auto& not_served) { not_served.clear_campaign(); }),
-            text);
-  EXPECT_EQ(refusal(make_forget({1}), [](auto& forget) { forget.clear_campaign(); }), text);
-  EXPECT_EQ(refusal(make_ack({1}, {{1}}), [](auto& ack) { ack.clear_campaign(); }), text);
-  EXPECT_EQ(refusal(make_retract({1}, good_runs), [](auto& retract) { retract.clear_campaign(); }),
-            text);
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.clear_campaign(); }), text);
-  EXPECT_EQ(refusal(good_batch, [](auto& batch) { batch.clear_campaign(); }), text);
-  EXPECT_EQ(
-      refusal(good_heartbeat, [](auto& heartbeat) { heartbeat.mutable_held(0)->clear_campaign(); }),
-      text);
-  EXPECT_EQ(refusal(good_heartbeat,
-                    [](auto& heartbeat) { heartbeat.mutable_computing(0)->clear_campaign(); }),
-            text);
+  for (const auto& [good, path] : {std::pair(good_request, "campaign_request"),
+                                   {good_part, "definition_part"},
+                                   {good_not_served, "not_served"},
+                                   {good_forget, "forget"},
+                                   {good_ack, "result_ack"},
+                                   {good_retract, "retract"},
+                                   {good_lease, "run_lease"},
+                                   {good_batch, "result_batch"},
+                                   {good_heartbeat, "heartbeat.held"},
+                                   {good_heartbeat, "heartbeat.computing"}}) {
+    expect_refusals(good, path, {{"campaign: 0", "campaign = 0 (must not be 0)"}});
+  }
 }
 
 // Heartbeat, GiveBack, Retract, Bye.
 
 TEST(MalformedHeartbeat, HasABoundedCredit) {
-  EXPECT_EQ(refusal(good_heartbeat, [](auto& heartbeat) { heartbeat.set_num_runs_max(131073); }),
-            "num_runs_max = 131073 (must be in [0, 131072])");
+  expect_refusals(good_heartbeat, "heartbeat",
+                  {{"num_runs_max: 131073", "num_runs_max = 131073 (must be in [0, 131072])"}});
 }
 
 TEST(MalformedHeartbeat, HasABoundedNumberOfRanges) {
-  EXPECT_EQ(refusal(good_heartbeat,
-                    [](auto& heartbeat) {
-                      for (int i = 0; i < 4096; ++i) *heartbeat.add_held() = heartbeat.held(0);
-                    }),
-            "held = 4097 entries (must be in [0, 4096])");
-  EXPECT_EQ(refusal(good_heartbeat,
-                    [](auto& heartbeat) {
-                      for (int i = 0; i < 4096; ++i)
-                        *heartbeat.add_computing() = heartbeat.computing(0);
-                    }),
-            "computing = 4097 entries (must be in [0, 4096])");
-  const auto fill = [](auto& ranges) {
-    for (int i = 0; i < 4095; ++i) *ranges.Add() = ranges.Get(0);
-  };
-  const std::string text = "number of ranges = 4097 (must be in [0, 4096])";
-  EXPECT_EQ(refusal(good_heartbeat,
-                    [&](auto& heartbeat) {
-                      *heartbeat.add_held() = heartbeat.held(0);
-                      fill(*heartbeat.mutable_held(1)->mutable_ranges());
-                    }),
-            text);
-  EXPECT_EQ(refusal(good_heartbeat,
-                    [&](auto& heartbeat) {
-                      *heartbeat.add_computing() = heartbeat.computing(0);
-                      fill(*heartbeat.mutable_computing(1)->mutable_ranges());
-                    }),
-            text);
+  const std::string ranges = times(4096, "ranges { count: 1 } ");
+  const std::string too_many = "number of ranges = 4097 (must be in [0, 4096])";
+  expect_refusals(
+      good_heartbeat, "heartbeat",
+      {{times(4096, "held { " + good_runs + " } "), "held = 4097 entries (must be in [0, 4096])"},
+       {times(4096, "computing { campaign: 1 ranges { count: 1 } } "),
+        "computing = 4097 entries (must be in [0, 4096])"},
+       {"held { campaign: 1 attempt: 1 " + ranges + "}", too_many},
+       {"computing { campaign: 1 " + ranges + "}", too_many}});
 }
 
 TEST(MalformedRanges, AreThereAndWithinAnyCampaign) {
-  const auto with = [](const std::function<void(proto::Retract&)>& change) {
-    return refusal(make_retract({1}, good_runs), change);
-  };
-  EXPECT_EQ(with([](auto& retract) { retract.clear_ranges(); }),
-            "ranges = 0 entries (must be in [1, 4096])");
-  EXPECT_EQ(with([](auto& retract) {
-              for (int i = 0; i < 4096; ++i) *retract.add_ranges() = retract.ranges(0);
-            }),
-            "ranges = 4097 entries (must be in [1, 4096])");
-  EXPECT_EQ(with([](auto& retract) { retract.mutable_ranges(0)->clear_count(); }),
-            "range count = 0 (must be in [1, 1000000000])");
-  EXPECT_EQ(with([](auto& retract) { retract.mutable_ranges(0)->set_first(1'000'000'000); }),
-            "range first = 1000000000 (must be in [0, 999999999])");
-  EXPECT_EQ(with([](auto& retract) { retract.mutable_ranges(0)->set_first(~0ULL); }),
-            "range first = 18446744073709551615 (must be in [0, 999999999])");
+  expect_refusals(
+      good_retract, "retract",
+      {{"-ranges", "ranges = 0 entries (must be in [1, 4096])"},
+       {times(4096, "ranges { count: 1 } "), "ranges = 4097 entries (must be in [1, 4096])"}});
+  expect_refusals(good_retract, "retract.ranges",
+                  {{"count: 0", "range count = 0 (must be in [1, 1000000000])"},
+                   {"first: 1000000000", "range first = 1000000000 (must be in [0, 999999999])"},
+                   {"first: 18446744073709551615",
+                    "range first = 18446744073709551615 (must be in [0, 999999999])"}});
 }
 
 TEST(MalformedGiveBack, SaysWhatAndWhy) {
-  EXPECT_EQ(refusal(good_give_back, [](auto& give_back) { give_back.clear_runs(); }),
-            "runs = 0 entries (must be in [1, 4096])");
-  EXPECT_EQ(refusal(good_give_back, [](auto& give_back) { give_back.clear_reason(); }),
-            "reason = 0 (must be one that this message may give)");
-  EXPECT_EQ(refusal(good_give_back,
-                    [](auto& give_back) { give_back.set_reason(proto::LOSS_REASON_HUNG); }),
-            "reason = 4 (must be one that this message may give)");
-  EXPECT_EQ(
-      refusal(good_give_back, [](auto& give_back) { give_back.mutable_runs(0)->clear_attempt(); }),
-      "attempt = 0 (must not be 0)");
-}
-
-TEST(MalformedBye, SaysWhy) {
-  EXPECT_EQ(refusal(make_bye(LossReason::drained),
-                    [](auto& bye) { bye.set_reason(proto::LOSS_REASON_HUNG); }),
-            "reason = 4 (must be one that this message may give)");
+  const std::string rule = " (must be one that this message may give)";
+  expect_refusals(good_give_back, "give_back",
+                  {{"-runs", "runs = 0 entries (must be in [1, 4096])"},
+                   {"reason: LOSS_REASON_UNSPECIFIED", "reason = 0" + rule},
+                   {"reason: LOSS_REASON_HUNG", "reason = 4" + rule}});
+  expect_refusals(good_give_back, "give_back.runs",
+                  {{"attempt: 0", "attempt = 0 (must not be 0)"}});
+  expect_refusals("bye { reason: LOSS_REASON_DRAINED }", "bye",
+                  {{"reason: LOSS_REASON_HUNG", "reason = 4" + rule}});
 }
 
 // RunLease.
 
-TEST(MalformedRunLease, HasAnAttempt) {
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_attempt(0); }),
-            "attempt = 0 (must not be 0)");
-}
-
-TEST(MalformedRunLease, HasRunsThatExist) {
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_num_runs(0); }),
-            "num_runs = 0 (must be in [1, 4096])");
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_num_runs(4097); }),
-            "num_runs = 4097 (must be in [1, 4096])");
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_first_run(999'999'999); }),
-            "first_run = 999999999 (must be in [0, 999999998])");
+TEST(MalformedRunLease, HasAnAttemptAndRunsThatExist) {
+  expect_refusals(good_lease, "run_lease",
+                  {{"attempt: 0", "attempt = 0 (must not be 0)"},
+                   {"num_runs: 0", "num_runs = 0 (must be in [1, 4096])"},
+                   {"num_runs: 4097", "num_runs = 4097 (must be in [1, 4096])"},
+                   {"first_run: 999999999", "first_run = 999999999 (must be in [0, 999999998])"}});
 }
 
 TEST(MalformedRunLease, HasFiniteTableValuesForEachRun) {
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.add_table_values(1.0); }),
-            "table_values = 3 entries (must be the same number for each run, at most 1024)");
-  EXPECT_EQ(refusal(good_lease, [](auto& lease) { lease.set_table_values(0, nan); }),
-            "table_values = not finite (must be finite)");
+  expect_refusals(
+      good_lease, "run_lease",
+      {{"table_values: 1",
+        "table_values = 3 entries (must be the same number for each run, at most 1024)"},
+       {"-table_values table_values: [nan, 2]", "table_values = not finite (must be finite)"}});
 }
 
 // ResultBatch.
 
 TEST(MalformedResultBatch, HasAttemptAndResults) {
-  EXPECT_EQ(refusal(good_batch, [](auto& batch) { batch.set_attempt(0); }),
-            "attempt = 0 (must not be 0)");
-  EXPECT_EQ(refusal(good_batch, [](auto& batch) { batch.clear_results(); }),
-            "results = 0 entries (must be in [1, 4096])");
+  expect_refusals(good_batch, "result_batch",
+                  {{"attempt: 0", "attempt = 0 (must not be 0)"},
+                   {"-results", "results = 0 entries (must be in [1, 4096])"}});
 }
 
 TEST(MalformedComputedRun, HasAFitAndCorrelationsOfStandardErrorsInRange) {
-  const auto with = [](int num_errors, double chi_squared) {
-    return [=](auto& run) {
-      for (int i = 0; i < num_errors; ++i) run.add_standard_error(1.0);
-      run.add_fit(chi_squared);
-      run.add_correlation(-1.0);
-    };
-  };
-  EXPECT_EQ(refusal_of_run(with(10, 1.0)), "accepted");
-  EXPECT_EQ(refusal_of_run([&](auto& run) {
-              with(10, 1.0)(run);
-              run.set_correlation(0, 1.5);
-            }),
-            "correlation = 1.5 (must be in [-1, 1])");
-  EXPECT_EQ(refusal_of_run(with(10, -1.0)), "fit = -1 (must be in [0, 1e+90])");
-  EXPECT_EQ(refusal_of_run(with(0, 1.0)), "fit = 1 entries (must be 0 with this status)");
+  const std::string errors = "standard_error: " + ten_numbers;
+  expect_refusals(good_batch, "result_batch.results",
+                  {{errors + " fit: 1 correlation: -1", "accepted"},
+                   {errors + " fit: 1 correlation: 1.5", "correlation = 1.5 (must be in [-1, 1])"},
+                   {errors + " fit: -1 correlation: -1", "fit = -1 (must be in [0, 1e+90])"},
+                   {"fit: 1", "fit = 1 entries (must be 0 with this status)"}});
 }
 
 TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_health(1, nan); }),
-            "health = nan (must be in [0, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_health(2, -1.0); }),
-            "health = -1 (must be in [0, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_loss_cause(2); }),
-            "loss_cause = 2 (must be in [0, 0])");
-  const auto lose = [](auto& run) {
-    run.set_status(proto::RUN_STATUS_LOST);
-    run.clear_estimate();
-  };
-  EXPECT_EQ(refusal_of_run(lose), "loss_cause = 0 (must be in [1, 255])");
-  EXPECT_EQ(refusal_of_run([&](auto& run) {
-              lose(run);
-              run.set_loss_cause(1);
-            }),
-            "loss_session = 0 (must be in [1, 255])");
+  const std::string lost = "-estimate status: RUN_STATUS_LOST";
+  expect_refusals(good_batch, "result_batch.results",
+                  {{"health: nan", "health = nan (must be in [0, 1e+90])"},
+                   {"health: -1", "health = -1 (must be in [0, 1e+90])"},
+                   {"loss_cause: 2", "loss_cause = 2 (must be in [0, 0])"},
+                   {lost, "loss_cause = 0 (must be in [1, 255])"},
+                   {lost + " loss_cause: 1", "loss_session = 0 (must be in [1, 255])"}});
 }
 
-TEST(MalformedComputedRun, HasAStatusAndARunIndex) {
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_status(); }),
-            "status = 0 (must be in [1, 5])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_run(1'000'000'000); }),
-            "run = 1000000000 (must be in [0, 999999999])");
+TEST(MalformedComputedRun, HasAStatusARunIndexAndTheNumbersThatItsStatusGives) {
+  expect_refusals(
+      good_batch, "result_batch.results",
+      {{"status: RUN_STATUS_UNSPECIFIED", "status = 0 (must be in [1, 5])"},
+       {"run: 1000000000", "run = 1000000000 (must be in [0, 999999999])"},
+       {"status: RUN_STATUS_NO_DRAW", "truth = 10 entries (must be 0 with this status)"},
+       {"status: RUN_STATUS_NOT_FINITE", "estimate = 10 entries (must be 0 with this status)"}});
 }
 
-TEST(MalformedComputedRun, HasTheNumbersThatItsStatusGives) {
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_status(proto::RUN_STATUS_NO_DRAW); }),
-            "truth = 10 entries (must be 0 with this status)");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_status(proto::RUN_STATUS_NOT_FINITE); }),
-            "estimate = 10 entries (must be 0 with this status)");
-}
-
+// The times of all results of a worker are added up and stored.
 TEST(MalformedComputedRun, HasFiniteNumbers) {
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_truth(3, nan); }),
-            "truth = nan (must be in [-1e+90, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_estimate(3, 1.0 / 0.0); }),
-            "estimate = inf (must be in [-1e+90, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_estimate(9, -1.1e90); }),
-            "estimate = -1.1e+90 (must be in [-1e+90, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(-1.0); }),
-            "compute_s = -1 (must be >= 0)");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(nan); }),
-            "compute_s = nan (must be >= 0)");
-  // The times of all results of a worker are added up and stored.
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(1.7e308); }),
-            "compute_s = 1.7e+308 (must be <= 1000000000)");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_elapsed_s(1.1e9); }),
-            "elapsed_s = 1100000000 (must be <= 1000000000)");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_elapsed_s(-1.0); }),
-            "elapsed_s = -1 (must be >= 0)");
+  expect_refusals(good_batch, "result_batch.results",
+                  {{"truth: nan", "truth = nan (must be in [-1e+90, 1e+90])"},
+                   {"estimate: inf", "estimate = inf (must be in [-1e+90, 1e+90])"},
+                   {"estimate: -1.1e90", "estimate = -1.1e+90 (must be in [-1e+90, 1e+90])"},
+                   {"compute_s: -1", "compute_s = -1 (must be >= 0)"},
+                   {"compute_s: nan", "compute_s = nan (must be >= 0)"},
+                   {"compute_s: 1.7e308", "compute_s = 1.7e+308 (must be <= 1000000000)"},
+                   {"elapsed_s: 1.1e9", "elapsed_s = 1100000000 (must be <= 1000000000)"},
+                   {"elapsed_s: -1", "elapsed_s = -1 (must be >= 0)"}});
+}
+
+// Welcome.
+
+TEST(MalformedWelcome, HasANumberAndAnInterval) {
+  const std::string rule = " (must be in (0, 3600])";
+  expect_refusals(good_welcome, "welcome",
+                  {{"worker_id: 0", "worker_id = 0 (must not be 0)"},
+                   {"heartbeat_interval_s: 0", "heartbeat_interval_s = 0" + rule},
+                   {"heartbeat_interval_s: nan", "heartbeat_interval_s = nan" + rule},
+                   {"heartbeat_interval_s: 3601", "heartbeat_interval_s = 3601" + rule}});
 }
 
 // The protocol's file names the limits, and texts for people have the numbers.
@@ -440,18 +334,6 @@ TEST(LimitsOfMessages, AreInDocumentsAsTheyAreInTheCode) {
   EXPECT_THAT(content("worker/README.md"),
               testing::HasSubstr(
                   fmt::format("16 slots, at most {},{:03}", slots_max / 1000, slots_max % 1000)));
-}
-
-// Welcome.
-
-TEST(MalformedWelcome, HasANumberAndAnInterval) {
-  EXPECT_EQ(refusal(good_welcome, [](auto& welcome) { welcome.set_worker_id(0); }),
-            "worker_id = 0 (must not be 0)");
-  for (const auto& [value, text] : {std::pair{0.0, "0"}, {nan, "nan"}, {3601.0, "3601"}}) {
-    EXPECT_EQ(
-        refusal(good_welcome, [&](auto& welcome) { welcome.set_heartbeat_interval_s(value); }),
-        std::string("heartbeat_interval_s = ") + text + " (must be in (0, 3600])");
-  }
 }
 
 }  // namespace

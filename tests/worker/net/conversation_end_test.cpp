@@ -49,8 +49,7 @@ TEST_F(ConversationTest, GivesBackRunsOfEachCampaign) {
   (void)take_sent<proto::Heartbeat>();
   EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 2));
   EXPECT_EQ(take_sent<proto::GiveBack>().runs(0).campaign(), campaign_2.value);
-  (void)take_sent<proto::Bye>();
-  expect_ending(Ending::Kind::done, "asked to end");
+  expect_left(proto::LOSS_REASON_PREEMPTED, "asked to end");
 }
 
 TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
@@ -95,8 +94,7 @@ TEST_F(ConversationTest, GivesBackBatchesThatDoNotFitIntoTheTime) {
   tick_after(15s);
   EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(0, 1));
   EXPECT_EQ(test::vector_of(take_sent<proto::GiveBack>().runs()), held(2, 1));
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  expect_ending(Ending::Kind::done, "asked to end");
+  expect_left(proto::LOSS_REASON_PREEMPTED, "asked to end");
 }
 
 TEST_F(ConversationTest, EndsWhenTheDrainTakesTooLong) {
@@ -107,8 +105,7 @@ TEST_F(ConversationTest, EndsWhenTheDrainTakesTooLong) {
   tick_after(19s);
   sent.clear();
   tick_after(1s);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
+  expect_left(proto::LOSS_REASON_PREEMPTED, "out of time with 2 results not acknowledged");
 }
 
 // A worker that cannot deliver, as the file is gone, outlives the coordinator that drained it, and
@@ -132,8 +129,7 @@ TEST_F(ConversationTest, WorksForANewCoordinatorAfterTheDrainOfTheFormer) {
   EXPECT_FALSE(conversation->ending().has_value());
   receive(proto::Drain(), wire::Epoch{6});
   EXPECT_EQ(take_sent<proto::Heartbeat>().num_runs_max(), 0U);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
-  expect_ending(Ending::Kind::done, "drained");
+  expect_left(proto::LOSS_REASON_DRAINED, "drained");
 }
 
 // What is given back while nobody knows the worker is not in the heartbeat of the next Welcome.
@@ -203,8 +199,7 @@ TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenDrainedByTheCoordinator) {
   tick_after(90s);
   (void)take_sent<proto::Heartbeat>();
   EXPECT_EQ(take_sent<proto::GiveBack>().reason(), proto::LOSS_REASON_WALLTIME);
-  (void)take_sent<proto::Bye>();
-  expect_ending(Ending::Kind::done, "its time is up");
+  expect_left(proto::LOSS_REASON_WALLTIME, "its time is up");
 }
 
 // The batch system kills it at 30 s, whatever it was asked before: its results must be kept by
@@ -224,8 +219,7 @@ TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenAskedToEnd) {
   EXPECT_FALSE(conversation->ending().has_value());
   sent.clear();
   tick_after(1s);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
+  expect_left(proto::LOSS_REASON_PREEMPTED, "out of time with 2 results not acknowledged");
 }
 
 // It leaves 100 to 160 s before the end of its walltime, and is then to leave within 3 s.
@@ -241,8 +235,7 @@ TEST_F(ConversationTest, HeedsTheDrainTimeAlsoWhenItsWalltimeIsNearlyOver) {
   EXPECT_FALSE(conversation->ending().has_value());
   sent.clear();
   tick_after(1s);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_PREEMPTED);
-  expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
+  expect_left(proto::LOSS_REASON_PREEMPTED, "out of time with 2 results not acknowledged");
 }
 
 TEST_F(ConversationTest, GetsNoTimeBeyondItsWalltimeByBeingAskedToEnd) {
@@ -254,8 +247,7 @@ TEST_F(ConversationTest, GetsNoTimeBeyondItsWalltimeByBeingAskedToEnd) {
   conversation->on_drain_request(now);
   EXPECT_TRUE(sent.empty());
   tick_after(5s);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_WALLTIME);
-  expect_ending(Ending::Kind::done, "out of time with 1 results not acknowledged");
+  expect_left(proto::LOSS_REASON_WALLTIME, "out of time with 1 results not acknowledged");
 }
 
 TEST_F(ConversationTest, LeavesAfterTheIdleTimeout) {
@@ -266,8 +258,7 @@ TEST_F(ConversationTest, LeavesAfterTheIdleTimeout) {
   (void)take_sent<proto::Heartbeat>();
   EXPECT_FALSE(conversation->ending().has_value());
   tick_after(298s);
-  EXPECT_EQ(take_sent<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
-  expect_ending(Ending::Kind::done, "no run for 300 s");
+  expect_left(proto::LOSS_REASON_DRAINED, "no run for 300 s");
 }
 
 TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {
@@ -285,8 +276,7 @@ TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {
   (void)take_sent<proto::Heartbeat>();
   EXPECT_FALSE(conversation->ending().has_value());
   tick_after(1s);
-  (void)take_sent<proto::Bye>();
-  expect_ending(Ending::Kind::done, "no run for 300 s");
+  expect_left(proto::LOSS_REASON_DRAINED, "no run for 300 s");
 }
 
 TEST_F(ConversationTest, StaysIdleWithoutATimeout) {

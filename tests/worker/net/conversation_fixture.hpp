@@ -191,6 +191,11 @@ class ConversationTest : public testing::Test {
     EXPECT_EQ(conversation->ending()->kind, kind);
     EXPECT_EQ(conversation->ending()->reason, reason);
   }
+  /// It has said that it leaves, and its work is done.
+  void expect_left(proto::LossReason reason, const std::string& ending) {
+    EXPECT_EQ(take_sent<proto::Bye>().reason(), reason);
+    expect_ending(Ending::Kind::done, ending);
+  }
 
   void TearDown() override { EXPECT_TRUE(sent.empty()) << sent.front().ShortDebugString(); }
 
