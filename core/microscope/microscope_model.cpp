@@ -144,6 +144,18 @@ std::string drift_note(const Scenario& scenario) {
       scenario.estimation.transient_s, std::ceil(least_s));
 }
 
+/// What the loops' start leaves in a record looks like noise to fits and monitors.
+std::string settling_note(const Scenario& scenario) {
+  constexpr double num_decays = 7.0;  // e⁻⁷ is a thousandth.
+  const double decay_s = slowest_decay_s(scenario);
+  if (scenario.simulation.settling_s >= num_decays * decay_s) return {};
+  return fmt::format(
+      "records begin before the loops have settled, which standard errors may take for noise: "
+      "their slowest mode decays by e in {:.0f} s, and simulation.settling_s = {} is less than the "
+      "{:.0f} s after which a thousandth of it is left",
+      decay_s, scenario.simulation.settling_s, std::ceil(num_decays * decay_s));
+}
+
 /// A file has the accelerations in the satellite's frame, and so those of one spin.
 std::string environment_note(const MicroscopeCampaign& campaign) {
   const Scenario& scenario = campaign.scenario;

@@ -170,6 +170,16 @@ TEST(MicroscopeCampaign, WarnsOfAFitThatChanceDoesNotExplain) {
   EXPECT_DOUBLE_EQ(warnings[0].part, 2.0 * 20.0 / 250.0);
 }
 
+// Seven times 146 s, the time constant of the attitude loop's integral.
+TEST(MicroscopeCampaign, NotesThatItsLoopsHaveNotSettled) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.simulation.settling_s = 1030.0;
+  EXPECT_EQ(campaign.note(), "");
+  campaign.scenario.simulation.settling_s = 0.0;
+  EXPECT_THAT(campaign.note(),
+              ::testing::HasSubstr("simulation.settling_s = 0 is less than the 1"));
+}
+
 /// The shifts that a campaign with a test warns of, for K2d at its bound.
 std::vector<Warning> warnings_of_residuals(double residual_m_s2, double test_residual_m_s2) {
   MicroscopeCampaign campaign;
