@@ -144,6 +144,18 @@ std::string drift_note(const Scenario& scenario) {
       scenario.estimation.transient_s, std::ceil(least_s));
 }
 
+/// What the loops' start leaves in a record looks like noise to fits and monitors.
+std::string settling_note(const Scenario& scenario) {
+  constexpr double num_decays = 7.0;  // e⁻⁷ is a thousandth.
+  const double decay_s = slowest_decay_s(scenario);
+  if (scenario.simulation.settling_s >= num_decays * decay_s) return {};
+  return fmt::format(
+      "records begin before the loops have settled, which standard errors may take for noise: "
+      "their slowest mode decays by e in {:.0f} s, and simulation.settling_s = {} is less than the "
+      "{:.0f} s after which a thousandth of it is left",
+      decay_s, scenario.simulation.settling_s, std::ceil(num_decays * decay_s));
+}
+
 /// A file has the accelerations in the satellite's frame, and so those of one spin.
 std::string environment_note(const MicroscopeCampaign& campaign) {
   const Scenario& scenario = campaign.scenario;
@@ -186,8 +198,8 @@ std::string gaps_note(const Scenario& scenario) {
 std::string MicroscopeCampaign::note() const {
   std::string all;
   for (const std::string& note :
-       {unwatched_note(scenario), loops_note(scenario), drift_note(scenario),
-        environment_note(*this), gaps_note(scenario)}) {
+       {unwatched_note(scenario), loops_note(scenario), settling_note(scenario),
+        drift_note(scenario), environment_note(*this), gaps_note(scenario)}) {
     if (!all.empty() && !note.empty()) all += "; ";
     all += note;
   }
@@ -243,20 +255,32 @@ void warn_of_fit(const RunResult& result, const ParameterArray& objectives,
 }  // namespace
 
 Warner MicroscopeCampaign::warner() const {
-  return
-      [bounds = ShiftBounds(scenario), objectives = scenario.objectives](const RunResult& result) {
-        std::vector<Warning> warnings;
-        if (result.health.empty()) return warnings;
-        // A test alone has standard errors where the calibration has none.
-        std::span<const double> errors = result.standard_error;
-        if (errors.size() < num_parameters) errors = {};
-        for (const Shift& shift : bounds.of(health_of(result.health), result.truth, errors)) {
-          if (shift.part < warned_part) continue;
-          warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
-        }
-        warn_of_fit(result, objectives, warnings);
-        return warnings;
-      };
+  // Results of older models lack what the loop left in tests.
+  const std::size_t test_residual = scenario.has_tests() ? budget_level(scenario) : SIZE_MAX;
+  return [bounds = ShiftBounds(scenario), objectives = scenario.objectives,
+          test_residual](const RunResult& result) {
+    std::vector<Warning> warnings;
+    if (result.health.empty()) return warnings;
+    const auto warn = [&](Effect effect, std::size_t quantity, double part) {
+      if (part >= warned_part) warnings.push_back({name_of(effect), quantity, part});
+    };
+    // A test alone has standard errors where the calibration has none.
+    std::span<const double> errors = result.standard_error;
+    if (errors.size() < num_parameters) errors = {};
+    std::array<double, num_effects> of_test{};
+    for (const Shift& shift : bounds.of(health_of(result.health), result.truth, errors)) {
+      warn(shift.effect, index(shift.parameter), shift.part);
+      if (test_residual >= result.health.size()) continue;
+      of_test[static_cast<std::size_t>(shift.effect)] +=
+          bounds.part_of_test(shift, result.health[test_residual]);
+    }
+    for (std::size_t i = 0; i < num_effects; ++i) {
+      warn(static_cast<Effect>(i), num_parameters + index(TestParameter::eotvos_parameter),
+           of_test[i]);
+    }
+    warn_of_fit(result, objectives, warnings);
+    return warnings;
+  };
 }
 
 namespace {

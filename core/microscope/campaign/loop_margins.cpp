@@ -3,9 +3,13 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <complex>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <numbers>
 #include <optional>
+#include <vector>
 
 #include "core/math/complex.hpp"
 
@@ -135,7 +139,83 @@ AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
   return {ControlLoop::attitude, axis, least(of_modes), {}};
 }
 
+// A controller in s: coefficients of 1, s, s² ...
+using Polynomial = std::vector<double>;
+struct RationalController {
+  Polynomial numerator, denominator;
+};
+
+Polynomial with_roots(const std::vector<std::complex<double>>& roots, double leading) {
+  std::vector<std::complex<double>> coefficients{leading};
+  for (const std::complex<double>& root : roots) {
+    coefficients.push_back(0.0);
+    for (std::size_t i = coefficients.size(); i-- > 0;) {
+      coefficients[i] = (i > 0 ? coefficients[i - 1] : 0.0) - root * coefficients[i];
+    }
+  }
+  Polynomial real;
+  for (const std::complex<double>& coefficient : coefficients) real.push_back(coefficient.real());
+  return real;
+}
+
+RationalController rational_controller(const Scenario& scenario, ControlLoop loop, Axis axis) {
+  constexpr double turn_rad = 2.0 * std::numbers::pi;
+  for (const ControllerConfig& own : scenario.controllers) {
+    if (own.loop != loop || own.axis != axis) continue;
+    return {with_roots(own.zeros_rad_s, own.gain), with_roots(own.poles_rad_s, 1.0)};
+  }
+  if (loop == ControlLoop::drag_free) {
+    const double crossover = turn_rad * scenario.drag_free.bandwidth_hz;
+    return {{crossover * turn_rad * scenario.drag_free.integral_hz, crossover}, {0.0, 0.0, 1.0}};
+  }
+  const AttitudeConfig& attitude = scenario.attitude;
+  const double omega = turn_rad * attitude.bandwidth_hz;
+  return {{omega * omega * turn_rad * attitude.integral_hz, omega * omega,
+           2.0 * attitude.damping * omega},
+          {0.0, 1.0}};
+}
+
+/// Least |Re s| of the zeros of a polynomial.
+double slowest_rate(const Polynomial& polynomial) {
+  const auto degree = static_cast<Eigen::Index>(polynomial.size()) - 1;
+  if (degree == 0) return std::numeric_limits<double>::infinity();
+  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(degree, degree);
+  companion.diagonal(-1).setOnes();
+  for (Eigen::Index i = 0; i < degree; ++i) {
+    companion(i, degree - 1) = -polynomial[static_cast<std::size_t>(i)] / polynomial.back();
+  }
+  return companion.eigenvalues().real().cwiseAbs().minCoeff();
+}
+
+/// Of 1 + C/(1 + s·lag) along an axis of the drag-free loop, and of 1 + C/((1 + s·lag) s²) about
+/// one of the attitude loop.
+double slowest_rate(const Scenario& scenario, ControlLoop loop, Axis axis) {
+  auto [closed, denominator] = rational_controller(scenario, loop, axis);
+  while (closed.front() == 0.0 && denominator.front() == 0.0) {  // An integral that is left out.
+    closed.erase(closed.begin());
+    denominator.erase(denominator.begin());
+  }
+  if (loop == ControlLoop::attitude) denominator.insert(denominator.begin(), 2, 0.0);
+  const double lag_s = scenario.realism ? scenario.realism->actuation_lag_s : 0.0;
+  closed.resize(denominator.size() + (lag_s > 0.0 ? 1 : 0));
+  for (std::size_t i = 0; i < denominator.size(); ++i) {
+    closed[i] += denominator[i];
+    if (lag_s > 0.0) closed[i + 1] += lag_s * denominator[i];
+  }
+  return slowest_rate(closed);
+}
+
 }  // namespace
+
+double slowest_decay_s(const Scenario& scenario) {
+  double rate = 2.0 * std::numbers::pi * scenario.attitude.blending_hz;
+  for (const Axis axis : axes) {
+    for (const ControlLoop loop : {ControlLoop::drag_free, ControlLoop::attitude}) {
+      rate = std::min(rate, slowest_rate(scenario, loop, axis));
+    }
+  }
+  return 1.0 / rate;
+}
 
 ResonatorGains resonator_in(const Scenario& scenario, const Session& session) {
   const double damping = scenario.drag_free.resonator_damping;

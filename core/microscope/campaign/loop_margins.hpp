@@ -33,6 +33,11 @@ struct AxisMargins {
 [[nodiscard]] std::vector<AxisMargins> loop_margins(const Scenario& scenario,
                                                     const Instrument& instrument);
 
+/// Time constant of the slowest mode of the loops with a perfect instrument, s: of the closed-loop
+/// poles of C and the actuators' lag, and of AttitudeEstimator, without delays. Resonators, which
+/// only take what the loop leaves, are not among them.
+[[nodiscard]] double slowest_decay_s(const Scenario& scenario);
+
 /// The smaller of each number.
 [[nodiscard]] Margins least(const std::vector<AxisMargins>& of_axes);
 

@@ -8,6 +8,7 @@
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
+#include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/signal/noise_shape.hpp"
 
@@ -226,27 +227,14 @@ std::vector<double> fitted_amplitudes(const Scenario& scenario, const Session& s
   return amplitudes;
 }
 
-namespace {
-
-/// Of a session's band-pass, Hz.
-double band_centre_hz(const Scenario& scenario, const Session& session) {
-  double centre_hz = 0.0;
-  for (const LineMultiple& line : session.fit_lines) {
-    centre_hz += line_frequency_hz(session, line, scenario.orbit.period_s) /
-                 static_cast<double>(session.fit_lines.size());
-  }
-  return centre_hz;
-}
-
-}  // namespace
-
 double band_decay_s(const Scenario& scenario, const Session& session) {
-  const double edge_hz = band_centre_hz(scenario, session) / scenario.estimation.band_ratio;
+  const double edge_hz =
+      band_centre_hz(session, scenario.orbit.period_s) / scenario.estimation.band_ratio;
   return std::numbers::sqrt2 / (full_turn * edge_hz);
 }
 
 double band_gain_squared(const Scenario& scenario, const Session& session, double frequency_hz) {
-  const double centre_hz = band_centre_hz(scenario, session);
+  const double centre_hz = band_centre_hz(session, scenario.orbit.period_s);
   const double ratio = scenario.estimation.band_ratio;
   const double low = centre_hz / ratio / frequency_hz;
   const double high = frequency_hz / (ratio * centre_hz);

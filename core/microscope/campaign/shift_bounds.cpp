@@ -9,6 +9,7 @@
 #include "core/math/elementary.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/instrument/stiffness.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/signal/line_weights.hpp"
 #include "core/signal/noise_shape.hpp"
 
@@ -104,8 +105,8 @@ const Session* first_of(const Scenario& scenario, SessionTarget target) {
 }  // namespace
 
 std::string_view name_of(Effect effect) {
-  static constexpr std::array<std::string_view, 5> names{"residual", "attitude", "quadratic_noise",
-                                                         "square_noise", "spin"};
+  static constexpr std::array<std::string_view, num_effects> names{
+      "residual", "attitude", "quadratic_noise", "square_noise", "spin"};
   return names[static_cast<std::size_t>(effect)];
 }
 
@@ -171,7 +172,10 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
           scenario.noise, [](const SensorNoise& x) { return square(x.white_asd); })),
       duration_s_(0.0),
       has_noise_(scenario.noise.scale > 0.0),
-      gradient_line_s2_(0.75 * square(mean_motion_rad_s(scenario))) {
+      gradient_line_s2_(0.75 * square(mean_motion_rad_s(scenario))),
+      delta_per_m_s2_(2.0 / (square(mean_motion_rad_s(scenario)) *
+                             KeplerOrbit(scenario.orbit).semi_latus_rectum_m())),
+      delta_objective_(scenario.test_objectives[index(TestParameter::eotvos_parameter)]) {
   if (has_noise_) white_density_ *= square(scenario.noise.scale);
   for (const Session& session : scenario.sessions) {
     if (is_test(session)) continue;
@@ -191,6 +195,9 @@ ShiftBounds::ShiftBounds(const Scenario& scenario)
     if (session.target == SessionTarget::no_target) continue;
     add_session(scenario, session);
     add_spin(scenario, session);
+    if (session.target != SessionTarget::a_d11_prime) continue;
+    const double turns = fit_duration_s(scenario, session) / scenario.orbit.period_s;
+    of_sidebands_ = std::max(of_sidebands_, 2.0 / (std::numbers::pi * turns));
   }
 }
 
@@ -255,6 +262,7 @@ void ShiftBounds::add_residual(double residual_m_s2, Sum& sum) const {
   for (const Parameter delta : {a_c11_delta_x, a_c11_delta_z}) {
     sum.add(Effect::residual, delta, sum.sensitivity(delta).of_line * square_m_s2);
   }
+  sum.add(Effect::residual, a_d11_prime, of_sidebands_ * sum[k2d] * line_m_s2);
   const auto add_product = [&](Axis axis, Parameter common, Parameter differential) {
     const double along_x = 0.5 * mass_acceleration_m_s2_[index(axis)] *
                            (sum[k2c] * (sum[common] + coupling_max_rad) +
@@ -313,6 +321,14 @@ std::vector<Shift> ShiftBounds::of(const LoopHealth& health, std::span<const dou
     sum.add(Effect::spin, delta, of_spin_[index(delta)] * sum[k2c] * sum[a_c11_delta_x]);
   }
   return std::move(sum.shifts);
+}
+
+double ShiftBounds::part_of_test(const Shift& shift, double test_residual_m_s2) const {
+  using enum Parameter;
+  const Parameter parameter = shift.parameter;
+  if (parameter != a_d11_prime && parameter != a_d12 && parameter != a_d13) return 0.0;
+  return shift.part * objectives_[index(parameter)] * delta_per_m_s2_ * test_residual_m_s2 /
+         delta_objective_;
 }
 
 }  // namespace proofmass

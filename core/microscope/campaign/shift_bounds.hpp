@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -20,6 +21,8 @@ enum class Effect : std::uint8_t {
   square_noise,     ///< Noise of a squared measurement, which scales a quadratic factor.
   spin,             ///< Centrifugal and Coriolis accelerations, through the quadratic factors.
 };
+
+inline constexpr std::size_t num_effects = 5;
 
 /// `residual`, for people and files.
 [[nodiscard]] std::string_view name_of(Effect effect);
@@ -43,12 +46,18 @@ class ShiftBounds {
   /// @pre scenario.validate() passed.
   explicit ShiftBounds(const Scenario& scenario);
 
-  /// Every shift that is not 0, in the order of effects. Parts may be infinite.
+  /// Every shift of the ten parameters that is not 0, in the order of effects. Parts may be
+  /// infinite.
   /// @param truth            Of each parameter, SI.
   /// @param standard_errors  Of each estimate, of a method that has them: what bounds its shifts.
   ///                         Else none.
   [[nodiscard]] std::vector<Shift> of(const LoopHealth& health, std::span<const double> truth,
                                       std::span<const double> standard_errors) const;
+
+  /// The shift of δ that one of a_d1j makes in the tests, a part of the objective of δ; 0 of other
+  /// parameters.
+  /// @param test_residual_m_s2  Of the run.
+  [[nodiscard]] double part_of_test(const Shift& shift, double test_residual_m_s2) const;
 
  private:
   /// The sessions of a target together.
@@ -83,6 +92,9 @@ class ShiftBounds {
   double gradient_line_s2_;  ///< Amplitude of ½T_xx and ½T_xz at 2 f_EP, on a circular orbit.
   /// Largest (ω² + |k/m|)Δ_TM of the masses that move along each axis.
   std::array<double, 3> mass_acceleration_m_s2_{};
+  double of_sidebands_ = 0.0;    ///< Shift of a_d11' by a line of 1 m/s² for K2d = 1 s²/m.
+  double delta_per_m_s2_ = 0.0;  ///< 2/g: δ that 1 m/s² makes.
+  double delta_objective_;
   /// Shifts by spin for K2c = 1 s²/m and, but for a_c13, Δx = 1 m.
   ParameterArray of_spin_{};
 };

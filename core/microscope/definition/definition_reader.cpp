@@ -5,6 +5,7 @@
 #include <complex>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -40,6 +41,21 @@ struct FieldReader {
   }
 };
 
+/// Refuses what the fields of tests are where no session tests.
+void refuse_fields_of_tests(Document& document) {
+  std::set<std::string> others;
+  Scenario scenario;
+  for_each_field(scenario, [&](const FieldInfo& field, auto&) { others.emplace(field.path); });
+  scenario.sessions.emplace_back().target = SessionTarget::ep_test;
+  for_each_field(scenario, [&](const FieldInfo& field, auto&) {
+    const std::string path(field.path);
+    if (others.contains(path) || document.find(path) == nullptr) return;
+    document.refuse(path,
+                    "only where a session tests the equivalence principle: none has the "
+                    "target ep_test");
+  });
+}
+
 /// Numbers and choices of the scenario, all but its sessions.
 void read_scenario(Document& document, Scenario& scenario) {
   // The preset sets the values that the other keys of noise then replace.
@@ -48,6 +64,7 @@ void read_scenario(Document& document, Scenario& scenario) {
   scenario.noise = noise_preset(preset);
   if (document.has_table("realism")) scenario.realism.emplace();
   for_each_field(scenario, FieldReader{document});
+  if (!scenario.has_tests()) refuse_fields_of_tests(document);
   if (document.find("health") == nullptr) return;
   document.refuse("health", "delete this table: what loses a run follows from its objectives");
 }

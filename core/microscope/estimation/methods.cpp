@@ -46,6 +46,21 @@ const EstimationMethodInfo& estimation_method(EstimationMethod method) {
 
 std::span<const EstimationMethodInfo> estimation_methods() { return methods; }
 
+double band_centre_hz(const Session& session, double orbit_period_s) {
+  double centre_hz = 0.0;
+  for (const LineMultiple& line : session.fit_lines) {
+    centre_hz += line_frequency_hz(session, line, orbit_period_s) /
+                 static_cast<double>(session.fit_lines.size());
+  }
+  return centre_hz;
+}
+
+BandPass fit_lines_filter(const Session& session, const EstimationConfig& config,
+                          double orbit_period_s, double sample_period_s) {
+  const double centre_hz = band_centre_hz(session, orbit_period_s);
+  return band_pass(centre_hz / config.band_ratio, centre_hz * config.band_ratio, sample_period_s);
+}
+
 BandPass further_lines_filter(const RecordNeeds& needs, const Session& session,
                               const EstimationConfig& config, double orbit_period_s,
                               double sample_period_s) {

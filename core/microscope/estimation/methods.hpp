@@ -28,10 +28,10 @@ struct SessionFit {
 /// What a method makes of a run.
 struct Estimation {
   ParameterArray values{};           ///< SI.
-  ParameterArray standard_errors{};  ///< SI; if the method has_standard_errors.
+  ParameterArray standard_errors{};  ///< SI; stored if the method has_standard_errors.
   std::uint32_t num_rounds = 0;
   bool converged = false;  ///< False if values still moved in the last allowed round.
-  /// Correlations of the estimates; if the method has_standard_errors.
+  /// Correlations of the estimates; stored likewise.
   std::array<ParameterArray, num_parameters> correlations{};
   std::vector<SessionFit> session_fits{};  ///< As many as sessions, or none.
 };
@@ -51,6 +51,12 @@ struct RecordNeeds {
   /// that the record cannot tell from a line before it is left out.
   std::vector<LineMultiple> neighbours{};
 };
+
+/// Centre of the band-pass behind which a session's fit lines are recorded, Hz: their mean.
+[[nodiscard]] double band_centre_hz(const Session& session, double orbit_period_s);
+/// That band-pass, from band_ratio below the centre to band_ratio above it.
+[[nodiscard]] BandPass fit_lines_filter(const Session& session, const EstimationConfig& config,
+                                        double orbit_period_s, double sample_period_s);
 
 /// The filter behind which a session's further lines are recorded: a low-pass at band_ratio times
 /// the highest of them and of their neighbours, but at half of the Nyquist frequency at most. It

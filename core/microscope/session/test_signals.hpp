@@ -41,16 +41,14 @@ inline constexpr std::size_t num_powers = 4;  ///< The functions of time.
 inline constexpr std::size_t num_averaged_signals = num_test_signals - num_powers;
 /// Signals that others are fitted with: powers of time, gravity, gradients.
 inline constexpr std::size_t num_test_columns = 8;
-inline constexpr std::size_t num_squares = 2;  ///< The last ones.
 
 [[nodiscard]] constexpr std::size_t index(TestSignal signal) {
   return static_cast<std::size_t>(signal);
 }
 
-/// Products that are kept: of a column with all signals from itself on, then of the squares.
-inline constexpr std::size_t num_test_products = num_test_columns * num_test_signals -
-                                                 num_test_columns * (num_test_columns - 1) / 2 +
-                                                 num_squares * (num_squares + 1) / 2;
+/// Products that are kept: of a column with all signals from itself on.
+inline constexpr std::size_t num_test_products =
+    num_test_columns * num_test_signals - num_test_columns * (num_test_columns - 1) / 2;
 
 /// Indices of the two signals of a product.
 struct SignalPair {
@@ -68,11 +66,20 @@ inline constexpr auto test_product_pairs = [] {
     }
   };
   for (std::size_t i = 0; i < num_test_columns; ++i) add_row(i);
-  for (std::size_t i = num_test_signals - num_squares; i < num_test_signals; ++i) add_row(i);
   return pairs;
 }();
 
 using TestProducts = std::array<double, num_test_products>;
+
+/// What the squares do from window to window: sums over all three windows in a row of the products
+/// of their second differences q_k − 2 q_{k−1} + q_{k−2}, in which nothing slow is left.
+template <typename T>
+struct SquareSteps {
+  T weight{};   ///< Of the weights of three windows, multiplied, by which the others count.
+  T common{};   ///< Of common_squared, m⁴/s⁸.
+  T mixed{};    ///< Of common_squared with common_product, m⁴/s⁸.
+  T product{};  ///< Of common_product, m⁴/s⁸.
+};
 
 /// The fitted regressors g_x, G_xx and G_xz of a window.
 inline constexpr std::size_t num_test_regressors = 3;

@@ -62,6 +62,7 @@ HWY_INLINE void scatter(const Group& group, const SessionSetup& setup, OutcomesO
     }
     if (setup.test != nullptr) {
       outcome.test_products = lane_of<TestProducts>(group.test.products, lane);
+      outcome.square_steps = lane_of<SquareSteps<double>>(group.test.steps, lane);
     }
   }
 }

@@ -16,16 +16,13 @@ LineFit line_fit(const Scenario& scenario, const Session& session) {
   fit.num_dropped = static_cast<std::size_t>(std::ceil(scenario.estimation.transient_s / period_s));
   fit.sample_period_s = period_s;
   if (is_test(session)) return fit;
-  double centre_hz = 0.0;
   for (const LineMultiple& line : session.fit_lines) {
     fit.fit_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
-    centre_hz += fit.fit_hz.back() / static_cast<double>(session.fit_lines.size());
   }
   for (const LineMultiple& line : session.known_lines) {
     fit.known_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
   }
-  const double ratio = scenario.estimation.band_ratio;
-  fit.filter = band_pass(centre_hz / ratio, centre_hz * ratio, period_s);
+  fit.filter = fit_lines_filter(session, scenario.estimation, scenario.orbit.period_s, period_s);
   return fit;
 }
 

@@ -140,7 +140,8 @@ struct RunPlan::Impl : RunParts {
            .attitude_rad = alone.loop.largest_angle,
            .monitor = alone.monitor},
           alone.further,
-          alone.test.products},
+          alone.test.products,
+          alone.test.steps},
          record);
   }
 

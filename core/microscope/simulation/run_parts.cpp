@@ -183,6 +183,7 @@ void RunParts::keep(std::size_t i, const SessionOutcome& outcome, RunRecord& rec
   }
   if (is_test(campaign.scenario.sessions[i])) {
     phasors.test_products.assign(outcome.test_products.begin(), outcome.test_products.end());
+    phasors.square_steps = outcome.square_steps;
     phasors.test_noise = window_noise(i, record.run);
   }
   record.health[i] = outcome.health;

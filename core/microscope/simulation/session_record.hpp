@@ -265,7 +265,8 @@ struct SessionOutcome {
   SignalSums<double> sums{};
   SessionHealth health;
   FurtherSums<double> further{};
-  TestProducts test_products{};  ///< Of a test session.
+  TestProducts test_products{};  ///< Of a test session, as what follows.
+  SquareSteps<double> square_steps{};
 };
 
 /// Whether LoopMonitor is filled.

@@ -50,7 +50,12 @@ struct TestSums {
   Averaged of_plain{};
   Averaged rising{};                            ///< Of the block before, with rising weights.
   std::array<T, num_test_products> products{};  ///< Over the windows, as TestProducts.
-  std::size_t num_blocks = 0;                   ///< That ended.
+  struct Squares {
+    T weight{}, common{}, product{};
+  };
+  std::array<Squares, 2> squares_before{};  ///< Of the last window, and of the one before.
+  SquareSteps<T> steps{};
+  std::size_t num_blocks = 0;  ///< That ended.
   WeightsOfRuns<T> window_weights{};
 
   /// Adds the sample `k` of a block.
@@ -96,6 +101,21 @@ struct TestSums {
       const auto [i, j] = pairs[k];
       products[k] = products[k] + weighted[i] * means[j];
     }
+    add_step({weight, means[index(TestSignal::common_squared)],
+              means[index(TestSignal::common_product)]});
+  }
+
+  PROOFMASS_INLINE void add_step(const Squares& now) {
+    const auto& [last, first] = squares_before;
+    const T weight = now.weight * last.weight * first.weight;
+    const T common = now.common - T(2.0) * last.common + first.common;
+    const T product = now.product - T(2.0) * last.product + first.product;
+    steps.weight = steps.weight + weight;
+    steps.common = steps.common + weight * common * common;
+    steps.mixed = steps.mixed + weight * common * product;
+    steps.product = steps.product + weight * product * product;
+    squares_before[1] = last;
+    squares_before[0] = now;
   }
 };
 

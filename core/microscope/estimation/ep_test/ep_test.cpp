@@ -22,7 +22,6 @@ constexpr auto num_fitted = static_cast<Eigen::Index>(num_test_regressors);
 constexpr auto num_calibrated = static_cast<Eigen::Index>(num_parameters);
 constexpr auto num_times = static_cast<Eigen::Index>(num_powers);
 constexpr auto num_columns = static_cast<Eigen::Index>(num_test_columns) - num_times;
-constexpr auto num_squared = static_cast<Eigen::Index>(num_squares);
 
 /// Factors of the averaged signals in a sum of them.
 using Factors = Eigen::Matrix<double, num_averaged, 1>;
@@ -41,10 +40,9 @@ struct WindowSums {
   double num_windows = 0.0;          ///< By weight.
   Factors means;                     ///< Of the averaged signals.
   double mean_square_gravity = 0.0;  ///< Of g_x² + g_z², (m/s²)².
-  /// Of the columns that are no power of time with the averaged signals, and of the squares, both
-  /// without their cubic polynomials in time.
+  /// Of the columns that are no power of time with the averaged signals, both without their cubic
+  /// polynomials in time.
   Eigen::Matrix<double, num_columns, num_averaged> products;
-  Eigen::Matrix<double, num_squared, num_squared> squares;
 };
 
 /// None if what was not lost determines no cubic polynomial.
@@ -75,8 +73,6 @@ std::optional<WindowSums> window_sums(const SessionPhasors& record) {
   sums.mean_square_gravity = (square(gravity_x) + square(gravity_z)) / sums.num_windows;
   sums.products = all.block<num_columns, num_averaged>(num_times, num_times) -
                   mixed.leftCols<num_columns>().transpose() * polynomials;
-  sums.squares = all.bottomRightCorner<num_squared, num_squared>() -
-                 mixed.rightCols<num_squared>().transpose() * polynomials.rightCols<num_squared>();
   return sums;
 }
 
@@ -86,6 +82,7 @@ struct TestRecord {
   /// Γ_App,cx over Γ_App,dx of what is constant: 0 if the loop nulls both sensors, −1 or 1 if it
   /// nulls the first or the second.
   double common_part = 0.0;
+  SquareSteps<double> square_steps;
   FittedMatrix noise;   ///< XᵀRX of the regressors, of noise of scale 1.
   double weight = 0.0;  ///< 1/S(f_EP), Hz/(m/s²)².
 };
@@ -94,9 +91,10 @@ struct TestRecord {
 std::optional<TestRecord> test_record(const SessionPhasors& record, const Session& session,
                                       const EstimationInput& input) {
   const std::optional<WindowSums> sums = window_sums(record);
-  if (!sums) return std::nullopt;
+  if (!sums || record.square_steps.weight == 0.0) return std::nullopt;
   TestRecord of;
   of.sums = *sums;
+  of.square_steps = record.square_steps;
   if (session.drag_free == DragFreeSource::sensor_1) of.common_part = -1.0;
   if (session.drag_free == DragFreeSource::sensor_2) of.common_part = 1.0;
   for (Eigen::Index i = 0; i < num_fitted; ++i) {
@@ -154,20 +152,17 @@ Fitted fitted_with(const TestRecord& record, const Factors& sum) {
 }
 
 /// Covariance of a window with all others, (m/s²)², by the noise of the squares that corrected()
-/// subtracts. It is white, of which windows that overlap by half leave `whitened` times their
-/// variance. What the squares have of the polynomial and of the regressors, lines as those of the
-/// drag, is no noise.
+/// subtracts: white noise of the variance s² of a sample makes s²/n of it and, of the second
+/// difference of windows that overlap by half, the variance (s²/n) (8 − 5/n²)/3.
 double square_noise(const TestRecord& record, const ParameterArray& calibration) {
-  constexpr auto size = static_cast<double>(test_block_size);
-  constexpr double whitened = 1.5 / (1.0 - 0.25 / (size * size));
-  Factors sum = Factors::Zero();
-  sum[place(common_squared)] = calibration[index(Parameter::k2d)];
-  sum[place(common_product)] = 2.0 * calibration[index(Parameter::k2c)];
-  const auto squares = sum.tail<num_squared>();
-  const Fitted mixed = fitted_with(record, sum);
-  const double of_windows = squares.dot(record.sums.squares * squares) -
-                            mixed.dot(fitted_block(record).llt().solve(mixed));
-  return whitened * std::max(of_windows, 0.0) / record.sums.num_windows;
+  constexpr auto n = static_cast<double>(test_block_size);
+  constexpr double of_steps = 3.0 / (8.0 - 5.0 / (n * n));
+  const double k2d = calibration[index(Parameter::k2d)];
+  const double twice_k2c = 2.0 * calibration[index(Parameter::k2c)];
+  const SquareSteps<double>& steps = record.square_steps;
+  const double squared_step = k2d * k2d * steps.common + 2.0 * k2d * twice_k2c * steps.mixed +
+                              twice_k2c * twice_k2c * steps.product;
+  return of_steps * squared_step / steps.weight;
 }
 
 /// Covariance of the calibration's estimates; 0 if it has no standard errors.

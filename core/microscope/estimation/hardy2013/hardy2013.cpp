@@ -136,6 +136,19 @@ struct SlopeSums {
   }
 };
 
+/// Calls visit(i, weight) for each session with a target. A phasor's variance is inverse to the
+/// session's length, so that is its weight, in that of the first.
+template <typename Visitor>
+void for_each_session_of(SessionTarget target, const std::vector<Session>& sessions,
+                         const Visitor& visit) {
+  const Session* first = nullptr;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    if (sessions[i].target != target) continue;
+    if (first == nullptr) first = &sessions[i];
+    visit(i, static_cast<double>(sessions[i].num_orbits) / static_cast<double>(first->num_orbits));
+  }
+}
+
 /// Estimates everything once from what the round before knows.
 class Round {
  public:
@@ -154,20 +167,14 @@ class Round {
 
  private:
   /// The real slope p that minimises Σ |signal − p·regressor|² over the lines of the target's
-  /// sessions, in units of the target. A phasor's variance is inverse to the session's length.
+  /// sessions, in units of the target.
   [[nodiscard]] double fit(SessionTarget target) const {
     const TargetInfo& info = target_info(target);
     SlopeSums sums;
-    const Session* first = nullptr;
-    for (std::size_t i = 0; i < sessions_.size(); ++i) {
-      const Session& session = sessions_[i];
-      if (session.target != target) continue;
-      if (first == nullptr) first = &session;
-      const double weight =
-          static_cast<double>(session.num_orbits) / static_cast<double>(first->num_orbits);
+    for_each_session_of(target, sessions_, [&](std::size_t i, double weight) {
       sums.add(corrected_signal(records_[i], info, correction_, known_), records_[i],
                info.regressor, weight);
-    }
+    });
     return info.scale * (sums.product / sums.square);
   }
 
@@ -202,6 +209,50 @@ bool has_settled(const Estimates& before, const Estimates& after, double converg
   return true;
 }
 
+/// Variance of cosine's and sine's amplitude of Γ_mes,dx at a fit line by the noise of the sensors,
+/// behind the band-pass; without noise that of scale 1.
+double line_variance(const Session& session, std::size_t line, const EstimationInput& input) {
+  const double f = line_frequency_hz(session, session.fit_lines[line], input.orbit_period_s);
+  const BandPass filter =
+      fit_lines_filter(session, input.config, input.orbit_period_s, input.sample_period_s);
+  const double scale = input.noise.scale > 0.0 ? input.noise.scale : 1.0;
+  const double duration_s = session.num_orbits * input.orbit_period_s - input.config.transient_s;
+  return scale * scale * differential_x_psd(input.noise, f) *
+         std::norm(response(filter, f, input.sample_period_s)) / duration_s;
+}
+
+/// Variance of a target's slope, from the regressors as they were measured.
+double slope_variance(SessionTarget target, const RunPhasors& records,
+                      const EstimationInput& input) {
+  const TargetInfo& info = target_info(target);
+  double noise = 0.0, square = 0.0;
+  for_each_session_of(target, input.sessions, [&](std::size_t i, double weight) {
+    for (std::size_t line = 0; line < records[i].num_fit_lines; ++line) {
+      const double weighted = weight * std::norm(records[i].amplitude[index(info.regressor)][line]);
+      square += weighted;
+      noise += weight * weighted * line_variance(input.sessions[i], line, input);
+    }
+  });
+  return info.scale * info.scale * noise / (square * square);
+}
+
+/// What the noise of the sensors makes of the estimates. Each is from lines of its own, and what
+/// the error of one makes of another is far below the noise of that.
+void set_standard_errors(const RunPhasors& records, const EstimationInput& input,
+                         Estimation& estimation) {
+  ParameterArray variances{};
+  for (const auto& [target, parameter] : determined_parameters) {
+    variances[index(parameter)] = slope_variance(target, records, input);
+  }
+  variances[index(Parameter::k2c)] =
+      0.25 * (slope_variance(SessionTarget::k2_sensor_1, records, input) +
+              slope_variance(SessionTarget::k2_sensor_2, records, input));
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    estimation.standard_errors[i] = std::sqrt(variances[i]);
+    estimation.correlations[i][i] = 1.0;
+  }
+}
+
 }  // namespace
 
 Estimation estimate_hardy2013(const RunPhasors& records, const EstimationInput& input) {
@@ -218,6 +269,7 @@ Estimation estimate_hardy2013(const RunPhasors& records, const EstimationInput& 
     ++result.num_rounds;
   }
   result.values = known.value;
+  set_standard_errors(records, input, result);
   return result;
 }
 

@@ -20,7 +20,7 @@ namespace proofmass {
 ///   or its counterpart (core/microscope/estimation/README.md says which terms the paper prints);
 /// - `second_order`: all products of two instrument errors.
 ///
-/// It has no standard errors.
+/// Its standard errors are those by the noise of the sensors.
 [[nodiscard]] Estimation estimate_hardy2013(const RunPhasors& records,
                                             const EstimationInput& input);
 

@@ -184,5 +184,30 @@ TEST(LoopMargins, RefuseAnUnstableLoop) {
   EXPECT_THROW(scenario.validate(), ConfigError);
 }
 
+// s³ + 2ζω s² + ω² s + ω² ω_i of the nominal attitude loop; (s + ω_i)² of a drag-free one with
+// ω_c = 4 ω_i; a controller of gain g and pole p, whose 1 + L has its zero at p − g.
+TEST(SlowestDecay, IsThatOfTheClosedLoops) {
+  Scenario scenario;
+  const double omega = 2.0 * std::numbers::pi * scenario.attitude.bandwidth_hz;
+  const double integral = 2.0 * std::numbers::pi * scenario.attitude.integral_hz;
+  const double s = -1.0 / slowest_decay_s(scenario);
+  EXPECT_NEAR(((s + 2.0 * scenario.attitude.damping * omega) * s + omega * omega) * s,
+              -omega * omega * integral, 1e-12 * omega * omega * integral);
+  EXPECT_NEAR(s, -integral, 0.2 * integral);
+  scenario.drag_free.bandwidth_hz = 1e-3;
+  scenario.drag_free.integral_hz = 2.5e-4;
+  EXPECT_NEAR(slowest_decay_s(scenario) * 2.0 * std::numbers::pi * 5e-4, 1.0, 1e-6);
+  scenario.drag_free.integral_hz = 0.0;  // What is not there decays not slowly.
+  EXPECT_NEAR(slowest_decay_s(scenario) * 2.0 * std::numbers::pi * 1e-3, 1.0, 1e-9);
+  scenario.controllers.push_back({.loop = ControlLoop::drag_free,
+                                  .axis = Axis::z,
+                                  .gain = 2e-4,
+                                  .zeros_rad_s = {},
+                                  .poles_rad_s = {-3e-4}});
+  EXPECT_NEAR(slowest_decay_s(scenario), 2000.0, 1e-6);
+  scenario.realism.emplace().actuation_lag_s = 100.0;  // 100 s² + (1 + 0.03) s + 5e-4 = 0.
+  EXPECT_NEAR(slowest_decay_s(scenario), 2.0 / (0.0103 - std::sqrt(0.0103 * 0.0103 - 2e-5)), 1e-6);
+}
+
 }  // namespace
 }  // namespace proofmass

@@ -58,10 +58,10 @@ TEST(MicroscopeCampaign, HasAFitOfEachSessionSinceTheSixthVersion) {
   EXPECT_EQ(schema.fit[8].name, "chi_squared_A_C12");
   EXPECT_EQ(schema.fit[10].name, "chi_squared_a_c12_");  // Names of columns have no case.
   EXPECT_EQ(schema.fit[11].name, "degrees_of_freedom_a_c12_");
-  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-11x", "other-7", ""}) {
+  for (const char* const version : {"hardy2013-5", "hardy2013-", "hardy2013-12x", "other-7", ""}) {
     EXPECT_EQ(model().results_of(definition, version).fit.size(), 2U) << version;
   }
-  EXPECT_EQ(model().results_of(definition, "hardy2013-11").fit.size(), schema.fit.size());
+  EXPECT_EQ(model().results_of(definition, "hardy2013-12").fit.size(), schema.fit.size());
   EXPECT_EQ(model().results_of("[[session", model_version).fit.size(), 2U);
 }
 
@@ -168,6 +168,47 @@ TEST(MicroscopeCampaign, WarnsOfAFitThatChanceDoesNotExplain) {
   EXPECT_EQ(warnings[0].effect, "fit");
   EXPECT_EQ(warnings[0].quantity, index(Parameter::k2d));
   EXPECT_DOUBLE_EQ(warnings[0].part, 2.0 * 20.0 / 250.0);
+}
+
+// Seven times 146 s, the time constant of the attitude loop's integral.
+TEST(MicroscopeCampaign, NotesThatItsLoopsHaveNotSettled) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.simulation.settling_s = 1030.0;
+  EXPECT_EQ(campaign.note(), "");
+  campaign.scenario.simulation.settling_s = 0.0;
+  EXPECT_THAT(campaign.note(),
+              ::testing::HasSubstr("simulation.settling_s = 0 is less than the 1"));
+}
+
+/// The shifts that a campaign with a test warns of, for K2d at its bound.
+std::vector<Warning> warnings_of_residuals(double residual_m_s2, double test_residual_m_s2) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.sessions.emplace_back().target = SessionTarget::ep_test;
+  RunResult result;
+  result.truth.assign(num_parameters + num_test_parameters, 0.0);
+  result.truth[index(Parameter::k2d)] = 14000.0;
+  result.health.assign(num_health_values + 1, 0.0);
+  for (std::size_t i = 0; i < num_health_values; ++i) {
+    if (health_values()[i].member == &LoopHealth::residual_m_s2) result.health[i] = residual_m_s2;
+  }
+  result.health.back() = test_residual_m_s2;
+  std::vector<Warning> warnings = campaign.warner()(result);
+  std::erase_if(warnings, [](const Warning& of) { return of.quantity < num_parameters; });
+  return warnings;
+}
+
+// A line of 2R beside the push of the session of a_d11', which lasts 9.83 orbits, makes sidebands
+// that leak 2·K2d·2R/(9.83 π) into it, and 2/g of that times the residual of the test into δ: with
+// R = 3e-10 and 1e-8 m/s² 1.4e-15, a part of 1.4 of 1e-15.
+TEST(MicroscopeCampaign, WarnsOfAResidualThatTheCalibrationDoesNotTakeFromATest) {
+  EXPECT_THAT(warnings_of_residuals(1e-12, 1e-8), IsEmpty());
+  EXPECT_THAT(warnings_of_residuals(3e-10, 3e-10), IsEmpty());
+  const std::vector<Warning> warnings = warnings_of_residuals(3e-10, 1e-8);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].effect, "residual");
+  EXPECT_EQ(warnings[0].quantity, num_parameters);
+  const double moved = 2.0 * 14000.0 * 6e-10 / (9.832 * std::numbers::pi);
+  EXPECT_NEAR(warnings[0].part, 2.0 / 7.9 * 1e-8 * moved / 1e-15, 0.01 * warnings[0].part);
 }
 
 // Without any session that is free of excitations nothing measures the noise of the loops.

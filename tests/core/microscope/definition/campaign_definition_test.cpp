@@ -209,7 +209,10 @@ TEST(ParseCampaign, RefusesWhatIsOfATestWithoutOne) {
        {"[objective]\neotvos_parameter = 1e-15\n", "[gaps]\nglitch_rate_hz = 0.01\n",
         "[drag_free]\nresonator_damping = 0.5\n"}) {
     const std::string text = "[campaign]\nname = \"c\"\n" + table;
-    EXPECT_THROW((void)test::parse_campaign("c.toml", text), DefinitionError);
+    EXPECT_THAT(
+        test::message_of<DefinitionError>([&] { (void)test::parse_campaign("c.toml", text); }),
+        HasSubstr("(only where a session tests the equivalence principle: none has the "
+                  "target ep_test)"));
   }
 }
 

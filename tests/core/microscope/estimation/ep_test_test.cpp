@@ -350,6 +350,27 @@ TEST(EpTest, HasAnHonestStandardError) {
   }
 }
 
+// The squares of what a loop leaves of thirty times the drag have lines as large as the noise of a
+// window. Taken for noise, they would make σ 2.3 times as large; differences keep 2e-4 of them.
+TEST(EpTest, TakesNoLineForNoise) {
+  for (const GapsConfig& gaps : {GapsConfig{}, many_gaps()}) {
+    double sigma = 0.0;
+    for (const double drag : {1.0, 30.0}) {
+      MicroscopeCampaign campaign;
+      campaign.scenario.environment.scale = drag;
+      campaign.scenario.sessions = {test_session("ep", 2, 17.5)};
+      campaign.scenario.gaps = gaps;
+      double variance = 0.0;
+      for (const RunRecord& record : test::recorded(RunPlan(campaign, no_calibration), 16)) {
+        const double of_run = estimate(campaign, record, record.truth).standard_error;
+        variance += of_run * of_run / 16.0;
+      }
+      if (drag == 1.0) sigma = std::sqrt(variance);
+      EXPECT_NEAR(std::sqrt(variance) / sigma, 1.0, 0.01);
+    }
+  }
+}
+
 /// A test whose loop nulls the outer mass, calibrated by the truth.
 double error_on_the_outer_mass(DragFreeSource of_calibration, double offcentring_m = 0.0) {
   MicroscopeCampaign campaign = quiet_campaign({test_session("ep", 2, 17.5)});

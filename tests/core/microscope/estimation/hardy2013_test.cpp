@@ -2,8 +2,10 @@
 
 #include "core/error.hpp"
 #include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "core/random/stream.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/runs.hpp"
 #include "tests/test.hpp"
 
 namespace proofmass {
@@ -147,7 +149,9 @@ Estimation calibrate(const RunPhasors& record, const EstimationConfig& config,
                                      .config = config,
                                      .objectives = scenario.objectives,
                                      .noise = scenario.noise,
-                                     .laws = drawn_moments(nominal_dispersions())});
+                                     .laws = drawn_moments(nominal_dispersions()),
+                                     .orbit_period_s = scenario.orbit.period_s,
+                                     .sample_period_s = scenario.simulation.sample_period_s});
 }
 
 /// The paper's sessions are in the order of their targets, as ModelRecord makes its records.
@@ -393,6 +397,41 @@ TEST(EstimateHardy2013, NeverConvergesOnNumbersThatAreNotFinite) {
   const Estimation result = calibrate(record, EstimationConfig{});
   EXPECT_FALSE(result.converged);
   EXPECT_FALSE(std::isfinite(result.values[0]));
+}
+
+// A slow loop leaves 2e-8 m/s² at f_EP, and noise moves a_d11' by 1e-6 in one orbit: 4e-15 of δ,
+// beside 2.4e-15 by the noise of the test. The standard errors of all estimates are those of noise,
+// of instruments that are perfect; the deviation of the mean square of error/σ is √(2/208).
+TEST(EstimateHardy2013, GivesItsErrorToTheStandardErrorOfATest) {
+  constexpr std::uint64_t num_runs = 208;
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
+  Session& test = campaign.scenario.sessions.emplace_back();
+  test.name = "ep";
+  test.target = SessionTarget::ep_test;
+  test.num_orbits = 2;
+  test.spin_rate_rad_s = 35.0 * std::numbers::pi / campaign.scenario.orbit.period_s;
+  campaign.scenario.drag_free.bandwidth_hz = 3e-3;
+  campaign.scenario.drag_free.integral_hz = 3e-4;
+  campaign.scenario.environment.scale = 3.0;
+  campaign.dispersions = test::perfect_laws();
+  const RunPlan plan(campaign);
+  std::array<double, num_parameters> ratios{};
+  double squares = 0.0, variances = 0.0;
+  for (const RunRecord& record : test::recorded(plan, num_runs)) {
+    const Estimation found = plan.estimation(record);
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      const double ratio = (found.values[i] - record.truth[i]) / found.standard_errors[i];
+      ratios[i] += ratio * ratio / num_runs;
+    }
+    const RunResult result = plan.estimate(record);
+    ASSERT_EQ(result.standard_error.size(), 1U);
+    squares += result.error(num_parameters) * result.error(num_parameters);
+    variances += result.standard_error[0] * result.standard_error[0];
+  }
+  const double tolerance = 3.5 * std::sqrt(2.0 / num_runs);
+  for (std::size_t i = 0; i < num_parameters; ++i) EXPECT_NEAR(ratios[i], 1.0, tolerance) << i;
+  EXPECT_NEAR(squares / variances, 1.0, tolerance);
 }
 
 }  // namespace
