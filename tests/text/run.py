@@ -111,7 +111,8 @@ class Session:
             if not name.startswith(("PROOFMASS_", "SLURM_")) and name not in ("COLUMNS", "NO_COLOR")
         }
         environment |= {
-            "PATH": f"{programs}:{environment['PATH']}",
+            # Debian's Python, which has what install-deps.sh installs, before any other one.
+            "PATH": f"{programs}:/usr/bin:{environment['PATH']}",
             "HOME": self.directory,
             "LC_ALL": "C.UTF-8",
             "TZ": "UTC",
