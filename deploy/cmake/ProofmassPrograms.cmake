@@ -10,9 +10,17 @@ function(proofmass_add_programs)
   cmake_parse_arguments(PARSE_ARGV 0 programs "" "NAME;MODEL" "")
   set(further_models ${CMAKE_CURRENT_BINARY_DIR}/${programs_NAME}/further_models.cpp)
   file(CONFIGURE OUTPUT ${further_models} @ONLY CONTENT [[
-#include "core/microscope/microscope_model.hpp"
+#include <vector>
 
-std::vector<const proofmass::Model*> proofmass::further_models() { return {&microscope_model()}; }
+// Not by their headers, which take the compiler seconds: each model's programs compile this.
+namespace proofmass {
+
+class Model;
+const Model& microscope_model();
+
+std::vector<const Model*> further_models() { return {&microscope_model()}; }
+
+}  // namespace proofmass
 ]])
   set(models ${programs_NAME}_further_models)
   add_library(${models} OBJECT ${further_models})

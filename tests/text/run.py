@@ -43,12 +43,13 @@ PATTERNS = {
 WITH_MOUNTS = ["unshare", "--mount", "--propagation", "private"]
 
 
-# Waits until a command succeeds. Until then it may find no file yet.
+# Waits until a command succeeds. Until then it may find no file yet. Counting the waits takes no
+# process for each, as reading the clock would.
 AWAIT = """await() {
-  await_until=$(($(date +%s) + 100))
+  await_left=5000
   until eval "$1" 2>/dev/null; do
-    [ $(date +%s) -lt $await_until ] || { echo "not within 100 s: $1"; return 1; }
-    sleep 0.02
+    [ $await_left -gt 0 ] || { echo "not within 100 s: $1"; return 1; }
+    await_left=$((await_left - 1)); sleep 0.02
   done
 }
 """
@@ -111,7 +112,8 @@ class Session:
             if not name.startswith(("PROOFMASS_", "SLURM_")) and name not in ("COLUMNS", "NO_COLOR")
         }
         environment |= {
-            "PATH": f"{programs}:{environment['PATH']}",
+            # Debian's Python, which has what install-deps.sh installs, before any other one.
+            "PATH": f"{programs}:/usr/bin:{environment['PATH']}",
             "HOME": self.directory,
             "LC_ALL": "C.UTF-8",
             "TZ": "UTC",
