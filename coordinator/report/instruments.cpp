@@ -102,6 +102,7 @@ InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
     const Moments magnitudes = quantity.magnitudes.moments();
     of.mean_magnitude = magnitudes.mean;
     of.magnitude_interval = not_negative(mean_interval(magnitudes, default_confidence));
+    of.is_too_skewed = is_too_skewed(magnitudes.skewness, magnitudes.count);
   }
   if (!have_standard_errors_ || !quantity.position) return of;
   of.standard_errors = {.within_ratio = {},
@@ -165,7 +166,8 @@ Table no_instruments(const InstrumentStatistics& statistics) {
                                    statistics.realisations)}}};
 }
 
-std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) {
+std::vector<std::string> variance_notes(const ResultSchema& schema,
+                                        const InstrumentStatistics& statistics) {
   std::vector<std::string> notes{count_text(statistics)};
   if (statistics.num_not_estimated > 0) {
     notes.push_back(fmt::format("left out: {} with a run that has no estimate",
@@ -174,6 +176,13 @@ std::vector<std::string> variance_notes(const InstrumentStatistics& statistics) 
   notes.emplace_back(
       "from, to: 95 % interval with the instrument as the unit; each holds by itself: of 20, one "
       "misses the true value");
+  const std::string skewed =
+      symbols_of(schema, [&](std::size_t i) { return statistics.quantities[i].is_too_skewed; });
+  if (!skewed.empty()) {
+    notes.push_back(fmt::format(
+        "mean: too skewed for intervals from {}, which may cover less than 95 %: {}",
+        counted(statistics.num_instruments - statistics.num_not_estimated, "instrument"), skewed));
+  }
   notes.emplace_back(
       "noise: no choice of the instruments reduces the runs that a bias needs by more than the "
       "inverse of this share");
@@ -194,7 +203,7 @@ Table variance_table(const ResultSchema& schema, const InstrumentStatistics& sta
   Table table{.id = "variance-table",
               .caption = "Variance between instruments and within",
               .rows = std::vector<Row>(statistics.quantities.size()),
-              .notes = variance_notes(statistics)};
+              .notes = variance_notes(schema, statistics)};
   const std::vector<InstrumentQuantity>& all = statistics.quantities;
   const auto scale = [&](std::size_t i) { return schema.quantities[i].display_scale; };
   const auto figure = [&](std::size_t i, double value) {

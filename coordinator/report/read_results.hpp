@@ -88,6 +88,7 @@ struct InstrumentQuantity {
   OneWayAnalysis error;         ///< Of the instruments all of whose runs have an estimate.
   double mean_magnitude = 0.0;  ///< Of |error|, over the same ones.
   std::optional<Interval> magnitude_interval = {};
+  bool is_too_skewed = false;  ///< The instruments' mean |error|, for Student's law.
   /// Of the runs whose |error| is above the objective, and of those without an estimate.
   GroupedShare beyond;
   std::optional<GroupedStandardErrors> standard_errors = {};
@@ -162,6 +163,7 @@ struct ReplicatedMean {
   /// By Student's law of the replicates' means, 95 %; empty where they cannot tell, see
   /// RunningReplicates::statistics().
   std::optional<Interval> interval = {};
+  bool is_too_skewed = false;  ///< The replicates' means, for that law.
 };
 
 /// estimate − truth of one quantity, SI.

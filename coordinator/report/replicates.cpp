@@ -70,6 +70,7 @@ ReplicatedMean RunningReplicates::Mean::mean() const {
   ReplicatedMean of{.mean = moments.mean};
   if (moments.count < num_replicates_of_interval) return of;
   of.interval = mean_interval(moments, default_confidence);
+  of.is_too_skewed = is_too_skewed(moments.skewness, moments.count);
   return of;
 }
 
@@ -123,7 +124,8 @@ std::optional<Interval> root_of(std::optional<Interval> interval) {
   return interval;
 }
 
-std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) {
+std::vector<std::string> replicate_notes(const ResultSchema& schema,
+                                         const ReplicateStatistics& statistics) {
   std::vector<std::string> notes{fmt::format(
       "{} complete replicates of {} runs (campaign.design = \"{}\"); their means, which "
       "are independent, make the intervals",
@@ -137,6 +139,16 @@ std::vector<std::string> replicate_notes(const ReplicateStatistics& statistics) 
                         : std::string()));
   }
   notes.emplace_back("each interval holds by itself: of 20, one misses the true value");
+  const std::string skewed = symbols_of(schema, [&](std::size_t i) {
+    const ReplicatedQuantity& of = statistics.quantities[i];
+    return of.magnitude.is_too_skewed || of.bias.is_too_skewed || of.mean_square.is_too_skewed;
+  });
+  if (!skewed.empty()) {
+    notes.push_back(
+        fmt::format("too skewed for intervals from {} replicates, which may cover less than 95 %: "
+                    "{}",
+                    statistics.num_replicates, skewed));
+  }
   notes.emplace_back("beyond: runs whose error exceeds the objective, or without an estimate");
   if (const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
       statistics.num_estimated < num_runs) {
@@ -182,7 +194,7 @@ Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& sta
   Table table{.id = "replicate-table",
               .caption = "95 % intervals from replicates of the design, in the units above",
               .rows = std::vector<Row>(statistics.quantities.size()),
-              .notes = replicate_notes(statistics)};
+              .notes = replicate_notes(schema, statistics)};
   const std::vector<ReplicatedQuantity>& all = statistics.quantities;
   const auto scale = [&](std::size_t i) { return schema.quantities[i].display_scale; };
   add_column(table, {"parameter", true, 10}, [&](auto i) { return schema.quantities[i].symbol; });

@@ -74,6 +74,9 @@ void add_ends(Table& table, Column from, Column to,
 /// Of |error|: of few values the symmetric interval of a mean may begin below 0, where none can
 /// lie.
 [[nodiscard]] std::optional<Interval> not_negative(std::optional<Interval> interval);
+/// `a, b`, the symbols of those quantities of which is_one(index) holds.
+[[nodiscard]] std::string symbols_of(const ResultSchema& schema,
+                                     const std::function<bool(std::size_t)>& is_one);
 /// Whether the bias differs from 0 if all parameters are looked at together (Holm, 5 %), by
 /// Student's law. False also where nothing tells: of one run, of draws that are not independent,
 /// and of errors that are too skewed for that law.

@@ -70,33 +70,16 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
   return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
 }
 
-/// Student's law holds for the mean of n values if their skewness is √n/5 or less [Cochran1977].
-/// Chance makes that of a sample larger by two standard deviations, 2√(6/n).
-bool is_too_skewed(double skewness, std::uint64_t num_runs) {
-  const auto n = static_cast<double>(num_runs);
-  return std::abs(skewness) > std::sqrt(n) / 5.0 + 2.0 * std::sqrt(6.0 / n);
-}
-
-/// `a, b`, the symbols of those parameters of which is_one(index) holds.
-template <typename IsOne>
-std::string symbols_of(const Review& review, const IsOne& is_one) {
-  std::string list;
-  for (std::size_t i = 0; i < review.schema.quantities.size(); ++i) {
-    if (!is_one(i)) continue;
-    list += fmt::format("{}{}", list.empty() ? "" : ", ", review.schema.quantities[i].symbol);
-  }
-  return list;
-}
-
 /// Which biases differ from 0, and which intervals do not hold.
 std::string bias_sentence(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
   const std::uint64_t num_runs = statistics.num_estimated;
   if (num_runs < 2) return "Bias: one run does not tell whether it differs from 0.";
-  const std::string skewed = symbols_of(review, [&](std::size_t i) {
+  const std::string skewed = symbols_of(review.schema, [&](std::size_t i) {
     return is_too_skewed(statistics.accuracy[i].error.skewness, num_runs);
   });
-  const std::string names = symbols_of(review, [&](std::size_t i) { return is_biased(review, i); });
+  const std::string names =
+      symbols_of(review.schema, [&](std::size_t i) { return is_biased(review, i); });
   const std::size_t count = statistics.accuracy.size();
   return fmt::format(
       "Bias: each interval holds by itself{}. {} {}.",
@@ -111,7 +94,7 @@ std::string bias_sentence(const Review& review) {
 /// Where the intervals of |error| cover less than they say; empty if nowhere.
 std::string skewness_note(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  const std::string skewed = symbols_of(review, [&](std::size_t i) {
+  const std::string skewed = symbols_of(review.schema, [&](std::size_t i) {
     return is_too_skewed(statistics.accuracy[i].skewness, statistics.num_estimated);
   });
   if (skewed.empty()) return "";
@@ -191,6 +174,15 @@ Cell no_figure() {
   Cell cell("-");
   cell.document = "–";
   return cell;
+}
+
+std::string symbols_of(const ResultSchema& schema, const std::function<bool(std::size_t)>& is_one) {
+  std::string list;
+  for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
+    if (!is_one(i)) continue;
+    list += fmt::format("{}{}", list.empty() ? "" : ", ", schema.quantities[i].symbol);
+  }
+  return list;
 }
 
 std::optional<Interval> not_negative(std::optional<Interval> interval) {

@@ -166,6 +166,11 @@ std::optional<Interval> mean_interval(const Moments& moments, double confidence)
   return Interval{moments.mean - half_width, moments.mean + half_width, confidence};
 }
 
+bool is_too_skewed(double skewness, std::uint64_t num_values) {
+  const auto n = static_cast<double>(num_values);
+  return std::abs(skewness) > std::sqrt(n) / 5.0 + 2.0 * std::sqrt(6.0 / n);
+}
+
 std::optional<Interval> deviation_interval(const Moments& moments, double confidence) {
   detail::check_fraction("confidence", confidence);
   const double z = inverse_normal(0.5 + 0.5 * confidence);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 
@@ -25,6 +26,10 @@ inline constexpr double default_confidence = 0.95;
 /// Empty below two values.
 /// @throws InvalidArgument unless 0 < confidence < 1; so do all below.
 [[nodiscard]] std::optional<Interval> mean_interval(const Moments& moments, double confidence);
+/// True if values of this skewness are too few for the interval of their mean: Student's law holds
+/// up to √n/5 [Cochran1977]. Chance makes that of a sample larger by two standard deviations,
+/// 2√(6/n).
+[[nodiscard]] bool is_too_skewed(double skewness, std::uint64_t num_values);
 
 /// Of the standard deviation s, by the kurtosis that the values have [Bonett2006]: for any law with
 /// a fourth moment, the better the more values. With z the quantile of the normal law and γ₄ the

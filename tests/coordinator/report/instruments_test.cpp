@@ -85,6 +85,22 @@ TEST(Instruments, SayHowOftenTheWorstOnesMeetAllObjectives) {
               HasSubstr("(temporal): each of the worst 2 instruments meets them in 1 of 2\n"));
 }
 
+// As replicates: the skewness of one of 20 that is apart is √20.
+TEST(Instruments, SayWhereTheyAreTooSkewedForIntervals) {
+  for (const std::uint64_t num_apart : {1U, 10U}) {
+    RunningInstruments running(test::schema(), objectives(), 2);
+    for (std::uint64_t run = 0; run < 40; ++run) {
+      running.add(test::result_off_by(run, run / 2 < num_apart ? 1.0 : 0.0));
+    }
+    const InstrumentStatistics statistics = running.statistics();
+    EXPECT_EQ(statistics.quantities.front().is_too_skewed, num_apart == 1);
+    const auto skewed = Contains(HasSubstr("too skewed for intervals from 20 instruments"));
+    const Table table = variance_table(test::schema(), statistics);
+    if (num_apart == 1) EXPECT_THAT(table.notes, skewed);
+    if (num_apart == 10) EXPECT_THAT(table.notes, Not(skewed));
+  }
+}
+
 TEST(Instruments, HaveTablesThatFitATerminal) {
   RunningInstruments running(test::schema(), objectives(), 2);
   for (std::uint64_t run = 0; run < 40; ++run) {

@@ -55,6 +55,21 @@ TEST(Replicates, MakeIntervalsOfTheirMeans) {
   EXPECT_FALSE(of.beyond.interval);  // Of 11 runs.
 }
 
+// One of 20 means that is apart: their skewness is √20, of which √20/5 + 2√(6/20) = 2.0 may be
+// chance. Of two that are, one on each side, it is 0.
+TEST(Replicates, SayWhereTheyAreTooSkewedForIntervals) {
+  for (const double of_second : {0.0, -1.0}) {
+    RunningReplicates running(test::schema(), test::campaign_of(1).objectives(), of_four);
+    for (std::uint64_t run = 0; run < 80; ++run) {
+      running.add(run_off_by(run, run == 8 ? 1.0 : run == 12 ? of_second : 0.0));
+    }
+    const ReplicateStatistics statistics = running.statistics();
+    EXPECT_EQ(statistics.quantities.front().bias.is_too_skewed, of_second == 0.0);
+    EXPECT_THAT(replicate_table(test::schema(), statistics).notes,
+                Contains(HasSubstr("too skewed for intervals from 20 replicates")));  // |error| is.
+  }
+}
+
 TEST(Replicates, LeaveOutTheOneThatIsNotFinishedYet) {
   const ReplicateStatistics statistics = replicates_of(35);
   EXPECT_EQ(statistics.num_replicates, 7U);
