@@ -330,7 +330,8 @@ std::string_view value_of_variable(const char* name) {
 
 ScreenSize screen_size_of(std::FILE* stream) {
   winsize size{};
-  const bool is_known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  const bool is_known =
+      ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && std::min(size.ws_col, size.ws_row) > 0;
   if (!is_known) return {};
   return {.columns = size.ws_col, .rows = size.ws_row};
 }
