@@ -86,6 +86,12 @@ std::string chance_text(const Planned& plan) {
                      percent_text(plan.bound.misses_any));
 }
 
+/// Empty for a campaign without a budget.
+std::string budget_text(const PlanBound& bound) {
+  if (!bound.mean_budget) return "";
+  return fmt::format("budget: {} m/s² in the mean", measured_figure(*bound.mean_budget));
+}
+
 /// `16 of 16 probed runs are lost`.
 std::string losses_text(const PlanBound& bound, std::size_t num_probed) {
   const std::size_t num_lost = bound.num_lost();
@@ -151,9 +157,8 @@ Table bound_table(const Planned& plan) {
   }
   table.remarks.push_back({fmt::format("{}, if estimated by the method {}", chance_text(plan),
                                        plan.study.scope().method)});
-  if (plan.bound.mean_budget) {
-    table.remarks.push_back(
-        {fmt::format("budget: {} m/s² in the mean", measured_figure(*plan.bound.mean_budget))});
+  if (std::string budget = budget_text(plan.bound); !budget.empty()) {
+    table.remarks.push_back({std::move(budget)});
   }
   table.notes.push_back(fmt::format(
       "σ: standard error of estimates by the method {}, mean of {} instruments; errors are taken "
@@ -325,8 +330,10 @@ void print_changed_method(const Campaign& campaign, const std::string& method) {
 /// What the lengths in the campaign file promise, to be held beside the new ones.
 void print_former_chance(const Campaign& campaign, const PlanStudy& study) {
   const Planned former = planned(campaign, study, study.scope().num_steps);
-  print_lines(fmt::format("before, with {} {}: {}\n", former.num_steps_in_all(),
-                          built_in_model().step_name(), chance_text(former)));
+  const std::string budget = budget_text(former.bound);
+  print_lines(fmt::format("before, with {} {}: {}{}{}\n", former.num_steps_in_all(),
+                          built_in_model().step_name(), chance_text(former),
+                          budget.empty() ? "" : "; ", budget));
 }
 
 /// Names the data files that a new campaign file in another folder does not find.
