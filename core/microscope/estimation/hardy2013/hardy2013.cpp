@@ -236,8 +236,9 @@ double slope_variance(SessionTarget target, const RunPhasors& records,
   return info.scale * info.scale * noise / (square * square);
 }
 
-/// What the noise of the sensors makes of the estimates. Each is from lines of its own, and what
-/// the error of one makes of another is far below the noise of that.
+/// What the noise of the sensors makes of the estimates, each from lines of its own. Left out is
+/// what the error of one makes of another: with the loops of 2013 it is far below the noise of
+/// that; with slow ones a_d11' makes more of a_c11Δ, of which tests only take a_c11Δy.
 void set_standard_errors(const RunPhasors& records, const EstimationInput& input,
                          Estimation& estimation) {
   ParameterArray variances{};
