@@ -167,9 +167,9 @@ std::optional<double> RequirementAnswer::relative_margin() const {
 }
 
 Interval RequirementAnswer::exceedance_of_all() const {
-  PROOFMASS_EXPECT(of_all.has_value());
-  return probability_interval(static_cast<double>(of_all->num_exceedances),
-                              static_cast<double>(of_all->num_runs), default_confidence);
+  const ExceedanceCount& all = of_all.value();
+  return probability_interval(static_cast<double>(all.num_exceedances),
+                              static_cast<double>(all.num_runs), default_confidence);
 }
 
 bool RequirementAnswer::is_opposed() const {

@@ -94,10 +94,10 @@ TEST(Instruments, SayWhereTheyAreTooSkewedForIntervals) {
     }
     const InstrumentStatistics statistics = running.statistics();
     EXPECT_EQ(statistics.quantities.front().is_too_skewed, num_apart == 1);
-    const auto skewed = Contains(HasSubstr("too skewed for intervals from 20 instruments"));
-    const Table table = variance_table(test::schema(), statistics);
-    if (num_apart == 1) EXPECT_THAT(table.notes, skewed);
-    if (num_apart == 10) EXPECT_THAT(table.notes, Not(skewed));
+    const std::string notes =
+        fmt::format("{}", fmt::join(variance_table(test::schema(), statistics).notes, "\n"));
+    EXPECT_EQ(notes.find("too skewed for intervals from 20 instruments") != std::string::npos,
+              num_apart == 1);
   }
 }
 
