@@ -261,9 +261,9 @@ std::vector<std::string> matrix_notes(const Review& review) {
       "(order statistics, any law). Margin: (limit − bound) / limit."};
   for (const RequirementAnswer& row : review.matrix) {
     if (!row.of_all) continue;
-    notes.push_back(fmt::format(
-        "{} was decided by the first {} draws: {} {}.", requirement_name(row), row.check.num_runs,
-        row.is_joint() ? "all hold in" : "exceeding are", text_of_all(row)));
+    notes.push_back(fmt::format("{} was decided by the first {} draws. {}: {}.",
+                                requirement_name(row), row.check.num_runs,
+                                row.is_joint() ? "Holding" : "Exceeding", text_of_all(row)));
   }
   if (std::ranges::any_of(review.matrix, &RequirementAnswer::is_joint)) {
     notes.emplace_back(

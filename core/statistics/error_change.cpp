@@ -32,8 +32,8 @@ std::vector<double> distances(std::span<const double> values, double centre) {
   return distances;
 }
 
-/// Mean sign s of x − mean: where x − mean are many and small, and few and large, the mean of
-/// |x − mean| depends on where the mean is.
+/// Mean sign s of x − mean. In a skew law it is not 0, and the mean of |x − mean| then changes by
+/// −s times what the mean does.
 double mean_sign(std::span<const double> errors) {
   const double mean = mean_of(errors, {});
   CompensatedSum signs;
@@ -62,8 +62,9 @@ double mean_sign_of_pairs(std::span<const double> first, std::span<const double>
   return 0.5 * (mean_sign(first) + mean_sign(second));
 }
 
-/// What a pair has more of the scale in the second campaign. What rounding makes of equal parts is
-/// 0.
+/// What the second run of a pair adds to the scale of its campaign beyond what the first one adds.
+/// What rounding makes of equal parts is 0: at most 12 ε times the largest number for the means,
+/// the distances and their parts, and ε for each of two errors that were shifted.
 std::vector<double> scale_differences(std::span<const double> first,
                                       std::span<const double> second) {
   const double sign = mean_sign_of_pairs(first, second);

@@ -154,7 +154,7 @@ struct SessionPhasors {
   std::array<double, num_line_bases> means{};
   /// Of a session that tests the equivalence principle; empty for others.
   std::vector<double> test_products{};
-  SquareSteps<double> square_steps{};
+  SquareSteps<double> square_steps{};  ///< Likewise; 0 for others.
   /// XᵀRX of a test, with X its weighted regressors and R the covariance of the windows' noise, of
   /// scale 1.
   RegressorProducts test_noise{};

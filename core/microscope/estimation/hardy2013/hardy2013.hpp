@@ -20,7 +20,8 @@ namespace proofmass {
 ///   or its counterpart (core/microscope/estimation/README.md says which terms the paper prints);
 /// - `second_order`: all products of two instrument errors.
 ///
-/// Its standard errors are those by the noise of the sensors.
+/// Its standard errors are those by the noise of the sensors alone; what the error of one estimate
+/// makes of another is left out.
 [[nodiscard]] Estimation estimate_hardy2013(const RunPhasors& records,
                                             const EstimationInput& input);
 
