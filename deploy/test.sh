@@ -5,11 +5,11 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-# These wait for their processes more than they compute; some long ones must not be disturbed.
+# Tests wait for their processes more than they compute; the long ones keep a core busy more often.
 selection=(--label-exclude '^long$' --parallel 4)
 targets=(all)
 if [[ ${1:-} == --all ]]; then
-  selection=()
+  selection=(--parallel 3)
   targets+=(
     unoptimised_recorded_bits_test proofmass_benchmarks proofmass_store_benchmark
     proofmass_fuzz_corpus

@@ -18,7 +18,7 @@ def check(is_true, what):
         raise AssertionError(what)
 
 
-def wait_until(what, holds, limit_s=120):
+def wait_until(what, holds, limit_s=600):
     end = time.monotonic() + limit_s
     while not holds():
         check(time.monotonic() < end, f"{what} did not come in {limit_s} s")

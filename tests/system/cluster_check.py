@@ -26,7 +26,7 @@ from checking import wait_until
 DEPLOY = checking.SOURCE / "deploy"
 PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are.
 NUM_RUNS = 64
-PATIENCE_S = 120
+PATIENCE_S = 600
 
 
 class Forwarder:

@@ -194,7 +194,7 @@ class Cluster:
 class Site:
     """Where people of the cluster work: the programs in the PATH, a campaign file, a disk."""
 
-    def __init__(self, cluster, directory, programs, num_runs=5000):
+    def __init__(self, cluster, directory, programs, num_runs=3000):
         self.cluster = cluster
         self.directory = directory
         self.script = Path(__file__).resolve().parents[2] / "deploy/slurm/campaign.sbatch"
@@ -323,7 +323,7 @@ def run_in_three_jobs(site, expected):
     site.wait_for_end(job)
 
     # Workers leave in time before this, and with the last of them the job ends.
-    job = site.submit(*arguments, SLURM_JOB_END_TIME=str(int(time.time()) + 20))
+    job = site.submit(*arguments, SLURM_JOB_END_TIME=str(int(time.time()) + 12))
     site.wait_for_output(job, "not finished; the same command goes on")
     site.wait_for_end(job)
 
@@ -370,7 +370,7 @@ def run_by_factory(site, expected):
         wait_until("three workers", lambda: len(jobs("RUNNING")) == NUM_NODES)
         job, node = jobs("RUNNING")[-1]
         site.cluster.kill_node(node)
-        wait_until("runs after the loss of a node", lambda: num_done() >= 1500)
+        wait_until("runs after the loss of a node", lambda: num_done() >= 1000)
         job = next(running for running, other in jobs("RUNNING") if other != node)
         site.cluster.run("scontrol", "requeue", job)
         wait_until("the end of the factory", lambda: keeper.poll() is not None)
