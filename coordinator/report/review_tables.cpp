@@ -77,8 +77,9 @@ Table cause_table(const Review& review) {
                           term.found.p_value < 1e-9 ? "<10⁻⁹" : figure_text(term.found.p_value)});
   }
   table.notes.push_back(fmt::format(
-      "Computed from {} of {} runs with an estimate{}. Of the variance: beyond that of the terms "
-      "above. p: that chance alone makes one of all quantities, or of products beyond their "
+      "Computed from {} of {} runs with an estimate{}. Products: of quantities less their means. "
+      "Of the variance: beyond that of the terms above. p: that chance alone makes one of all "
+      "quantities, or of products beyond their "
       "factors, look so.",
       review.causes->num_runs, review.causes->num_with_estimate,
       review.causes->num_runs < review.causes->num_with_estimate ? ", the first ones" : ""));

@@ -54,7 +54,8 @@ using Column = std::span<const double>;
                                                                   double confidence,
                                                                   std::size_t num_outputs);
 
-/// One input, or the product of two, as a term of a sum that explains an output.
+/// One input, or the product of two, each less its mean, as a term of a sum that explains an
+/// output.
 struct ExplanatoryTerm {
   std::size_t first = 0;              ///< Index of the column.
   std::optional<std::size_t> second;  ///< Of the other factor, which may be `first`; empty for one.
@@ -66,13 +67,14 @@ struct ExplanatoryTerm {
 /// Searches a sum of few terms that explains an output, a term at a time:
 ///
 /// 1. Of all inputs and all products of two inputs, squares among them, the one with the largest
-///    linear correlation with what is left of the output is the candidate.
+///    linear correlation with what is left of the output is the candidate. Factors are taken less
+///    their means: a product with a scale factor that is nearly 1 would be the other factor itself.
 /// 2. It is kept if its p-value times the number of all inputs and products, and times that of the
 ///    outputs that somebody looks at, is below 1 − confidence, and it explains at least
 ///    `term_share_min` of the output's variance. A product must explain more than its factors do:
-///    both are fitted linearly and taken from product and output first, as in x y the factor y ≈ 1
-///    would else make a driver of any x. If it is not kept, the next one by correlation is asked,
-///    of num_term_candidates at most.
+///    both are fitted linearly and taken from product and output first, as the square of a skewed
+///    input goes with the input. If it is not kept, the next one by correlation is asked, of
+///    num_term_candidates at most.
 /// 3. The output is fitted again by all terms, least squares with a constant, and what is left goes
 ///    on to 1.
 ///

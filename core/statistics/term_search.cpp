@@ -103,8 +103,9 @@ class TermSearch {
           *std::ranges::max_element(inputs[i], {}, [](double value) { return std::abs(value); }));
       if (!detail::varies(inputs[i])) continue;
       // Products of values in units of the largest one stay within the range of a double.
-      Values& scaled = columns_.emplace_back(inputs[i].begin(), inputs[i].end());
+      Values scaled(inputs[i].begin(), inputs[i].end());
       for (double& value : scaled) value /= largest;
+      columns_.push_back(centred(scaled));
       positions_.push_back(i);
       units_.push_back(largest);
     }
@@ -160,9 +161,9 @@ class TermSearch {
   [[nodiscard]] double p_value_of(const Candidate& candidate, Values values) const {
     Values rest = rest_;
     if (candidate.second) {
-      std::vector<Values> factors{centred(columns_[candidate.first])};
+      std::vector<Values> factors{columns_[candidate.first]};
       if (*candidate.second != candidate.first) {
-        factors.push_back(centred(columns_[*candidate.second]));
+        factors.push_back(columns_[*candidate.second]);
         remove(factors[0], factors[1]);
       }
       for (const Values& factor : factors) {
@@ -232,7 +233,7 @@ class TermSearch {
   double num_outputs_;
   std::vector<std::size_t> positions_;  ///< Of the inputs that vary.
   std::vector<double> units_;
-  std::vector<Values> columns_;
+  std::vector<Values> columns_;  ///< Centred.
   Values output_;
   Values rest_;
   double variance_;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <iostream>
+#include <numeric>
 
 #include "core/error.hpp"
 #include "core/random/stream.hpp"
@@ -205,14 +206,37 @@ TEST(ExplanatoryTerms, NameTheProductThatMakesAnError) {
   EXPECT_LT(terms[0].p_value, 1e-9);
 }
 
+// A scale factor near 1: its raw product with the driver is the driver itself, to five digits, and
+// the raw product of a quantity with a mean goes with the error, too. Noise: 3 % of the deviation.
+TEST(ExplanatoryTerms, NameTheProductWithAFactorThatIsNearlyOne) {
+  Columns inputs = normal_columns(4, 1000, {.seed = 76});
+  for (double& value : inputs[0]) value = 1.0 + 0.006 * value;
+  for (std::size_t i = 0; i < inputs[1].size(); ++i) {
+    inputs[1][i] = 2.0 + 0.5 * inputs[1][i] + 50.0 * (inputs[0][i] - 1.0);
+  }
+  const auto output = output_of(inputs, [&](std::size_t i) {
+    return (inputs[0][i] - 1.0) * inputs[2][i] + 0.03 * 0.006 * inputs[3][i];
+  });
+  const auto terms = terms_of({inputs.begin(), inputs.begin() + 3}, output, 1);
+  ASSERT_EQ(terms.size(), 1u);
+  EXPECT_EQ(terms[0].first, 0u);
+  EXPECT_EQ(terms[0].second, 2u);
+  EXPECT_NEAR(terms[0].slope, 1.0, 4.0 * 0.03 / std::sqrt(1000.0));
+  EXPECT_GT(terms[0].share, 0.99);
+}
+
 // Exact by construction, in units far from 1; the second quantity has a mean.
 TEST(ExplanatoryTerms, FitAllTermsAtOnce) {
   Columns inputs = normal_columns(5, 400, {.seed = 72});
   for (double& value : inputs[1]) value = 1e-9 * (value + 3.0);
   for (double& value : inputs[3]) value *= 1e12;
+  const auto difference = [&](std::size_t input, std::size_t i) {
+    const Values& values = inputs[input];
+    return values[i] - std::accumulate(values.begin(), values.end(), 0.0) / 400.0;
+  };
   const auto output = output_of(inputs, [&](std::size_t i) {
-    return 2.0 + 5e9 * inputs[1][i] - 4e-12 * inputs[0][i] * inputs[3][i] +
-           1.5 * inputs[2][i] * inputs[2][i];
+    return 2.0 + 5e9 * inputs[1][i] - 4e-12 * difference(0, i) * difference(3, i) +
+           1.5 * difference(2, i) * difference(2, i);
   });
   const auto terms = terms_of(inputs, output, 5);
   ASSERT_EQ(terms.size(), 3u);
