@@ -43,8 +43,18 @@ void expect_accepted(std::string_view answer, const std::filesystem::path& progr
                   program.string(), excerpt_of(answer)));
 }
 
-/// The file may have been replaced since the model was loaded, and then other runs would be
-/// computed.
+/// The program as it was loaded, with its reference digest.
+struct LoadedProgram {
+  std::filesystem::path path;
+  std::filesystem::file_time_type written;
+};
+
+/// The least time there is where it cannot be told.
+std::filesystem::file_time_type time_written(const std::filesystem::path& program) {
+  std::error_code error;
+  return std::filesystem::last_write_time(program, error);
+}
+
 /// @throws ModelProgramError
 void expect_same(std::string_view answer, const ProgramDescription& loaded,
                  const std::filesystem::path& program) {
@@ -101,13 +111,21 @@ class FreshProcesses {
 
 /// A process of the program that has accepted the parameters of a campaign. None is asked to accept
 /// others after its first ones.
-std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& program,
+/// @throws ModelProgramError also if the file was replaced: other runs might be computed.
+std::unique_ptr<ProgramProcess> prepared_process(const LoadedProgram& loaded,
                                                  const DescribedCampaign& campaign) {
+  const std::filesystem::path& program = loaded.path;
   const ProgramDescription& of = campaign.description();
   const std::string question = prepare_question(campaign);
   FreshProcess fresh = FreshProcesses::instance().take(program);
   if (fresh.process && fresh.prepared == question) return std::move(fresh.process);
   if (!fresh.process || !fresh.prepared.empty()) {
+    if (time_written(program) != loaded.written) {
+      throw ModelProgramError(fmt::format(
+          "model program = {} (was written anew after it was loaded, so that its runs may be "
+          "others: start what runs it anew)",
+          program.string()));
+    }
     fresh.process = std::make_unique<ProgramProcess>(program, of.limits);
     fresh.process->ask({describe_question()},
                        [&](std::string_view answer) { expect_same(answer, of, program); });
@@ -121,12 +139,12 @@ std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& pr
 /// Processes of a program that have been told the parameters, each for one thread at a time.
 class ProgramPlan final : public Plan {
  public:
-  ProgramPlan(std::filesystem::path program, const DescribedCampaign& campaign)
+  ProgramPlan(LoadedProgram program, const DescribedCampaign& campaign)
       : program_(std::move(program)), campaign_(campaign) {}
   ~ProgramPlan() override {
     if (has_computed_ || idle_.empty()) return;
-    FreshProcesses::instance().keep(
-        program_, {.process = std::move(idle_.back()), .prepared = prepare_question(campaign_)});
+    FreshProcesses::instance().keep(program_.path, {.process = std::move(idle_.back()),
+                                                    .prepared = prepare_question(campaign_)});
   }
   ProgramPlan(const ProgramPlan&) = delete;
   ProgramPlan& operator=(const ProgramPlan&) = delete;
@@ -146,7 +164,7 @@ class ProgramPlan final : public Plan {
   [[nodiscard]] std::string question_of(RunIndex run, const std::vector<double>& drawn) const;
   void read(std::string_view answer, RunResult& result) const;
 
-  const std::filesystem::path program_;
+  const LoadedProgram program_;
   const DescribedCampaign campaign_;
   const Recording recording_;
   mutable std::mutex mutex_;
@@ -203,7 +221,8 @@ void ProgramPlan::read(std::string_view answer, RunResult& result) const {
   const auto refuse_as = [&](std::string_view what) {
     return [this, answer, run = result.run.value, what](std::string_view rule) {
       throw ModelProgramError(fmt::format("model program = {} (run {}: {} {}: {})",
-                                          program_.string(), run, what, rule, excerpt_of(answer)));
+                                          program_.path.string(), run, what, rule,
+                                          excerpt_of(answer)));
     };
   };
   Json json;
@@ -270,6 +289,7 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
   constexpr ProgramLimits while_describing{.answer_time_max_s = 60};
   const std::filesystem::path program = std::filesystem::absolute(path);
   const std::string source = program.string() + ": description";
+  const LoadedProgram loaded{.path = program, .written = time_written(program)};
   ProgramDescription description;
   auto process = std::make_unique<ProgramProcess>(program, while_describing);
   process->ask(
@@ -288,8 +308,8 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
   }
   FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
   return std::make_unique<DescribedModel>(
-      std::move(description), std::nullopt, [program](const DescribedCampaign& campaign) {
-        return std::make_unique<const ProgramPlan>(program, campaign);
+      std::move(description), std::nullopt, [loaded](const DescribedCampaign& campaign) {
+        return std::make_unique<const ProgramPlan>(loaded, campaign);
       });
 }
 
