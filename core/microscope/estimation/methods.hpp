@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/microscope/control/control_config.hpp"
 #include "core/microscope/estimation/estimation_config.hpp"
 #include "core/microscope/instrument/drawn_moments.hpp"
 #include "core/microscope/instrument/noise_config.hpp"
@@ -73,6 +74,7 @@ struct EstimationInput {
   const EstimationConfig& config;
   const ParameterArray& objectives;  ///< SI.
   const NoiseConfig& noise;
+  const AttitudeConfig& attitude;
   const DrawnMoments& laws;  ///< Of the laws by which instruments are drawn.
   double orbit_period_s = 0.0;
   double sample_period_s = 0.0;

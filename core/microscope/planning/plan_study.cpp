@@ -219,6 +219,7 @@ class JointStudy final : public PlanStudy {
                                 .config = scenario.estimation,
                                 .objectives = scenario.objectives,
                                 .noise = scenario.noise,
+                                .attitude = scenario.attitude,
                                 .laws = laws,
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};

@@ -71,11 +71,11 @@ inline constexpr auto test_product_pairs = [] {
 
 using TestProducts = std::array<double, num_test_products>;
 
-/// What the squares do from window to window: sums over all three windows in a row of the products
-/// of their second differences q_k − 2 q_{k−1} + q_{k−2}, in which nothing slow is left.
+/// What the squares do from window to window: sums over all five windows in a row of the products
+/// of their fourth differences, in which nothing slow is left.
 template <typename T>
 struct SquareSteps {
-  T weight{};   ///< Of the weights of three windows, multiplied, by which the others count.
+  T weight{};   ///< Of the weights of five windows, multiplied, by which the others count.
   T common{};   ///< Of common_squared, m⁴/s⁸.
   T mixed{};    ///< Of common_squared with common_product, m⁴/s⁸.
   T product{};  ///< Of common_product, m⁴/s⁸.

@@ -53,7 +53,7 @@ struct TestSums {
   struct Squares {
     T weight{}, common{}, product{};
   };
-  std::array<Squares, 2> squares_before{};  ///< Of the last window, and of the one before.
+  std::array<Squares, 4> squares_before{};  ///< Of the windows before, the last one first.
   SquareSteps<T> steps{};
   std::size_t num_blocks = 0;  ///< That ended.
   WeightsOfRuns<T> window_weights{};
@@ -106,16 +106,17 @@ struct TestSums {
   }
 
   PROOFMASS_INLINE void add_step(const Squares& now) {
-    const auto& [last, first] = squares_before;
-    const T weight = now.weight * last.weight * first.weight;
-    const T common = now.common - T(2.0) * last.common + first.common;
-    const T product = now.product - T(2.0) * last.product + first.product;
+    const std::array<Squares, 4>& last = squares_before;
+    const T weight = now.weight * last[0].weight * last[1].weight * last[2].weight * last[3].weight;
+    const T common = now.common - T(4.0) * (last[0].common + last[2].common) +
+                     T(6.0) * last[1].common + last[3].common;
+    const T product = now.product - T(4.0) * (last[0].product + last[2].product) +
+                      T(6.0) * last[1].product + last[3].product;
     steps.weight = steps.weight + weight;
     steps.common = steps.common + weight * common * common;
     steps.mixed = steps.mixed + weight * common * product;
     steps.product = steps.product + weight * product * product;
-    squares_before[1] = last;
-    squares_before[0] = now;
+    squares_before = {now, last[0], last[1], last[2]};
   }
 };
 

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstddef>
 #include <numbers>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
+#include "core/microscope/control/star_tracker.hpp"
 #include "core/signal/noise_shape.hpp"
 
 namespace proofmass {
@@ -76,6 +78,39 @@ std::optional<WindowSums> window_sums(const SessionPhasors& record) {
   return sums;
 }
 
+/// One-sided density of ½(a_c11Δx G_xx + a_c11Δy G_xy + a_c11Δz G_xz) at f_EP by the noise of the
+/// estimated attitude: (xx x² + xz x z + zz z² + yy y²), x = ½ a_c11Δx and so on; s⁻⁴/Hz.
+struct AttitudeNoise {
+  double xx = 0.0, xz = 0.0, zz = 0.0, yy = 0.0;
+};
+
+/// Of the turn about Y at the rate Ω, G_xx has 2 Ω ω_y, G_xy −Ω ω_x + α_z and G_xz −α_y of the
+/// errors ω of the estimated rate and α of the measured angular acceleration. With the estimator's
+/// crossover ω_h and s = 2πi f, ω is of these and of the star tracker's angles θ
+///
+///     ω = ((3 ω_h² s² + ω_h³ s) θ + (s + 3 ω_h) s α)/(s + ω_h)³
+AttitudeNoise attitude_noise(const EstimationInput& input, double rate_rad_s, double frequency_hz) {
+  const double of_blending = 2.0 * std::numbers::pi * input.attitude.blending_hz;
+  const std::complex<double> s(0.0, 2.0 * std::numbers::pi * frequency_hz);
+  const std::complex<double> pole = s + of_blending;
+  const std::complex<double> cube = pole * pole * pole;
+  const std::complex<double> of_angle =
+      of_blending * of_blending * s * (3.0 * s + of_blending) / cube;
+  const std::complex<double> of_acceleration = (s + 3.0 * of_blending) * s / cube;
+
+  const Eigen::Matrix3d factor =
+      make_star_tracker(input.noise, input.sample_period_s).noise_factor_S_rad;
+  const Eigen::Matrix3d angles = 2.0 * input.sample_period_s * factor * factor.transpose();
+  const double acceleration = nominal_psd(input.noise.angular, frequency_hz);
+  const auto rate_about = [&](Eigen::Index axis) {
+    return std::norm(of_angle) * angles(axis, axis) + std::norm(of_acceleration) * acceleration;
+  };
+  return {.xx = 4.0 * rate_rad_s * rate_rad_s * rate_about(1),
+          .xz = -4.0 * rate_rad_s * of_acceleration.real() * acceleration,
+          .zz = acceleration,
+          .yy = rate_rad_s * rate_rad_s * rate_about(0) + acceleration};
+}
+
 /// A session that tests.
 struct TestRecord {
   WindowSums sums;
@@ -83,6 +118,7 @@ struct TestRecord {
   /// nulls the first or the second.
   double common_part = 0.0;
   SquareSteps<double> square_steps;
+  AttitudeNoise attitude_noise;
   FittedMatrix noise;   ///< XᵀRX of the regressors, of noise of scale 1.
   double weight = 0.0;  ///< 1/S(f_EP), Hz/(m/s²)².
 };
@@ -102,6 +138,7 @@ std::optional<TestRecord> test_record(const SessionPhasors& record, const Sessio
     of.noise.row(i) = Eigen::Map<const Fitted>(products.data()).transpose();
   }
   const double f = test_frequency_hz(session, input.orbit_period_s);
+  of.attitude_noise = attitude_noise(input, session.spin_rate_rad_s, f);
   of.weight = 1.0 / differential_x_density(input.noise, [&](const SensorNoise& x) {
                 return 2.0 * window_noise_psd(x, f, input.sample_period_s);
               });
@@ -152,17 +189,29 @@ Fitted fitted_with(const TestRecord& record, const Factors& sum) {
 }
 
 /// Covariance of a window with all others, (m/s²)², by the noise of the squares that corrected()
-/// subtracts: white noise of the variance s² of a sample makes s²/n of it and, of the second
-/// difference of windows that overlap by half, the variance (s²/n) (8 − 5/n²)/3.
+/// subtracts: white noise of the variance s² of a sample makes s²/n of it and, of the fourth
+/// difference of windows that overlap by half, the variance (s²/n) (28 − 21/n²).
 double square_noise(const TestRecord& record, const ParameterArray& calibration) {
   constexpr auto n = static_cast<double>(test_block_size);
-  constexpr double of_steps = 3.0 / (8.0 - 5.0 / (n * n));
+  constexpr double of_steps = 1.0 / (28.0 - 21.0 / (n * n));
   const double k2d = calibration[index(Parameter::k2d)];
   const double twice_k2c = 2.0 * calibration[index(Parameter::k2c)];
   const SquareSteps<double>& steps = record.square_steps;
   const double squared_step = k2d * k2d * steps.common + 2.0 * k2d * twice_k2c * steps.mixed +
                               twice_k2c * twice_k2c * steps.product;
   return of_steps * squared_step / steps.weight;
+}
+
+/// The same by the noise of the attitude in the gradients that corrected() subtracts, at a scale of
+/// 1: noise of a density S that is alike near f_EP.
+double attitude_noise(const TestRecord& record, const ParameterArray& calibration,
+                      double sample_period_s) {
+  const double x = 0.5 * calibration[index(Parameter::a_c11_delta_x)];
+  const double y = 0.5 * calibration[index(Parameter::a_c11_delta_y)];
+  const double z = 0.5 * calibration[index(Parameter::a_c11_delta_z)];
+  const AttitudeNoise& noise = record.attitude_noise;
+  const double density = noise.xx * x * x + noise.xz * x * z + noise.zz * z * z + noise.yy * y * y;
+  return density / (2.0 * static_cast<double>(test_block_size) * sample_period_s);
 }
 
 /// Covariance of the calibration's estimates; 0 if it has no standard errors.
@@ -182,7 +231,8 @@ Eigen::Matrix<double, num_calibrated, num_calibrated> covariance_of(const Estima
 class TestFit {
  public:
   TestFit(const RunPhasors& records, const EstimationInput& input)
-      : scale_(input.noise.scale > 0.0 ? input.noise.scale : 1.0) {
+      : scale_(input.noise.scale > 0.0 ? input.noise.scale : 1.0),
+        sample_period_s_(input.sample_period_s) {
     for (std::size_t i = 0; i < records.size(); ++i) {
       if (!is_test(input.sessions[i])) continue;
       if (auto test = test_record(records[i], input.sessions[i], input)) tests_.push_back(*test);
@@ -200,12 +250,15 @@ class TestFit {
     return 2.0 * (inverse_ * sum);
   }
 
-  /// By the noise of the sensors, and of the squares that are subtracted.
+  /// By the noise of the sensors, and of the squares and gradients that are subtracted.
   [[nodiscard]] FittedMatrix covariance(const ParameterArray& calibration) const {
     FittedMatrix sum = FittedMatrix::Zero();
     for (const TestRecord& test : tests_) {
+      const double subtracted =
+          square_noise(test, calibration) +
+          scale_ * scale_ * attitude_noise(test, calibration, sample_period_s_);
       sum += test.weight * test.weight *
-             (scale_ * scale_ * test.noise + square_noise(test, calibration) * fitted_block(test));
+             (scale_ * scale_ * test.noise + subtracted * fitted_block(test));
     }
     return 4.0 * inverse_ * sum * inverse_;
   }
@@ -225,6 +278,7 @@ class TestFit {
 
  private:
   double scale_;
+  double sample_period_s_;
   std::vector<TestRecord> tests_;
   FittedMatrix inverse_;
 };

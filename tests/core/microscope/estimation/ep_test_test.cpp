@@ -54,6 +54,7 @@ TestEstimation estimate(const MicroscopeCampaign& campaign, const RunRecord& rec
                            .config = scenario.estimation,
                            .objectives = scenario.objectives,
                            .noise = scenario.noise,
+                           .attitude = scenario.attitude,
                            .laws = laws,
                            .orbit_period_s = scenario.orbit.period_s,
                            .sample_period_s = scenario.simulation.sample_period_s},
@@ -306,12 +307,19 @@ struct Coverage {
 };
 
 /// Of the Eötvös parameter in 208 runs.
-Coverage coverage(double spin, const NoiseConfig& noise, const GapsConfig& gaps) {
+/// @param offcentring_m  Along each axis, of every instrument; none: drawn.
+Coverage coverage(double spin, const NoiseConfig& noise, const GapsConfig& gaps,
+                  std::optional<double> offcentring_m = {}) {
   constexpr std::uint64_t num_runs = 208;
   MicroscopeCampaign campaign;
   campaign.scenario.noise = noise;
   campaign.scenario.sessions = {test_session("ep", 2, spin)};
   campaign.scenario.gaps = gaps;
+  if (offcentring_m) {
+    for (const char* const axis : {"x", "y", "z"}) {
+      fix(campaign, std::string("offcentring_m.") + axis, *offcentring_m);
+    }
+  }
   Coverage found;
   for (const RunRecord& record : test::recorded(RunPlan(campaign, no_calibration), num_runs)) {
     const TestEstimation test = estimate(campaign, record, record.truth);
@@ -350,14 +358,23 @@ TEST(EpTest, HasAnHonestStandardError) {
   }
 }
 
+// At 0.6 mm the noise of the estimated attitude times the offcentring is 2.8 times that of the
+// sensors: without it the rms would be 1.95.
+TEST(EpTest, CountsTheNoiseOfTheAttitudeInItsStandardError) {
+  EXPECT_NEAR(coverage(17.5, NoiseConfig{}, {}, 6e-4).rms, 1.0, 3.5 / std::sqrt(2.0 * 208));
+}
+
 // The squares of what a loop leaves of thirty times the drag have lines as large as the noise of a
-// window. Taken for noise, they would make σ 2.3 times as large; differences keep 2e-4 of them.
+// window, of which differences keep 1e-6: taken for noise, they would make σ 2.3 times as large.
+// So have those of the gradient's line, at twice f_EP, 20 cm along X from the centre of mass.
 TEST(EpTest, TakesNoLineForNoise) {
   for (const GapsConfig& gaps : {GapsConfig{}, many_gaps()}) {
     double sigma = 0.0;
-    for (const double drag : {1.0, 30.0}) {
+    for (const auto& [drag, position_x_m] :
+         {std::pair(1.0, 0.0), std::pair(30.0, 0.0), std::pair(1.0, 0.2)}) {
       MicroscopeCampaign campaign;
       campaign.scenario.environment.scale = drag;
+      campaign.scenario.sensor.position_m[0] = position_x_m;
       campaign.scenario.sessions = {test_session("ep", 2, 17.5)};
       campaign.scenario.gaps = gaps;
       double variance = 0.0;
@@ -365,7 +382,7 @@ TEST(EpTest, TakesNoLineForNoise) {
         const double of_run = estimate(campaign, record, record.truth).standard_error;
         variance += of_run * of_run / 16.0;
       }
-      if (drag == 1.0) sigma = std::sqrt(variance);
+      if (sigma == 0.0) sigma = std::sqrt(variance);
       EXPECT_NEAR(std::sqrt(variance) / sigma, 1.0, 0.01);
     }
   }
