@@ -19,10 +19,10 @@ double share_within(const StandardErrorStatistic& statistic) {
   return static_cast<double>(statistic.num_within) / static_cast<double>(statistic.num_runs);
 }
 
-Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statistic, bool is_first) {
+Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statistic) {
   const Histogram& histogram = statistic.pulls;
   Bars bars{.edges = histogram.edges};
-  Curve law{.name = is_first ? "normal law" : "", .ink = Ink::second, .look = Dash::dashed};
+  Curve law{.ink = Ink::second, .look = Dash::dashed};
   for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
     bars.heights.push_back(static_cast<double>(histogram.counts[i]));
     const double from = histogram.edges[i], to = histogram.edges[i + 1];
@@ -104,10 +104,13 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
     of.within = probability_interval(static_cast<double>(sums.num_within), n, default_confidence);
   }
   for (std::size_t i = 0; i < fit_.size() && num_runs_ > 0; ++i) {
-    statistics.fit.push_back(fit_of(sessions_[i], fit_[i]));
+    if (has_part(fit_[i])) statistics.fit.push_back(fit_of(sessions_[i], fit_[i]));
   }
   return statistics;
 }
+
+// A test of the equivalence principle has no part in the fit of a calibration.
+bool RunningStandardErrors::has_part(const FitSums& sums) { return sums.x > 0.0 || sums.n > 0.0; }
 
 FitStatistic RunningStandardErrors::fit_of(const std::string& session, const FitSums& sums) const {
   const auto num_runs = static_cast<double>(num_runs_);
@@ -126,7 +129,8 @@ FitStatistic RunningStandardErrors::fit_of(const std::string& session, const Fit
   }
   const double one_sided = std::min(chi_square_above(sums.x / (1.0 + fit_tolerance_), sums.n),
                                     chi_square_at_most(sums.x / (1.0 - fit_tolerance_), sums.n));
-  of.p_value = std::min(1.0, 2.0 * static_cast<double>(fit_.size()) * one_sided);
+  const auto num_ratios = static_cast<double>(std::ranges::count_if(fit_, has_part));
+  of.p_value = std::min(1.0, 2.0 * num_ratios * one_sided);
   return of;
 }
 
@@ -192,12 +196,12 @@ std::optional<ChartGrid> pull_overview(const ResultSchema& schema,
                                        const StandardErrorStatistics& statistics) {
   if (statistics.quantities.empty()) return std::nullopt;
   ChartGrid grid{.text = {.id = "pulls",
-                          .title = "Errors in units of their standard errors; dotted: ±1.96",
+                          .title = "Errors in standard errors; dashed: normal law; dotted: ±1.96",
                           .description = "Histograms beside the normal law of honest standard "
                                          "errors; the lines hold 95 % of it."}};
   for (const StandardErrorStatistic& statistic : statistics.quantities) {
     const Quantity& quantity = schema.quantities[statistic.quantity];
-    grid.charts.push_back(pull_chart(quantity, statistic, grid.charts.empty()));
+    grid.charts.push_back(pull_chart(quantity, statistic));
     grid.text.description += fmt::format(" {}: {} % of the runs.", quantity.symbol,
                                          figure_text(100.0 * share_within(statistic)));
   }

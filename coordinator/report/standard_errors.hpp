@@ -121,6 +121,7 @@ class RunningStandardErrors {
     double x = 0.0, n = 0.0, xx = 0.0, xn = 0.0, nn = 0.0;
   };
   void add_fit(const RunResult& result);
+  [[nodiscard]] static bool has_part(const FitSums& sums);
   [[nodiscard]] FitStatistic fit_of(const std::string& session, const FitSums& sums) const;
 
   bool are_draws_independent_;

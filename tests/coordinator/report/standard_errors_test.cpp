@@ -70,8 +70,8 @@ TEST(StandardErrors, HaveATableAndAChartOfTheirPulls) {
   EXPECT_THAT(text, ContainsRegex("a_c12 +1e-4 rad +0.900 .* +3.30 +0.632 .* +60.0 +14.7 +94.7"));
   const std::string svg = svg_of(*pull_overview(test::schema(), statistics), SvgUse::embedded);
   EXPECT_EQ(test::malformed_part(svg), "");
-  EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."), HasSubstr("normal law"),
-                         HasSubstr("dotted: ±1.96<")));
+  EXPECT_THAT(svg, AllOf(HasSubstr("a_c12: 60 % of the runs."),
+                         HasSubstr("dashed: normal law; dotted: ±1.96<")));
   EXPECT_EQ(test::tags_of(svg, "stroke-dasharray=\"2 3\"").size(),
             2 * statistics.quantities.size());
 }
@@ -174,8 +174,14 @@ TEST(Fit, HasTheStandardErrorOfTheRatio) {
   EXPECT_EQ(fit[1].chi_squared, 4.0);
   EXPECT_EQ(fit[1].degrees_of_freedom, 4.0);
   EXPECT_NEAR(fit[1].ratio_error.value(), 0.5, 1e-12);
-  EXPECT_EQ(fit[2].ratio, 0.0);
-  EXPECT_FALSE(fit[2].p_value || fit[2].ratio_error);
+}
+
+// As a test of the equivalence principle, which would also count among the ratios of each p: of 20
+// with 4 degrees, twice e^(−10) 11 for each of two ratios.
+TEST(Fit, LeavesOutASessionThatHasNoPartInIt) {
+  const std::vector<FitStatistic> fit = fit_of({{20.0, 4.0, 20.0, 4.0, 0.0, 0.0}});
+  ASSERT_EQ(fit.size(), 2u);
+  EXPECT_NEAR(*fit[1].p_value, 4.0 * std::exp(-10.0) * 11.0, 1e-15);
 }
 
 // Campaigns of 5 runs in which all is as it should be: at most one in twenty has a session that
