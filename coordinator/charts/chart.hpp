@@ -220,7 +220,8 @@ struct AxisRange {
                                      std::size_t num_ticks_max);
 
 /// Ticks are 1, 2 and 5 times powers of ten over less than two of these, and if they are few
-/// enough; else powers of ten, every k-th of them with the smallest k for which they are.
+/// enough; else powers of ten, every k-th from the first on, with the smallest k for which they
+/// are.
 /// @param axis      Of a logarithmic scale. An end that it does not give is moved outwards to 1, 2
 ///                  or 5 times a power of ten.
 /// @param from, to  Of the data, above 0.

@@ -394,8 +394,8 @@ AxisRange logarithmic_range(const ChartAxis& axis, double from, double to,
   if (are_few_powers || range.ticks.size() <= num_ticks_max) return range;
   range.ticks.clear();
   const int stride = 1 + (last - first) / static_cast<int>(num_ticks_max);
-  for (int decade = first; decade <= last; ++decade) {
-    if (decade % stride == 0) add_ticks(range, decade, std::array{1.0});
+  for (int decade = first; decade <= last; decade += range.ticks.empty() ? 1 : stride) {
+    add_ticks(range, decade, std::array{1.0});
   }
   return range;
 }

@@ -107,7 +107,9 @@ std::string events_of(const std::deque<StoredEvent>& events, const std::string& 
     const StoredEvent& event = events[events.size() - 1 - i];
     Cell details(event.text);
     details.markup = "<span class=\"long\">" + markup_text(event.text) + "</span>";
-    table.rows.push_back({event.time_utc, event.kind, std::move(details)});
+    Cell time(event.time_utc);
+    time.markup = "<time>" + markup_text(event.time_utc) + "</time>";
+    table.rows.push_back({std::move(time), event.kind, std::move(details)});
   }
   std::string html = "<section><h2>Events</h2>\n" + table_or_nothing(table);
   html += list_navigation(list, "events, the newest first", percent_encoded(name) + "?events=");
@@ -241,7 +243,7 @@ std::string attempts_chart(const RecentAttempts& attempts) {
       .x = {.label = "time until the last result, s", .from = -span_s, .to = 0.0},
       .lanes = std::move(lanes)};
   std::string html = fmt::format(
-      "<div class=\"scroll attempts\" tabindex=\"0\" role=\"region\" "
+      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" "
       "aria-label=\"Timeline of attempts\">{}</div>\n",
       svg_of(timeline, SvgUse::embedded));
   if (num_lanes > chart_lanes_max) {

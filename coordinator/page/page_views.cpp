@@ -345,7 +345,7 @@ input, select, button { font: inherit; color: inherit; background: var(--chart-g
   border: 1px solid var(--faint); border-radius: 4px; padding: 0.25rem 0.5rem; max-width: 100%; }
 .pages a, .pages span { display: inline-block; padding: 0.25rem 0.5rem; }
 .pages .off { color: var(--faint); }
-.attempts svg { display: block; height: auto; width: 100%; min-width: 56rem; max-width: 75rem; }
+time { white-space: nowrap; }
 )css";
 
 // The new markup is merged into the old element by element, so that focus, scroll positions and

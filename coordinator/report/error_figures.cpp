@@ -373,7 +373,7 @@ Chart convergence_chart(const Review& review, std::size_t index) {
 }
 
 ChartGrid magnitude_overview(const Review& review) {
-  ChartGrid grid{.text = {.id = "errors", .title = "Errors in units of their objectives"}};
+  ChartGrid grid{.text = {.id = "errors", .title = "Errors in units of their objectives (dashed)"}};
   // One axis for all, so that they can be compared.
   double end = 3.0;
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
@@ -389,6 +389,7 @@ ChartGrid magnitude_overview(const Review& review) {
                       .scale = Scale::logarithmic,
                       .from = 1e-4,
                       .to = end},
+                .y = {.label = "runs"},
                 .layers = {bars_of(review.figures[i].magnitudes, overview_scale(review, i))},
                 .plot_height = 70.0};
     if (std::isfinite(objective)) chart.layers.emplace_back(LimitLine{.value = 1.0});
@@ -402,12 +403,12 @@ ChartGrid magnitude_overview(const Review& review) {
 ChartGrid convergence_overview(const Review& review) {
   ChartGrid grid{
       .text = {.id = "convergence",
-               .title = "95 % intervals of mean and std of |error|",
+               .title = "95 % intervals of mean and std (dashed) of |error|",
                .description =
                    "Half the width of each interval over the value, against the number of runs."}};
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
-    Curve mean{.name = i == 0 ? "mean" : ""};
-    Curve deviation{.name = i == 0 ? "std" : "", .ink = Ink::second, .look = Dash::dashed};
+    Curve mean;
+    Curve deviation{.ink = Ink::second, .look = Dash::dashed};
     for (const ConvergencePoint& point : review.figures[i].convergence) {
       const auto n = static_cast<double>(point.num_runs);
       if (const auto width = relative_percent(point.mean_interval, point.mean)) {

@@ -72,8 +72,8 @@ std::vector<Part> parts_of(std::vector<Table> tables) {
   return {std::move_iterator(tables.begin()), std::move_iterator(tables.end())};
 }
 
-std::vector<Part> accuracy_parts(const Review& review) {
-  std::vector<Part> parts{accuracy_table(review)};
+std::vector<Part> verification_parts(const Review& review) {
+  std::vector<Part> parts{matrix_table(review)};
   // Without requirements there is one chart: that of the default tolerance.
   std::string name = "characteristic";
   for (Chart& chart : characteristic_charts(review)) {
@@ -86,8 +86,6 @@ std::vector<Part> accuracy_parts(const Review& review) {
         "good instruments from bad ones; more draws make it steeper.</p>\n",
         name_of(review.interpretation))});
   }
-  parts.emplace_back(interval_table(review));
-  parts.emplace_back(error_table(review));
   return parts;
 }
 
@@ -125,7 +123,8 @@ std::vector<Part> cause_parts(const Review& review) {
   std::vector<Part> parts;
   if (auto map = cause_map(review)) {
     parts.emplace_back(Markup{
-        "<p>Rows are drawn quantities, true parameters and products of two of them; columns are "
+        "<p>Rows are drawn quantities, true parameters and products of two of them, each less its "
+        "mean; columns are "
         "the errors with their signs. Cells below four standard errors are empty.</p>\n"});
     parts.emplace_back(NamedPicture{"causes", *std::move(map)});
   }
@@ -173,8 +172,10 @@ std::vector<Part> run_parts(const Review& review) {
 std::vector<Section> sections_of(const Review& review) {
   // What intervals take for their unit instead of the run.
   const char* const groups = review.results.replicates ? "Replicates of the design" : "Instruments";
-  return {{"verification", "Verification matrix", {matrix_table(review)}},
-          {"results", "Accuracy", accuracy_parts(review)},
+  return {{"verification", "Verification matrix", verification_parts(review)},
+          {"results",
+           "Accuracy",
+           {accuracy_table(review), interval_table(review), error_table(review)}},
           {"standard-errors-section", "Standard errors", standard_error_parts(review)},
           {"instruments-section", groups, parts_of(group_tables(review))},
           {"distributions", "Errors by parameter", error_parts(review)},
@@ -365,9 +366,14 @@ std::string verdicts(const Review& review) {
     parts.push_back(fmt::format("{} {} {}", names.size(), be(names.size()), name_of(verdict)));
     if (verdict != RequirementVerdict::met) parts.back() += fmt::format(" ({})", list_of(names));
   }
-  return fmt::format("Of {}, {}.{}", counted(review.matrix.size(), "requirement"),
-                     fmt::join(parts, ", "),
-                     review.num_contradicting > 0 ? fmt::format(" Note: {}.", review.note) : "");
+  std::vector<std::string> opposed;
+  for (const RequirementAnswer& row : review.matrix) {
+    if (row.is_opposed()) opposed.push_back(requirement_name(row));
+  }
+  return fmt::format(
+      "Of {}, {}.{}{}", counted(review.matrix.size(), "requirement"), fmt::join(parts, ", "),
+      opposed.empty() ? "" : fmt::format(" All runs together speak against {}.", list_of(opposed)),
+      review.num_contradicting > 0 ? fmt::format(" Note: {}.", review.note) : "");
 }
 
 /// The quantity whose worst error is the largest beside its objective.

@@ -363,6 +363,9 @@ TEST(LogarithmicRange, LeavesOutPowersWhereTheyAreMany) {
   const ChartAxis axis{.scale = Scale::logarithmic};
   EXPECT_THAT(labels_of(logarithmic_range(axis, 1e-12, 1.0, 5)),
               ElementsAre("10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1"));
+  EXPECT_THAT(
+      labels_of(logarithmic_range({.scale = Scale::logarithmic, .from = 5.0}, 5.0, 1000.0, 2)),
+      ElementsAre("10", "1000"));
 }
 
 TEST(LogarithmicRange, DividesFewPowersByTwoAndFive) {

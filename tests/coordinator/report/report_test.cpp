@@ -433,11 +433,11 @@ TEST_F(StoredRequirement, SaysWhatRunsAfterTheAnswerSpeakAgainst) {
   store.extend(test::campaign_of(75), "");
   store.commit(std::span(deliveries).subspan(59));
   const std::vector<std::string> texts{"a_c12 < 9e-4 for 95% with 95%"};
-  const auto rows =
-      read_review(store, test::campaign_of(75), ReviewDepth::matrix, numbered_requirements(texts))
-          .matrix;
-  EXPECT_EQ(rows[0].check.verdict, RequirementVerdict::met);
-  EXPECT_EQ(text_of_all(rows[0]),
+  const Review review =
+      read_review(store, test::campaign_of(75), ReviewDepth::matrix, numbered_requirements(texts));
+  EXPECT_EQ(review.matrix[0].check.verdict, RequirementVerdict::met);
+  EXPECT_THAT(review_summary(review)[2].text, HasSubstr(". All runs together speak against R1."));
+  EXPECT_EQ(text_of_all(review.matrix[0]),
             "10 of all 75 runs; 6.58 to 23.2 % of all draws, with 95 %: they speak against this "
             "answer, which more runs may change");
 }
