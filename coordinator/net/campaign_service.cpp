@@ -212,9 +212,10 @@ void CampaignService::review() {
   std::vector<CampaignId> ended;
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
-    const std::uint64_t num_committed = campaign.num_committed_here;
-    const std::uint64_t num_new = num_committed - served.num_committed_seen;
-    served.num_committed_seen = num_committed;
+    // A result that a worker had finished while it was cut off says nothing of the time since then.
+    const std::uint64_t num_computed = campaign.num_committed_here - campaign.num_kept;
+    const std::uint64_t num_new = num_computed - served.num_computed_seen;
+    served.num_computed_seen = num_computed;
     if (num_new > 0 || !campaign.lent.empty()) {
       served.rate.add(num_new, now);
     } else {
