@@ -74,6 +74,7 @@ class AnswersTest : public testing::Test {
                                 writer_,
                                 background_,
                                 outbox_,
+                                [](const Event&) {},
                                 [this] { return now_; }};
 
  protected:
