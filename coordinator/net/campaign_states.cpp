@@ -102,15 +102,15 @@ void CampaignService::review_directory() {
   is_looking_ = true;
   std::vector<CampaignRecord> closed;
   for (const auto& [id, campaign] : closed_) closed.push_back(campaign);
-  const auto look = [directory, start = context_.start, known = known(),
-                     closed = std::move(closed)]() mutable {
+  const auto look = [directory, start = context_.start, known = known(), closed = std::move(closed),
+                     num_reserved = context_.config.num_descriptors_reserved]() mutable {
     Findings findings;
     for (const CampaignRecord& one : closed) {
       if (!one.stamp || stamp_of(one.file) == one.stamp) continue;
       known.remove(one);
       findings.changed.push_back(one);
     }
-    findings.looks = look_at_all(*directory, known, start);
+    findings.looks = look_at_all(*directory, known, start, num_reserved);
     return findings;
   };
   context_.background.post_next(work_of(look, [this, now](std::future<Findings> found) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "coordinator/dispatch/events.hpp"
+#include "coordinator/net/service_sockets.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/error.hpp"
@@ -377,8 +378,9 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
                                   std::function<ServedCampaign()> open,
                                   std::function<void(Store&)> activate, Respond respond) {
   const auto made = std::make_shared<std::filesystem::path>();
-  const auto work = [this, made, open = std::move(open), activate = std::move(activate)] {
+  const auto work = [this, name, made, open = std::move(open), activate = std::move(activate)] {
     try {
+      require_room_for_campaign("campaign = " + name, context_.config.num_descriptors_reserved);
       ServedCampaign campaign = open();
       if (campaign.is_new) *made = campaign.file;
       activate(campaign.store);

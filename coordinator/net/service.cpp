@@ -344,7 +344,8 @@ class Service::Impl final : public Outbox {
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log) {
   const CoordinatorStart start = coordinator_start(config.version);
   std::vector<FileLook> looks =
-      looks_at_beginning(std::move(campaigns), config.given_up, config.directory, start);
+      looks_at_beginning(std::move(campaigns), config.given_up, config.directory, start,
+                         config.num_descriptors_reserved);
   impl_ = std::make_unique<Impl>(start, std::move(looks), config, std::move(log));
 }
 
