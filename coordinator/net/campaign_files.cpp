@@ -42,7 +42,8 @@ FileLook failed_look(const std::filesystem::path& file, const std::string& failu
 
 FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
   FileLook look = failed_look(
-      file, fmt::format("{}: campaign {} is in another file as well", file.string(), name));
+      file, fmt::format("{}: campaign {} is in another file as well; move one of them away",
+                        file.string(), name));
   look.is_copy = true;
   return look;
 }

@@ -82,7 +82,7 @@ TEST_F(CampaignFolderTest, ServesTheCopyWithTheMostResults) {
   EXPECT_THAT(loaded(folder), ElementsAre("a"));
   EXPECT_THAT(warnings,
               ElementsAre((directory / "served/a-backup.db").string() +
-                          ": campaign a is in another file as well"));
+                          ": campaign a is in another file as well; move one of them away"));
 }
 
 TEST_F(CampaignFolderTest, ServesOfEqualCopiesTheOneWithTheNameOfTheCampaign) {

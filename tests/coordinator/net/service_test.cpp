@@ -194,6 +194,12 @@ TEST_F(ServiceStart, SaysThatAnAddressIsTaken) {
   }
 }
 
+TEST_F(ServiceStart, SaysThatAnAddressIsOfAnotherMachine) {
+  config.workers_endpoint = "tcp://nohost:1";
+  config.is_plain_waived = true;
+  EXPECT_EQ(refusal(), "bind = tcp://nohost:1 (is no address of this machine)");
+}
+
 TEST_F(ServiceStart, RefusesTwoCampaignsOfOneName) {
   std::vector<ServedCampaign> campaigns;
   campaigns.push_back(files.open(test::campaign_of("a", 1), {}, {}));
