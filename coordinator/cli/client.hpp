@@ -126,11 +126,11 @@ struct Drawing {
   std::size_t num_lines = 0;  ///< Of the table that is on the screen.
 };
 
-/// Lines ended by `\n`, none longer than the screen, to be drawn over `num_lines_before` lines that
-/// end right above the cursor. If there are more lines than the screen has rows, the last one says
-/// how many are left out.
+/// Draws a terminal_text() over `num_lines_before` lines that end right above the cursor. What is
+/// wider than the screen is cut. If there are more lines than the screen has rows, the last one
+/// says how many are left out.
 [[nodiscard]] Drawing drawn_over(std::size_t num_lines_before, std::string_view text,
-                                 std::size_t num_rows);
+                                 const ScreenSize& screen);
 
 /// Shows where campaigns stand, again and again.
 class WatchDisplay {

@@ -31,6 +31,7 @@
 #include "proto/link/machine.hpp"
 #include "proto/model_program/model_choice.hpp"
 #include "proto/model_program/program_model.hpp"
+#include "proto/wire/endpoint.hpp"
 
 extern char** environ;
 
@@ -196,6 +197,7 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   if (!config.clients_endpoint) {
     config.clients_endpoint =
         "ipc://" + (std::filesystem::absolute(options.directory) / "clients").string();
+    wire::check_endpoint("--bind-clients, by default in --directory,", *config.clients_endpoint);
   }
   config.drain_max =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));

@@ -33,6 +33,16 @@ void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_
   }
 }
 
+/// What the worker only said that it holds was not lent to it.
+bool is_lent_to(const State& state, const CampaignState& campaign, RunIndex run, WorkerId id) {
+  const auto is_of = [&](LeaseId lease) {
+    return state.leases.at(lease).worker == id && !state.leases.at(lease).is_adopted;
+  };
+  if (const auto first = campaign.lent.find(run); first && is_of(*first)) return true;
+  const auto copies = campaign.copies.find(run);
+  return copies != campaign.copies.end() && std::ranges::any_of(copies->second.leases, is_of);
+}
+
 /// Results of one worker for one campaign, on their way through the dispatch.
 struct Intake {
   State& state;
@@ -47,8 +57,9 @@ struct Intake {
 
   void take(wire::ComputedRun computed) {
     const RunIndex run = computed.result.run;
+    const bool is_kept = !was_computed_now(run);
     if (detail::close_run(state, campaign_id, run, id, holders)) {
-      campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
+      campaign.delivered[run] = {.attempt = attempt, .waiting = {id}, .is_kept = is_kept};
       state.finished_at = state.ticked_at;
       if (!computed.result.is_completed()) ++campaign.num_without_estimate;
       return outbox.write(campaign_id, delivery_of(std::move(computed)));
@@ -68,6 +79,17 @@ struct Intake {
   }
 
  private:
+  /// False of a result that the worker may have had when this coordinator first heard of the run:
+  /// it was neither lent the run here nor seen computing it. What is seen in a heartbeat is most of
+  /// what a worker goes on with after a restart: runs that take longer than the interval of
+  /// heartbeats. Shorter ones that waited there are taken for finished, 1.5 s of work or a round.
+  [[nodiscard]] bool was_computed_now(RunIndex run) const {
+    return is_lent_to(state, campaign, run, id) ||
+           std::ranges::any_of(worker.computing, [&](const Progress& batch) {
+             return batch.campaign == campaign_id && batch.runs.contains(run);
+           });
+  }
+
   [[nodiscard]] Delivery delivery_of(wire::ComputedRun computed) const {
     detail::note_joined(campaign_id, worker, outbox);
     return {.result = std::move(computed.result),
@@ -114,16 +136,6 @@ void reopen_if_unfinished(State& state, CampaignState& campaign) {
   if (num_settled(campaign) == campaign.definition->num_runs) return;
   campaign.phase = Phase::active;
   detail::sort_served(state);
-}
-
-/// What the worker only said that it holds was not lent to it.
-bool is_lent_to(const State& state, const CampaignState& campaign, RunIndex run, WorkerId id) {
-  const auto is_of = [&](LeaseId lease) {
-    return state.leases.at(lease).worker == id && !state.leases.at(lease).is_adopted;
-  };
-  if (const auto first = campaign.lent.find(run); first && is_of(*first)) return true;
-  const auto copies = campaign.copies.find(run);
-  return copies != campaign.copies.end() && std::ranges::any_of(copies->second.leases, is_of);
 }
 
 /// True if the result does not begin with the run's draw. Only of an open run that was not lent to
@@ -287,8 +299,9 @@ void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, T
   for (const RunIndex run : runs) {
     const auto found = campaign.delivered.find(run);
     PROOFMASS_EXPECT(found != campaign.delivered.end());
-    const auto& [attempt, waiting] = found->second;
+    const auto& [attempt, waiting, is_kept] = found->second;
     for (const WorkerId worker : waiting) acknowledged[worker].push_back(run);
+    if (is_kept) ++campaign.num_kept;
     if (is_audited(campaign.definition->seed, run, campaign.audit_fraction)) {
       detail::add_to_audit(campaign,
                            {.first_worker = waiting.front(), .attempt = detail::after(attempt)},

@@ -240,6 +240,7 @@ struct OutsideCrashes {
 struct Uncommitted {
   Attempt attempt;
   std::vector<WorkerId> waiting;
+  bool is_kept = false;  ///< See CampaignState::num_kept.
 };
 
 /// Leases of a run besides the first one.
@@ -280,9 +281,10 @@ struct CampaignState {
   LeaseIndex audits;                                    ///< Runs on audit leases.
   std::map<RunIndex, std::uint32_t> audit_crashes;      ///< Of runs in `to_audit` or `audits`.
   std::uint64_t num_comparing = 0;                      ///< Results on their way to be compared.
-  double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
-  std::string storage_failure;             ///< Why nothing can be stored; empty if all is well.
-  std::uint64_t num_committed_here = 0;    ///< Without those that were finished before.
+  double run_time_s = 0.0;               ///< Running mean over all workers; 0 if not known yet.
+  std::string storage_failure;           ///< Why nothing can be stored; empty if all is well.
+  std::uint64_t num_committed_here = 0;  ///< Without those that were finished before.
+  std::uint64_t num_kept = 0;  ///< Of these, those that workers had finished while cut off.
   std::uint64_t num_without_estimate = 0;  ///< Delivered here, with a status that has none.
   std::uint64_t num_duplicates = 0;        ///< Results that were there already.
   std::uint64_t num_audited = 0;           ///< Results that were compared with the stored ones.

@@ -117,8 +117,10 @@ std::uint64_t require_space(const Order& order, const std::filesystem::path& dat
   const std::uint64_t wanted = 2 * (size + promised);
   if (error || space.available >= wanted) return size;
   throw Error(fmt::format(
-      "disk = {} bytes available (must be {}, twice the size of the database{})", space.available,
-      wanted, promised > 0 ? " and of those that are being copied; try again later" : ""));
+      "disk of the coordinator's host {} = {} bytes available (must be {}, twice the size of the "
+      "database{})",
+      wire::host_name(), space.available, wanted,
+      promised > 0 ? " and of those that are being copied; try again later" : ""));
 }
 
 /// @param directory  Is made if it is not there.
@@ -216,6 +218,16 @@ std::string failure_text(std::string_view text) {
   return std::string(text);
 }
 
+/// The standard output of the program is a file of the coordinator, and not the client's.
+/// @throws Error if the program failed as it could not write it.
+void require_written(std::string_view error_text) {
+  constexpr std::string_view beginning = "standard output: ";
+  const std::string text = failure_text(error_text);
+  if (!text.starts_with(beginning)) return;
+  throw Error(fmt::format("disk of the coordinator's host {} = {} (the answer is written there)",
+                          wire::host_name(), text.substr(beginning.size())));
+}
+
 /// Removes the copy at the end, whatever happens.
 struct CopyRemover {
   const std::optional<std::filesystem::path>& copy;
@@ -277,6 +289,7 @@ void Answers::ask(const proto::AnswerRequest& request, const std::filesystem::pa
     const wire::UnnamedFile errors(memfd_create("errors", MFD_CLOEXEC));  // A full disk is named.
     const int exit_code = exit_code_of(run(order, *file, errors, *is_cancelled), order);
     const std::string error_text = errors.read(0, wire::reply_text_size_max);
+    if (exit_code != 0) require_written(error_text);
     if (order.copy && exit_code != 0) throw Error(failure_text(error_text));
     if (order.copy) {
       file = std::make_unique<wire::UnnamedFile>(open(order.copy->c_str(), O_RDONLY | O_CLOEXEC));

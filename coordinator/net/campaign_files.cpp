@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "coordinator/net/service_sockets.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/error.hpp"
@@ -41,7 +42,8 @@ FileLook failed_look(const std::filesystem::path& file, const std::string& failu
 
 FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
   FileLook look = failed_look(
-      file, fmt::format("{}: campaign {} is in another file as well", file.string(), name));
+      file, fmt::format("{}: campaign {} is in another file as well; move one of them away",
+                        file.string(), name));
   look.is_copy = true;
   return look;
 }
@@ -130,7 +132,7 @@ void require_shown(const std::filesystem::path& file, const proto::CampaignStatu
 
 FileLook opened(const CampaignDirectory& directory, const std::filesystem::path& file,
                 const KnownCampaigns& known, const NumFiles& num_files,
-                const CoordinatorStart& start) {
+                const CoordinatorStart& start, std::uint64_t num_reserved) {
   const std::optional<FileStamp> stamp = stamp_of(file);  // Before anything is read.
   if (std::optional<CampaignRecord> record = peek_without_log(file)) {
     require_shown(file, record->status);
@@ -144,6 +146,7 @@ FileLook opened(const CampaignDirectory& directory, const std::filesystem::path&
     record->stamp = stamp;
     if (record->is_closed) return {.record = std::move(*record)};
   }
+  require_room_for_campaign("campaign database = " + file.string(), num_reserved);
   ServedCampaign campaign = directory.load(file);
   if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
     return copy_of(file, campaign.definition->name);
@@ -190,14 +193,14 @@ FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const Coordinato
 }
 
 std::vector<FileLook> look_at_all(const CampaignDirectory& directory, KnownCampaigns& known,
-                                  const CoordinatorStart& start) {
+                                  const CoordinatorStart& start, std::uint64_t num_reserved) {
   std::vector<std::filesystem::path> files = directory.list();
   std::erase_if(files, [&](const auto& file) { return known.files.contains(file); });
   const NumFiles num_files = order_files(files, known);
   std::vector<FileLook> looks;
   for (const std::filesystem::path& file : files) {
     try {
-      looks.push_back(opened(directory, file, known, num_files, start));
+      looks.push_back(opened(directory, file, known, num_files, start, num_reserved));
     } catch (const std::exception& error) {
       looks.push_back(failed_look(file, error.what()));
     }
@@ -217,7 +220,8 @@ CoordinatorStart coordinator_start(const std::string& version) {
 
 std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
                                          GivenUpRuns given_up, const CampaignDirectory* directory,
-                                         const CoordinatorStart& start) {
+                                         const CoordinatorStart& start,
+                                         std::uint64_t num_reserved) {
   std::vector<FileLook> looks;
   KnownCampaigns known;
   for (ServedCampaign& campaign : campaigns) {
@@ -225,7 +229,8 @@ std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
     known.add(looks.back().record);
   }
   if (directory != nullptr) {
-    std::ranges::move(look_at_all(*directory, known, start), std::back_inserter(looks));
+    std::ranges::move(look_at_all(*directory, known, start, num_reserved + descriptors_of_sockets),
+                      std::back_inserter(looks));
   }
   return looks;
 }

@@ -152,24 +152,28 @@ struct KnownCampaigns {
 /// Looks at the files of a directory that are not known and adds their campaigns to those that are.
 /// Lists them in the order in which the campaigns were made. Opens a file only if something is
 /// left to do with it: a campaign that has ended costs no lock, no descriptor and no write.
+/// @param num_reserved  Descriptors that are not for campaigns, see require_room_for_campaign().
 /// @throws Error if the directory cannot be read.
 [[nodiscard]] std::vector<FileLook> look_at_all(const CampaignDirectory& directory,
                                                 KnownCampaigns& known,
-                                                const CoordinatorStart& start);
+                                                const CoordinatorStart& start,
+                                                std::uint64_t num_reserved);
 
 /// A coordinator that starts now in this process.
 /// @param version  Of the program, for people.
 [[nodiscard]] CoordinatorStart coordinator_start(const std::string& version);
 
 /// Reads what must be known of the campaigns that are handed over, which come first, and of those
-/// in the directory.
-/// @param directory  Null if there is none.
+/// in the directory. The sockets are not there yet.
+/// @param directory     Null if there is none.
+/// @param num_reserved  See ServiceConfig::num_descriptors_reserved.
 /// @throws Error, StoreError if a campaign that is handed over cannot be served, or the directory
 ///         cannot be read.
 [[nodiscard]] std::vector<FileLook> looks_at_beginning(std::vector<ServedCampaign> campaigns,
                                                        GivenUpRuns given_up,
                                                        const CampaignDirectory* directory,
-                                                       const CoordinatorStart& start);
+                                                       const CoordinatorStart& start,
+                                                       std::uint64_t num_reserved);
 
 /// Workers that may come back to any of the campaigns.
 [[nodiscard]] std::set<SessionId> sessions_of(const std::vector<FileLook>& looks);

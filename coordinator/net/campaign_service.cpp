@@ -61,7 +61,7 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   status.set_priority(campaign.priority);
   status.set_num_runs(campaign.definition->num_runs);
   status.set_num_done(campaign.committed.size());
-  status.set_num_without_estimate(campaign.num_without_estimate);
+  status.set_num_without_estimate(served.num_failures_before + campaign.num_without_estimate);
   status.set_num_given_up(campaign.given_up.size());
   status.set_num_lent(campaign.lent.runs().size());
   status.set_num_duplicates(campaign.num_duplicates);
@@ -212,9 +212,10 @@ void CampaignService::review() {
   std::vector<CampaignId> ended;
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
-    const std::uint64_t num_committed = campaign.num_committed_here;
-    const std::uint64_t num_new = num_committed - served.num_committed_seen;
-    served.num_committed_seen = num_committed;
+    // A result that a worker had finished while it was cut off says nothing of the time since then.
+    const std::uint64_t num_computed = campaign.num_committed_here - campaign.num_kept;
+    const std::uint64_t num_new = num_computed - served.num_computed_seen;
+    served.num_computed_seen = num_computed;
     if (num_new > 0 || !campaign.lent.empty()) {
       served.rate.add(num_new, now);
     } else {

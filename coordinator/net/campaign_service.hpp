@@ -50,7 +50,8 @@ class WakingTime {
   Duration slept_{};
 };
 
-/// How fast runs have been stored in the last two minutes, while any were lent.
+/// How fast runs have been stored in the last two minutes, while any were lent. Results that
+/// workers had kept from before, which arrive all at once, are not to be added.
 class RateMeter {
  public:
   explicit RateMeter(TimePoint began_at) : asked_at_(began_at) {}
@@ -212,7 +213,7 @@ class CampaignService {
   struct Served {
     CampaignRecord record;  ///< Without what changes; see record_of().
     RateMeter rate;
-    std::uint64_t num_committed_seen = 0;
+    std::uint64_t num_computed_seen = 0;
     CampaignControl written;  ///< As the file has it.
     StopPlan plan;
     bool is_decided = false;                ///< The stop rule was checked with the runs of now.

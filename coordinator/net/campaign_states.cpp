@@ -66,7 +66,7 @@ void CampaignService::take(FileLook look) {
     const std::string failure = failure_of([&] { add(std::move(look)); });
     if (failure.empty()) {
       if (unserved_.erase(file) == 0) return;
-      return outbox_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
+      return context_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
     }
     look = {.record = {.file = file, .problem = failure}};
   }
@@ -74,7 +74,7 @@ void CampaignService::take(FileLook look) {
   const bool is_news =
       known == unserved_.end() || known->second.record.problem != look.record.problem;
   if (is_news) {
-    outbox_.log(Event::error("campaign_not_served", {Field::reason(look.record.problem)}));
+    context_.log(Event::error("campaign_not_served", {Field::reason(look.record.problem)}));
   }
   unserved_.insert_or_assign(file, std::move(look));
 }
@@ -102,15 +102,15 @@ void CampaignService::review_directory() {
   is_looking_ = true;
   std::vector<CampaignRecord> closed;
   for (const auto& [id, campaign] : closed_) closed.push_back(campaign);
-  const auto look = [directory, start = context_.start, known = known(),
-                     closed = std::move(closed)]() mutable {
+  const auto look = [directory, start = context_.start, known = known(), closed = std::move(closed),
+                     num_reserved = context_.config.num_descriptors_reserved]() mutable {
     Findings findings;
     for (const CampaignRecord& one : closed) {
       if (!one.stamp || stamp_of(one.file) == one.stamp) continue;
       known.remove(one);
       findings.changed.push_back(one);
     }
-    findings.looks = look_at_all(*directory, known, start);
+    findings.looks = look_at_all(*directory, known, start, num_reserved);
     return findings;
   };
   context_.background.post_next(work_of(look, [this, now](std::future<Findings> found) {
@@ -128,7 +128,7 @@ void CampaignService::take_findings(Findings findings) {
   std::set<std::filesystem::path> seen;
   for (const FileLook& look : findings.looks) seen.insert(look.record.file);
   const auto log_gone = [&](const std::filesystem::path& file, Severity severity) {
-    outbox_.log(
+    context_.log(
         {.severity = severity, .kind = "campaign_file_gone", .fields = {{"file", file.string()}}});
   };
   for (const CampaignRecord& changed : findings.changed) {
@@ -150,7 +150,7 @@ void CampaignService::take_findings(Findings findings) {
     if (!files_now.contains(file)) {
       log_gone(file, Severity::info);
     } else {
-      outbox_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
+      context_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
     }
     return true;
   });
@@ -272,7 +272,7 @@ void CampaignService::close_ended(CampaignId id) {
         found->second.stamp = FileStamp{};
         const std::string failure = failure_of([&] { found->second.stamp = stamp.get(); });
         if (!failure.empty()) return say_not_closed(failure);
-        outbox_.log(Event::info("campaign_closed", {{"campaign", found->second.status.name()}}));
+        context_.log(Event::info("campaign_closed", {{"campaign", found->second.status.name()}}));
       }));
 }
 
@@ -323,14 +323,14 @@ void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
       const std::string place = moved.get().string();
       // Looking at the directory may have found out before that the file is gone.
       if (closed_.contains(id)) unlist(id);
-      outbox_.log(Event::info("campaign_archived", {{"campaign", name}, {"file", place}}));
+      context_.log(Event::info("campaign_archived", {{"campaign", name}, {"file", place}}));
       respond(wire::done_reply(fmt::format("campaign {}: its database is {} now", name, place)));
     });
   }));
 }
 
 void CampaignService::say_not_closed(std::string_view reason) {
-  outbox_.log(Event::warning("campaign_not_closed", {Field::reason(reason)}));
+  context_.log(Event::warning("campaign_not_closed", {Field::reason(reason)}));
 }
 
 std::vector<ServedCampaign> CampaignService::close() {

@@ -3,33 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <filesystem>
 #include <optional>
-#include <ranges>
-#include <set>
 #include <string_view>
 #include <utility>
 
 #include "coordinator/dispatch/events.hpp"
-#include "coordinator/net/service_snapshot.hpp"
+#include "coordinator/net/service_sockets.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/error.hpp"
-#include "core/model.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-/// Workers with several keys may run there.
-std::set<std::string> quarantined_hosts(const State& state) {
-  std::set<std::string> names;
-  for (const auto& [host, until] : state.quarantined) names.insert(state.hosts.at(host).name);
-  return names;
-}
 
 /// @throws Error if the action can have no effect. A finished campaign can only be archived or
 /// retried, the latter only if runs were given up; a cancelled one must be resumed before it is
@@ -54,6 +43,14 @@ void require_possible(const proto::CampaignStatus& campaign, proto::ControlActio
   if (campaign.phase() == proto::CAMPAIGN_PHASE_CANCELLED && needs_resume)
     refuse("is cancelled; resume it first");
   if (is_retry && campaign.num_given_up() == 0) refuse("has no run that was given up");
+}
+
+wire::Fields fields_of(const proto::ControlRequest& request) {
+  wire::Fields fields{{"request", wire::name_of(request.action())}};
+  if (request.action() == proto::CONTROL_ACTION_SET_PRIORITY) {
+    fields.emplace_back("priority", std::to_string(request.priority()));
+  }
+  return fields;
 }
 
 StopPlan plan_of(const Request& request) {
@@ -104,31 +101,6 @@ void require_own_file(const CampaignRecord& campaign) {
 
 RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
     : context_(context), campaigns_(campaigns), answers_(context) {}
-
-proto::StatusReply RequestService::service_status() const {
-  const State& state = context_.state;
-  const TimePoint now = context_.now();
-  proto::StatusReply reply;
-  reply.set_version(context_.config.version);
-  reply.set_model_version(std::string(built_in_model().version()));
-  reply.set_uptime_s(seconds(std::chrono::steady_clock::now() - began_at_));
-  reply.set_num_workers(state.workers.size());
-  reply.set_num_slots(state.num_slots);
-  reply.set_num_campaigns(campaigns_.num_campaigns());
-  campaigns_.add_unserved(reply);
-  const std::set<std::string> hosts = quarantined_hosts(state);
-  reply.set_num_quarantined_hosts(hosts.size());
-  for (const std::string& host : hosts | std::views::take(wire::quarantined_hosts_per_reply_max)) {
-    reply.add_quarantined_hosts(host);
-  }
-  for (proto::FactoryStatus& factory : factories_.current(now)) {
-    *reply.add_factories() = std::move(factory);
-  }
-  reply.set_num_refusals(state.num_refusals);
-  reply.set_last_refusal(state.last_refusal);
-  if (state.num_refusals > 0) reply.set_last_refusal_s(seconds(now - state.refused_at));
-  return reply;
-}
 
 void RequestService::refuse_as_not_served(const std::string& campaign) const {
   const CampaignDirectory* const directory = context_.config.directory;
@@ -188,43 +160,6 @@ void RequestService::defer(std::function<void()> ask_again, const Respond& respo
   deferred_.push_back({.ask_again = std::move(ask_again), .respond = respond});
 }
 
-proto::ReplyEnvelope RequestService::status(const proto::StatusRequest& request) const {
-  proto::ReplyEnvelope reply;
-  proto::StatusReply& status = *reply.mutable_status();
-  status = service_status();
-  for (CampaignRecord& campaign :
-       campaigns_.records(request.first_campaign(), wire::campaigns_per_reply_max)) {
-    *status.add_campaigns() = std::move(campaign.status);
-  }
-  return reply;
-}
-
-proto::ReplyEnvelope RequestService::workers(const proto::WorkersRequest& request) const {
-  const State& state = context_.state;
-  const TimePoint now = context_.now();
-  proto::ReplyEnvelope reply;
-  proto::WorkersReply& workers = *reply.mutable_workers();
-  workers.set_num_workers(state.workers.size());
-  for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id()});
-       item != state.workers.end() &&
-       static_cast<std::size_t>(workers.workers_size()) < wire::workers_per_reply_max;
-       ++item) {
-    const auto& [id, worker] = *item;
-    *workers.add_workers() = record_of(state, id, worker, now).status;
-  }
-  return reply;
-}
-
-proto::ReplyEnvelope RequestService::release_host(const std::string& host) {
-  if (!on_release_host(context_.state, host, context_.now(), context_.outbox)) {
-    const std::set<std::string> others = quarantined_hosts(context_.state);
-    throw Error(fmt::format(
-        "host = {} (is not in quarantine; {})", host,
-        others.empty() ? "no host is" : fmt::format("there is {}", fmt::join(others, ", "))));
-  }
-  return wire::done_reply(fmt::format("host {}: runs are lent to its workers again", host));
-}
-
 void RequestService::ask(const proto::AnswerRequest& request, const Asker& asker,
                          const Respond& respond) {
   const auto campaign = campaigns_.find(request.campaign());
@@ -238,12 +173,32 @@ proto::ReplyEnvelope RequestService::take(const proto::FactoryReport& report, co
   return wire::done_reply(fmt::format("factory {}: noted", report.name()));
 }
 
+Respond RequestService::noted(const std::string& campaign, wire::Fields fields, const Asker& asker,
+                              Respond respond) {
+  if (!asker.name.empty()) fields.emplace_back("by", asker.name);
+  return [this, campaign, event = Event::info("campaign_changed", std::move(fields)),
+          respond = std::move(respond)](const proto::ReplyEnvelope& reply) {
+    if (reply.has_done()) log(event, campaign);
+    respond(reply);
+  };
+}
+
+void RequestService::log(Event event, const std::string& campaign) const {
+  const std::optional<CampaignRecord> found = campaigns_.find(campaign);
+  if (found && campaigns_.is_served(found->id)) return context_.outbox.log(event, found->id);
+  event.fields.emplace_back("campaign", campaign);
+  context_.log(event);
+}
+
 void RequestService::carry_out(Request request, const Asker& asker, Respond respond) {
   const proto::RequestEnvelope& message = request.message;
   const auto may_observe = [&] { require_right(asker, Right::observe); };
   switch (message.request_case()) {
     case proto::RequestEnvelope::kSubmit:
-      return submit(std::make_shared<const Request>(std::move(request)), asker, respond);
+      respond = noted(request.campaign->name,
+                      {{"request", "submit"}, {"runs", request.campaign->num_runs}}, asker,
+                      std::move(respond));
+      return submit(std::make_shared<const Request>(std::move(request)), asker, std::move(respond));
     case proto::RequestEnvelope::kStatus:
       may_observe();
       return respond(status(message.status()));
@@ -251,7 +206,9 @@ void RequestService::carry_out(Request request, const Asker& asker, Respond resp
       may_observe();
       return respond(workers(message.workers()));
     case proto::RequestEnvelope::kControl:
-      return control(message.control(), asker, respond);
+      return control(message.control(), asker,
+                     noted(message.control().campaign(), fields_of(message.control()), asker,
+                           std::move(respond)));
     case proto::RequestEnvelope::kPart:
       throw Error("request = a part (must be a request when its parts are together)");
     case proto::RequestEnvelope::kReleaseHost:
@@ -421,8 +378,9 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
                                   std::function<ServedCampaign()> open,
                                   std::function<void(Store&)> activate, Respond respond) {
   const auto made = std::make_shared<std::filesystem::path>();
-  const auto work = [this, made, open = std::move(open), activate = std::move(activate)] {
+  const auto work = [this, name, made, open = std::move(open), activate = std::move(activate)] {
     try {
+      require_room_for_campaign("campaign = " + name, context_.config.num_descriptors_reserved);
       ServedCampaign campaign = open();
       if (campaign.is_new) *made = campaign.file;
       activate(campaign.store);

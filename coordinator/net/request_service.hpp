@@ -59,6 +59,12 @@ class RequestService {
   void control(const proto::ControlRequest& request, const Asker& asker, const Respond& respond);
   void control_served(CampaignId id, proto::ControlAction action, int priority,
                       const Respond& respond);
+  /// Says in the log, and in the campaign's database while that is served, who has changed a
+  /// campaign, once it is done.
+  /// @param fields  What was asked for.
+  [[nodiscard]] Respond noted(const std::string& campaign, wire::Fields fields, const Asker& asker,
+                              Respond respond);
+  void log(Event event, const std::string& campaign) const;
   void defer(std::function<void()> ask_again, const Respond& respond);
   [[nodiscard]] proto::ReplyEnvelope status(const proto::StatusRequest& request) const;
   [[nodiscard]] proto::ReplyEnvelope workers(const proto::WorkersRequest& request) const;

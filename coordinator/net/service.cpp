@@ -47,7 +47,8 @@ class Service::Impl final : public Outbox {
         state_(initial_state(config.dispatch, sessions_of(campaigns), now())),
         writer_([this] { sockets_.wake(); }, config.writer),
         worker_gateway_(state_, start_.epoch, worker_callbacks()),
-        context_{config_, start_, state_, writer_, background_, *this, [this] { return now(); }},
+        context_{config_,     start_, state_, writer_,
+                 background_, *this,  log_,   [this] { return now(); }},
         campaign_service_(context_),
         request_service_(context_, campaign_service_),
         client_gateway_(background_, client_callbacks()),
@@ -343,7 +344,8 @@ class Service::Impl final : public Outbox {
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log) {
   const CoordinatorStart start = coordinator_start(config.version);
   std::vector<FileLook> looks =
-      looks_at_beginning(std::move(campaigns), config.given_up, config.directory, start);
+      looks_at_beginning(std::move(campaigns), config.given_up, config.directory, start,
+                         config.num_descriptors_reserved);
   impl_ = std::make_unique<Impl>(start, std::move(looks), config, std::move(log));
 }
 

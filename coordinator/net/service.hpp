@@ -96,6 +96,7 @@ struct ServiceContext {
   StoreWriter& writer;
   Background& background;
   Outbox& outbox;
+  Log log;  ///< Alone, of what concerns no campaign that is served: no database gets the event.
   std::function<TimePoint()> now;
 };
 

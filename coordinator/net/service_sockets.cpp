@@ -47,18 +47,39 @@ void check_endpoints(const ServiceConfig& config) {
                        protection);
 }
 
+/// What is kept for files, and for each kind of peers.
+std::uint64_t share_of(std::uint64_t num_descriptors) {
+  constexpr std::uint64_t share_max = 64;
+  return std::min(num_descriptors / 8, share_max);
+}
+
 }  // namespace
 
 Descriptors shared_out(std::uint64_t limit, std::uint64_t num_reserved, int num_open) {
-  constexpr std::uint64_t share_max = 64;
   const std::uint64_t left = limit - std::min(num_reserved, limit);
-  const std::uint64_t share = std::min(left / 8, share_max);
+  const std::uint64_t share = share_of(left);
   const std::uint64_t taken = 2 * share + static_cast<std::uint64_t>(num_open);
   const std::uint64_t alarm =
       std::min<std::uint64_t>(left - share, std::numeric_limits<int>::max());
   return {.limit = limit,
           .num_workers_max = left - std::min(taken, left),
           .alarm = static_cast<int>(alarm)};
+}
+
+bool has_room_for_campaign(std::uint64_t limit, std::uint64_t num_reserved,
+                           std::uint64_t num_open) {
+  const std::uint64_t left = limit - std::min(num_reserved, limit);
+  return num_open + descriptors_per_campaign + 3 * share_of(left) <= left;
+}
+
+void require_room_for_campaign(std::string_view what, std::uint64_t num_reserved) {
+  const std::uint64_t limit = raise_descriptor_limit();
+  const auto num_open = static_cast<std::uint64_t>(lowest_free_descriptor());
+  if (has_room_for_campaign(limit, num_reserved, num_open)) return;
+  throw Error(fmt::format(
+      "{} (takes {} descriptors, for which the coordinator's limit of {} open files has no room "
+      "beside other campaigns, workers and clients; raise `ulimit -n` or LimitNOFILE there)",
+      what, descriptors_per_campaign, limit));
 }
 
 std::uint64_t raise_descriptor_limit() {

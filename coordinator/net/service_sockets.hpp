@@ -41,6 +41,22 @@ struct Descriptors {
 /// @param num_open      What it has open now, besides connections.
 [[nodiscard]] Descriptors shared_out(std::uint64_t limit, std::uint64_t num_reserved, int num_open);
 
+/// Descriptors that a campaign database takes while it is open: two for the file, and one each for
+/// its write-ahead log, the memory that its users share and its lock.
+inline constexpr std::uint64_t descriptors_per_campaign = 5;
+
+/// Descriptors that the sockets take before a peer connects: 16, and a few more with keys.
+inline constexpr std::uint64_t descriptors_of_sockets = 20;
+
+/// Whether one more campaign database may be opened. Besides what shared_out() keeps for files and
+/// clients, as many descriptors must be left for workers.
+[[nodiscard]] bool has_room_for_campaign(std::uint64_t limit, std::uint64_t num_reserved,
+                                         std::uint64_t num_open);
+
+/// @param what  `campaign = NAME`, of which the error speaks.
+/// @throws Error if the limit of this process leaves no room for it.
+void require_room_for_campaign(std::string_view what, std::uint64_t num_reserved);
+
 /// Lets the process have as many open descriptors as the system allows: what shells and init
 /// systems give by default is often 1024.
 /// @return Their number.

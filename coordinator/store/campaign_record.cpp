@@ -44,12 +44,10 @@ bool is_complete(const Database& database, const proto::CampaignStatus& status) 
 std::optional<std::uint64_t> failures_exceeded(const Database& database,
                                                const proto::CampaignStatus& status) {
   if (status.phase() != proto::CAMPAIGN_PHASE_CANCELLED) return std::nullopt;
-  return database
-      .first_row(
-          "SELECT CASE WHEN failures_max < (SELECT count(*) FROM run_failure) +"
-          " (SELECT count(*) FROM run_result WHERE status <> 1) THEN failures_max END"
-          " FROM campaign")
-      .optional_count(0);
+  const auto failures_max =
+      database.first_row("SELECT failures_max FROM campaign").optional_count(0);
+  const std::uint64_t num_failures = status.num_without_estimate() + status.num_given_up();
+  return failures_max && *failures_max < num_failures ? failures_max : std::nullopt;
 }
 
 }  // namespace
@@ -87,6 +85,8 @@ CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth)
   proto::CampaignStatus& status = record.status;
   status.set_num_given_up(database.count("SELECT count(*) FROM run_failure"));
   status.set_num_done(database.count("SELECT coalesce(max(num_finished), 0) FROM summary"));
+  status.set_num_without_estimate(
+      database.count("SELECT count(*) FROM run_result WHERE status <> 1"));
   if (const auto failures_max = failures_exceeded(database, status)) {
     status.set_failures_max(*failures_max);
   }

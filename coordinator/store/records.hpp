@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -61,6 +62,8 @@ struct GivenUpRun {
 struct EventEntry {
   std::string kind;  ///< What happened, in one word: `coordinator_started`.
   std::string text;  ///< Details; what is beyond 2,000 characters is cut.
+  /// When it happened: the entry may wait for the disk.
+  std::chrono::system_clock::time_point time = std::chrono::system_clock::now();
 };
 
 [[nodiscard]] inline EventEntry entry_of(const wire::Event& event) {

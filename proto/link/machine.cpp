@@ -245,8 +245,8 @@ void require_threads(int count) {
   end.count_down();
   if (error == 0) return;
   throw Error(
-      fmt::format("threads = {} (must be at least {}: {}; raise `ulimit -u`, or the limit "
-                  "of the service or container)",
+      fmt::format("threads = {} (must be at least {}: {}; raise `ulimit -u`, `ulimit -v`, "
+                  "or the limit of the service or container)",
                   threads.size(), count, std::strerror(error)));
 }
 

@@ -112,7 +112,9 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
   try {
     socket.bind(endpoint);
   } catch (const zmq::error_t& error) {
-    throw Error(fmt::format("{} = {} ({})", option, endpoint, error.what()));
+    const std::string_view why =
+        error.num() == ENODEV ? "is no address of this machine" : error.what();
+    throw Error(fmt::format("{} = {} ({})", option, endpoint, why));
   }
   return socket;
 }

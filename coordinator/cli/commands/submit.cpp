@@ -133,19 +133,34 @@ proto::StatusReply with_open_ones_first(proto::StatusReply status) {
   return status;
 }
 
+/// What fits of a line of terminal_text(). Its escape sequences, which take no room, stay.
+std::string cut_line(std::string_view line, std::size_t width) {
+  std::string cut;
+  while (!line.empty()) {
+    const bool is_escape = line.front() == '\033';
+    const std::size_t end = is_escape ? line.find('m') + 1 : line.find('\033');
+    const std::string_view part = line.substr(0, end);
+    line.remove_prefix(part.size());
+    if (!is_escape && width == 0) continue;
+    cut += is_escape ? std::string(part) : shortened(part, width);
+    if (!is_escape) width -= std::min(width, display_width(part));
+  }
+  return cut;
+}
+
 }  // namespace
 
-Drawing drawn_over(std::size_t num_lines_before, std::string_view text, std::size_t num_rows) {
+Drawing drawn_over(std::size_t num_lines_before, std::string_view text, const ScreenSize& screen) {
   // The cursor stands below the last line, so one row stays free.
-  const std::size_t rows_max = std::max<std::size_t>(2, num_rows) - 1;
+  const std::size_t rows_max = std::max<std::size_t>(2, screen.rows) - 1;
   const auto num_lines = static_cast<std::size_t>(std::ranges::count(text, '\n')) +
                          (text.empty() || text.ends_with('\n') ? 0 : 1);
   const std::size_t num_shown = num_lines > rows_max ? rows_max - 1 : num_lines;
   Drawing drawing;
   if (num_lines_before > 0) drawing.text = fmt::format("\033[{}A", num_lines_before);
-  // What a longer line left behind is erased to the end of the line.
+  // A wider line would take two rows. What a longer one left behind is erased.
   const auto draw = [&](std::string_view line) {
-    drawing.text.append(line).append("\033[K\n");
+    drawing.text.append(cut_line(line, screen.columns - 1)).append("\033[K\n");
     ++drawing.num_lines;
   };
   while (drawing.num_lines < num_shown) {
@@ -178,9 +193,8 @@ void WatchDisplay::update(const proto::StatusReply& status) {
 void WatchDisplay::show_screen(const proto::StatusReply& status) {
   TerminalStyle style = style_of(stream_);
   style.cuts_remarks = true;
-  const Drawing drawing =
-      drawn_over(num_lines_drawn_, status_text(with_open_ones_first(status), style),
-                 screen_size_of(stream_).rows);
+  const Drawing drawing = drawn_over(
+      num_lines_drawn_, status_text(with_open_ones_first(status), style), screen_size_of(stream_));
   fmt::print(stream_, "{}", drawing.text);
   num_lines_drawn_ = drawing.num_lines;
 }

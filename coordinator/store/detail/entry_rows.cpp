@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <ctime>
 #include <limits>
 #include <utility>
@@ -146,7 +147,9 @@ EntryRows::EntryRows(const Database& database, const ResultSchema& results)
           " lost_unix_s) VALUES (?, ?, ?, ?, ?, ?, ?)")),
       trim_attempts_(
           database.prepare("DELETE FROM attempt WHERE attempt_id <= last_insert_rowid() - ?")),
-      insert_event_(database.prepare("INSERT INTO event (kind, text) VALUES (?, substr(?, 1, ?))")),
+      insert_event_(database.prepare(
+          "INSERT INTO event (time_utc, kind, text)"
+          " VALUES (strftime('%Y-%m-%dT%H:%M:%fZ', ?, 'unixepoch'), ?, substr(?, 1, ?))")),
       trim_events_(
           database.prepare("DELETE FROM event WHERE event_id <= last_insert_rowid() - ?")) {}
 
@@ -259,7 +262,11 @@ void EntryRows::write_entry(const RetriedRuns&) {
 }
 
 void EntryRows::write_entry(const EventEntry& event) {
-  insert_event_.run(event.kind, event.text, event_text_size_max);
+  // In whole milliseconds, as in the log.
+  const auto time_ms =
+      std::chrono::floor<std::chrono::milliseconds>(event.time.time_since_epoch()).count();
+  insert_event_.run(static_cast<double>(time_ms) / 1000.0, event.kind, event.text,
+                    event_text_size_max);
   trim_events_.run(num_events_max);
 }
 

@@ -41,7 +41,7 @@ class CampaignFolderTest : public testing::Test {
     std::vector<std::string> names;
     KnownCampaigns known;
     const CoordinatorStart start{.epoch = {7}, .host = "h", .version = "0"};
-    for (const FileLook& look : look_at_all(folder, known, start)) {
+    for (const FileLook& look : look_at_all(folder, known, start, 0)) {
       if (look.store) {
         names.push_back(look.record.status.name());
       } else {
@@ -80,8 +80,9 @@ TEST_F(CampaignFolderTest, ServesTheCopyWithTheMostResults) {
     std::filesystem::rename(directory / ("killed" + ending), file.string() + ending);
   }
   EXPECT_THAT(loaded(folder), ElementsAre("a"));
-  EXPECT_THAT(warnings, ElementsAre((directory / "served/a-backup.db").string() +
-                                    ": campaign a is in another file as well"));
+  EXPECT_THAT(warnings,
+              ElementsAre((directory / "served/a-backup.db").string() +
+                          ": campaign a is in another file as well; move one of them away"));
 }
 
 TEST_F(CampaignFolderTest, ServesOfEqualCopiesTheOneWithTheNameOfTheCampaign) {

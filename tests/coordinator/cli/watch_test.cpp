@@ -17,22 +17,30 @@ proto::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
 }
 
 TEST(Drawing, TakesThePlaceOfTheOneBefore) {
-  const Drawing first = drawn_over(0, "a\nb\n", 24);
+  const Drawing first = drawn_over(0, "a\nb\n", {.rows = 24});
   EXPECT_EQ(first.text, "a\033[K\nb\033[K\n\033[J");
   EXPECT_EQ(first.num_lines, 2U);
-  const Drawing second = drawn_over(first.num_lines, "c\n", 24);
+  const Drawing second = drawn_over(first.num_lines, "c\n", {.rows = 24});
   EXPECT_EQ(second.text, "\033[2Ac\033[K\n\033[J");
   EXPECT_EQ(second.num_lines, 1U);
 }
 
 TEST(Drawing, SaysHowManyLinesItLeavesOut) {
-  const Drawing drawing = drawn_over(0, "a\nb\nc\nd", 4);
+  const Drawing drawing = drawn_over(0, "a\nb\nc\nd", {.rows = 4});
   EXPECT_EQ(drawing.text, "a\033[K\nb\033[K\nand 2 more lines\033[K\n\033[J");
   EXPECT_EQ(drawing.num_lines, 3U);
 }
 
 TEST(Drawing, NeedsNoEndOfTheLastLine) {
-  EXPECT_EQ(drawn_over(0, "a", 24).text, "a\033[K\n\033[J");
+  EXPECT_EQ(drawn_over(0, "a", {.rows = 24}).text, "a\033[K\n\033[J");
+}
+
+// A row that the terminal wraps would take two of it, and the next drawing would begin too low.
+TEST(Drawing, CutsLinesThatAreTooWideAndKeepsTheirColours) {
+  const ScreenSize narrow{.columns = 6};
+  EXPECT_EQ(drawn_over(0, "abcdef\nabcde", narrow).text, "abcd…\033[K\nabcde\033[K\n\033[J");
+  EXPECT_EQ(drawn_over(0, "ab\033[1mcdef\033[0mgh", narrow).text,
+            "ab\033[1mcd…\033[0m\033[K\n\033[J");
 }
 
 TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {

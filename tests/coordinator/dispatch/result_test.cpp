@@ -81,6 +81,19 @@ TEST_F(ResultTest, OfARunThatIsLentToAnotherIsTakenAndTheOtherOneAskedBack) {
   outbox.forget();
 }
 
+// At the first heartbeat after a restart: runs 0 and 1 may be finished, run 2 is not.
+TEST_F(ResultTest, SaysNothingOfTheRateIfItMayHaveBeenThereBefore) {
+  add_campaign(two, 10);
+  add_worker(second);
+  outbox.forget();
+  heartbeat(second, {held(two, {{0}, 3})}, {make_computed_batch(two, {{{2}, 1}}, 7)}, 0);
+  complete(second, two, {0, 1, 2});
+  EXPECT_EQ(campaign(two).num_committed_here, 3U);
+  EXPECT_EQ(campaign(two).num_kept, 2U);
+  complete(first, one, {0});  // Lent to it.
+  EXPECT_EQ(campaign(one).num_kept, 0U);
+}
+
 TEST_F(ResultTest, OfACampaignThatIsNotServedIsKept) {
   deliver(first, two, {0});
   const auto not_served = outbox.take_sent<proto::NotServed>(first);

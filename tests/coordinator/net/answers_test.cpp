@@ -1,6 +1,7 @@
 #include "coordinator/net/answers.hpp"
 
 #include "core/error.hpp"
+#include "proto/link/machine.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/proto/wire/requests.hpp"
@@ -74,6 +75,7 @@ class AnswersTest : public testing::Test {
                                 writer_,
                                 background_,
                                 outbox_,
+                                [](const Event&) {},
                                 [this] { return now_; }};
 
  protected:
@@ -93,6 +95,15 @@ TEST_F(AnswersTest, AreComputedForEachKeyTwoAtATimeAndFourForAll) {
   wait_for(4);
   for (const proto::ReplyEnvelope& reply : replies_) EXPECT_TRUE(reply.has_answer());
   ask("anna");
+}
+
+TEST_F(AnswersTest, NameTheCoordinatorsDiskIfItIsFull) {
+  answer_with("echo 'proofmass: error: standard output: No space left on device' >&2; exit 1");
+  ask("anna");
+  wait_for(1);
+  EXPECT_EQ(replies_.front().error().text(),
+            "disk of the coordinator's host " + wire::host_name() +
+                " = No space left on device (the answer is written there)");
 }
 
 TEST_F(AnswersTest, AreDroppedAMinuteAfterTheyWereLastRead) {

@@ -145,6 +145,14 @@ TEST(Descriptors, AreKeptForFilesAndClients) {
   EXPECT_GT(shared_out(~std::uint64_t{0}, 0, 20).num_workers_max, 1'000'000'000U);
 }
 
+TEST(Descriptors, AreKeptForWorkersByCampaigns) {
+  EXPECT_TRUE(has_room_for_campaign(1024, 0, 1024 - 3 * 64 - 5));
+  EXPECT_FALSE(has_room_for_campaign(1024, 0, 1024 - 3 * 64 - 4));
+  EXPECT_TRUE(has_room_for_campaign(80, 16, 64 - 3 * 8 - 5));
+  EXPECT_FALSE(has_room_for_campaign(80, 16, 64 - 3 * 8 - 4));
+  EXPECT_FALSE(has_room_for_campaign(16, 20, 3));
+}
+
 TEST(Descriptors, AreCountedByTheLowestThatIsFree) {
   const int before = lowest_free_descriptor();
   const int taken = dup(0);

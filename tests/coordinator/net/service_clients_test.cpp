@@ -116,6 +116,18 @@ TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
             "too_many_failures without_estimate=1 failures_max=0 campaign=a");
 }
 
+TEST_F(ServiceClients, HearOfAllRunsWithoutAnEstimateAfterARestart) {
+  start_with({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow(1), RunStatus::no_draw);
+  (void)worker.receive<proto::ResultAck>();
+  end(StopRequest::now);
+  start_with({test::campaign_of("a", 3)});
+  worker.deliver(worker.borrow(1), RunStatus::no_draw);
+  (void)worker.receive<proto::ResultAck>();
+  EXPECT_EQ(client->status().campaigns(0).num_without_estimate(), 2U);
+}
+
 // The runs are there already: what is open again is whether they are enough.
 TEST_F(ServiceClients, GiveAFinishedCampaignAnotherRule) {
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 1, .failures_max = {}};

@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include "coordinator/net/service_sockets.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -172,6 +173,26 @@ TEST_F(ServiceWithADirectory, RemovesAFileThatItMadeForASubmissionInVain) {
   EXPECT_TRUE(fs::exists(directory / "small.db"));
   EXPECT_THAT(served(), ElementsAre("a"));
   end(StopRequest::now);
+}
+
+// Where ZeroMQ finds no descriptor, it ends the process.
+TEST_F(ServiceWithADirectory, OpensNoMoreFilesThanThereAreDescriptorsFor) {
+  make_file("a");
+  make_finished_file("b");
+  const std::uint64_t limit = raise_descriptor_limit();
+  config.num_descriptors_reserved = limit - 30;
+  start_service();
+  const std::string reason =
+      "(takes 5 descriptors, for which the coordinator's limit of " + std::to_string(limit) +
+      " open files has no room beside other campaigns, workers and clients; raise `ulimit -n` or "
+      "LimitNOFILE there)";
+  EXPECT_THAT(served(), ElementsAre("b"));
+  ASSERT_EQ(client->status().unserved_files_size(), 1);
+  EXPECT_EQ(client->status().unserved_files(0).reason(),
+            "campaign database = " + (directory / "a.db").string() + " " + reason);
+  EXPECT_EQ(client->error(test::submission(definition_of(test::campaign_of("c", 1)))),
+            "campaign = c " + reason);
+  EXPECT_FALSE(fs::exists(directory / "c.db"));
 }
 
 // A file that is open can be copied if it is removed.

@@ -69,6 +69,14 @@ class ServiceLimits : public test::ServiceTest {
     return client->done(test::control(action, name));
   }
 
+  [[nodiscard]] std::vector<std::string> kinds_of_events(const std::string& file) const {
+    std::vector<std::string> kinds;
+    for (const StoredEvent& event : Store::open_read_only(directory / file).events_after(0, 100)) {
+      kinds.push_back(event.kind);
+    }
+    return kinds;
+  }
+
   const std::string too_many =
       "error: campaigns = 2 (must be at most 1 unfinished ones of the key anna; cancel one, or "
       "wait)";
@@ -92,6 +100,28 @@ TEST_F(ServiceLimits, HoldForCancelledCampaignsThatAreResumed) {
   EXPECT_THAT(control(proto::CONTROL_ACTION_RESUME, "b"), StartsWith("campaign b: active"));
   EXPECT_THAT(control(proto::CONTROL_ACTION_CANCEL, "b"), StartsWith("campaign b: cancelled"));
   EXPECT_THAT(control(proto::CONTROL_ACTION_RESUME, "a"), StartsWith("campaign a: active"));
+}
+
+// Each database has the history of its own campaign.
+TEST_F(ServiceLimits, AreOfAKeyWhoseChangesAreNoted) {
+  config.directory = &folder;
+  start_with({});
+  EXPECT_THAT(submit("a", 3), StartsWith("campaign a: active"));
+  EXPECT_EQ(wait_for_event("campaign_changed request=submit"),
+            "campaign_changed request=submit runs=3 by=anna campaign=a");
+  EXPECT_EQ(submit("b"), too_many);
+  (void)client->done(test::control(proto::CONTROL_ACTION_SET_PRIORITY, "a", -3));
+  EXPECT_EQ(wait_for_event("campaign_changed request=set-priority"),
+            "campaign_changed request=set-priority priority=-3 by=anna campaign=a");
+  (void)control(proto::CONTROL_ACTION_CANCEL, "a");
+  EXPECT_THAT(submit("b"), StartsWith("campaign b: active"));
+  EXPECT_THAT(control(proto::CONTROL_ACTION_ARCHIVE, "a"), StartsWith("campaign a: its database"));
+  EXPECT_EQ(wait_for_event("campaign_changed request=archive"),
+            "campaign_changed request=archive by=anna campaign=a");
+  end(StopRequest::now);
+  EXPECT_THAT(kinds_of_events("a.archived"),
+              ElementsAre("campaign_changed", "campaign_changed", "campaign_changed"));
+  EXPECT_THAT(kinds_of_events("b.db"), ElementsAre("campaign_changed"));
 }
 
 TEST_F(ServiceLimits, HoldForRunsThatAreRetried) {

@@ -39,6 +39,32 @@ TEST_F(ServiceWorkers, HearTheEpochOfEachCoordinator) {
   EXPECT_NE(worker.epoch, first);
 }
 
+// As many as were computed while no coordinator was there arrive at once.
+TEST_F(ServiceWorkers, KeepResultsThatSayNothingOfTheRate) {
+  start({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  const proto::RunLease kept = worker.borrow();
+  kill();
+  start({test::campaign_of("a", 3)});
+  (void)worker.register_here();
+  worker.deliver(kept);
+  (void)worker.receive<proto::ResultAck>();
+  worker.want(1);
+  const auto other = worker.receive<proto::RunLease>();
+  const auto campaign = [this] {
+    proto::CampaignStatus status;
+    in_service([&] { status = service->campaigns().front(); });
+    return status;
+  };
+  EXPECT_EQ(campaign().num_done(), 1U);
+  EXPECT_EQ(campaign().rate_hz(), 0.0);
+  EXPECT_FALSE(campaign().has_remaining_s());
+  worker.deliver(other);
+  (void)worker.receive<proto::ResultAck>();
+  EXPECT_EQ(campaign().num_done(), 2U);
+  EXPECT_GT(campaign().rate_hz(), 0.0);
+}
+
 TEST_F(ServiceWorkers, AreToldToRegisterIfTheyMeanAnotherCoordinator) {
   start({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
@@ -166,6 +192,12 @@ TEST_F(ServiceStart, SaysThatAnAddressIsTaken) {
   } catch (const Error& error) {
     EXPECT_EQ(error.what(), "bind = " + config.workers_endpoint + " (Address already in use)");
   }
+}
+
+TEST_F(ServiceStart, SaysThatAnAddressIsOfAnotherMachine) {
+  config.workers_endpoint = "tcp://nohost:1";
+  config.is_plain_waived = true;
+  EXPECT_EQ(refusal(), "bind = tcp://nohost:1 (is no address of this machine)");
 }
 
 TEST_F(ServiceStart, RefusesTwoCampaignsOfOneName) {

@@ -89,7 +89,10 @@ TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
                                 .reason = wire::LossReason::crashed,
                                 .is_blamed = true});
   writer.write(id, GivenUpRun{RunIndex{4}});
-  writer.write(id, EventEntry{.kind = "note", .text = "text"});
+  const std::chrono::sys_days happened_at{std::chrono::year{2024} / 2 / 29};
+  writer.write(id, EventEntry{.kind = "note",
+                              .text = "text",
+                              .time = happened_at + std::chrono::microseconds(1'007'999)});
   writer.write(id, CampaignControl{.phase = wire::CampaignPhase::paused, .priority = 3});
   const Store store = writer.close(id);
 
@@ -97,7 +100,7 @@ TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
   EXPECT_THAT(store.blamed_runs(), ElementsAre(BlamedRun{RunIndex{3}, 1, {1}}));
   EXPECT_THAT(store.given_up_runs(), ElementsAre(RunRange{RunIndex{4}, 1}));
   EXPECT_EQ(store.control().phase, wire::CampaignPhase::paused);
-  EXPECT_EQ(text("SELECT kind || text FROM event"), "notetext");
+  EXPECT_EQ(text("SELECT time_utc || kind || text FROM event"), "2024-02-29T00:00:01.007Znotetext");
   EXPECT_THAT(take_completions(), IsEmpty());
 }
 
