@@ -168,7 +168,8 @@ std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
 
 std::string ProgramPlan::question_of(RunIndex run, const std::vector<double>& drawn) const {
   const ProgramDescription& of = campaign_.description();
-  Json question{{"ask", "run"}, {"run", run.value}};
+  Json question{
+      {"ask", "run"}, {"run", run.value}, {"drawn", Json::object()}, {"seeds", Json::object()}};
   for (std::size_t i = 0; i < of.drawn_names.size(); ++i) {
     question["drawn"][of.drawn_names[i]] = drawn[i];
   }
