@@ -17,7 +17,7 @@
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/store/result_columns.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"

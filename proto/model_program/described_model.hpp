@@ -199,6 +199,13 @@ class DescribedModel final : public Model {
   mutable std::optional<RunResult> last_reference_run_;  // Until it was computed again.
 };
 
+/// Refuses what is drawn under the name of a column of results, which would be confused with it,
+/// and names that have another meaning in expressions and requirements. Databases may have such
+/// names.
+/// @param source  For messages: where the description is from.
+/// @throws DefinitionError
+void check_names(const DescribedModel& model, const std::string& source);
+
 /// Has the run computed again by a process of the program that no other run came before.
 /// @param campaign  Of a model with its program.
 /// @throws ModelProgramError if the result is another one, which follows not from its question

@@ -1,14 +1,17 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
 #include "core/campaign/expression.hpp"
 #include "core/campaign/name.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/law_reader.hpp"
+#include "core/statistics/requirement.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/json_line.hpp"
 #include "proto/text/visible_text.hpp"
@@ -178,6 +181,30 @@ std::string read_name(Document& document, const std::string& path) {
   }
   document.refuse(key, "must be 1 to 64 of [a-z0-9_], a letter first");
   return {};
+}
+
+void check_names(const DescribedModel& model, const std::string& source) {
+  const auto refuse = [&](std::string_view list, std::string_view name, std::string_view meaning) {
+    throw DefinitionError(
+        fmt::format("{}: {}.{} (must have another name: {})", source, list, name, meaning));
+  };
+  const auto check_input = [&](std::string_view list, std::string_view name) {
+    if (is_function(name)) refuse(list, name, "it is a function of expressions");
+  };
+  for (const ProgramParameter& parameter : model.parts().parameters) {
+    check_input("parameters", parameter.name);
+  }
+  const std::vector<std::string> columns =
+      result_column_names(model.results_of({}, model.version()));
+  for (const DrawnQuantity& drawn : model.drawn()) {
+    check_input("drawn", drawn.name);
+    if (std::ranges::find(columns, drawn.name) == columns.end()) continue;
+    refuse("drawn", drawn.name, "it is a column of the results");
+  }
+  for (const ProgramQuantity& quantity : model.parts().quantities) {
+    if (quantity.name != all_objectives_word) continue;
+    refuse("quantities", quantity.name, "requirements say `all objectives`");
+  }
 }
 
 ProgramDescription description_in(std::string_view answer, const std::string& source) {

@@ -287,11 +287,13 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
         fmt::format("{}: {}: display_unit = {} (needs display_scale, its size in units of {})",
                     source, quantity.name, quantity.display_unit, quantity.unit));
   }
-  FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
-  return std::make_unique<DescribedModel>(
+  auto model = std::make_unique<DescribedModel>(
       std::move(description), std::nullopt, [program](const DescribedCampaign& campaign) {
         return std::make_unique<const ProgramPlan>(program, campaign);
       });
+  check_names(*model, source);
+  FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
+  return model;
 }
 
 void end_fresh_programs() { FreshProcesses::instance().end(); }

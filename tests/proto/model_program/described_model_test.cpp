@@ -4,6 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "core/campaign/result_columns.hpp"
 #include "core/model.hpp"
 #include "tests/test.hpp"
 
@@ -105,6 +108,44 @@ TEST(RecordedModel, IsOneForOneText) {
   // Its text begins with the first key of the alphabet, and describes it again.
   EXPECT_EQ(other.description().substr(0, 9), R"({"drawn":)");
   EXPECT_EQ(ruler(std::string(other.description())).description(), other.description());
+}
+
+/// What is wrong with the names of a model program.
+std::string name_refusal_of(const std::string& text) {
+  try {
+    check_names(static_cast<const DescribedModel&>(ruler(text)), "p.py: description");
+  } catch (const DefinitionError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Names, AreNotThoseOfColumnsAndFunctions) {
+  for (const char* const name : {"run_index", "status", "num_draws", "loss_cause", "truth_length",
+                                 "estimate_length", "error_length"}) {
+    const std::string more = fmt::format(R"(,{{"name": "{}", "law": "fixed", "value": 1}}])", name);
+    const std::string drawn = R"("drawn": [{"name": "scale", "law": "fixed", "value": 3})" + more;
+    EXPECT_EQ(name_refusal_of(description(drawn)),
+              fmt::format("p.py: description: drawn.{} (must have another name: it is a column of "
+                          "the results)",
+                          name));
+  }
+  EXPECT_EQ(
+      name_refusal_of(description(
+          R"("parameters": [{"name": "offset_m", "value": 1}, {"name": "sqrt", "value": 1}])")),
+      "p.py: description: parameters.sqrt (must have another name: it is a function of "
+      "expressions)");
+  EXPECT_EQ(name_refusal_of(description(R"("quantities": [{"name": "all", "truth": "scale"}])")),
+            "p.py: description: quantities.all (must have another name: requirements say `all "
+            "objectives`)");
+  // Nothing is confused with these.
+  EXPECT_EQ(name_refusal_of(description(R"("quantities": [{"name": "scale", "truth": "scale"},)"
+                                        R"({"name": "status", "truth": "1"}])")),
+            "accepted");
+  const std::vector<std::string> columns = result_column_names(example_results());
+  for (const DrawnQuantity& drawn : model().drawn()) {
+    EXPECT_EQ(std::ranges::count(columns, drawn.name), 0) << drawn.name;
+  }
 }
 
 /// As many quantities, each of which is the next one.
