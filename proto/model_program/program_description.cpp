@@ -11,6 +11,7 @@
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/law_reader.hpp"
+#include "core/math/hash.hpp"
 #include "core/statistics/requirement.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/json_line.hpp"
@@ -208,7 +209,7 @@ void check_names(const DescribedModel& model, const std::string& source) {
 }
 
 ProgramDescription description_in(std::string_view answer, const std::string& source) {
-  const Json json = json_in(answer, source);
+  Json json = json_in(answer, source);
   Document document = document_of(json, source);
   (void)document.find("proofmass_model_program");
   ProgramDescription description;
@@ -226,6 +227,10 @@ ProgramDescription description_in(std::string_view answer, const std::string& so
   document.read("memory_max_mib", limits.memory_max_mib, range::between(1, 1 << 20));
   read_lists(document, description);
   document.check();
+  for (const char* const key : {"purpose", "runs_at_once", "run_time_max_s", "memory_max_mib"}) {
+    json.erase(key);
+  }
+  description.digest = fnv1a(json.dump());
   const LawSet set = description.law_set(description.laws);
   for (std::size_t i = 0; i < set.laws.size(); ++i) {
     if (!has_covariances(document, fmt::format("drawn[{}]", i))) continue;

@@ -5,8 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
+#include "core/campaign/recording.hpp"
 #include "core/campaign/result_columns.hpp"
+#include "core/math/hash.hpp"
 #include "core/model.hpp"
 #include "tests/test.hpp"
 
@@ -108,6 +111,63 @@ TEST(RecordedModel, IsOneForOneText) {
   // Its text begins with the first key of the alphabet, and describes it again.
   EXPECT_EQ(other.description().substr(0, 9), R"({"drawn":)");
   EXPECT_EQ(ruler(std::string(other.description())).description(), other.description());
+}
+
+// A campaign whose runs took too long goes on with another limit, and its reference runs are the
+// same; what may change a result needs another version.
+TEST(RecordedModel, IsTheSameWithOtherLimits) {
+  const std::uint64_t digest = ruler(description()).description_digest();
+  for (const char* const limit : {R"("purpose": "Measures.")", R"("runs_at_once": 8)",
+                                  R"("run_time_max_s": 7)", R"("memory_max_mib": 100)"}) {
+    EXPECT_EQ(ruler(description(limit)).description_digest(), digest) << limit;
+  }
+  for (const char* const other : {R"("streams": [{"name": "noise"}])",
+                                  R"("parameters": [{"name": "offset_m", "value": 0.25}])"}) {
+    EXPECT_NE(ruler(description(other)).description_digest(), digest) << other;
+  }
+  EXPECT_NE(digest, 0U);
+}
+
+/// Of a program that estimates 1.5 in each run.
+class FixedPlan final : public Plan {
+ public:
+  [[nodiscard]] std::vector<RunResult> simulate_batch(
+      std::span<const RunRequest> requests, InstructionSet,
+      const std::function<void(int)>&) const override {
+    return {{.run = requests.front().run, .truth = {1.0}, .estimate = {1.5}}};
+  }
+  [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink&,
+                                 const std::function<void(int)>&) const override {
+    return simulate_batch({&request, 1}, InstructionSet::scalar, {}).front();
+  }
+  [[nodiscard]] const Recording& recording() const override { return recording_; }
+  [[nodiscard]] int num_steps() const override { return 1; }
+
+ private:
+  const Recording recording_;
+};
+
+// Campaigns that older programs began go on.
+TEST(ReferenceDigest, OfAnOlderProgramHadLimitsInIt) {
+  const auto model_with = [](const std::string& limit) {
+    return std::make_unique<DescribedModel>(
+        description_in(description(limit), "test"), std::nullopt,
+        [](const DescribedCampaign&) { return std::make_unique<const FixedPlan>(); });
+  };
+  const auto before = model_with(R"("run_time_max_s": 2)"), now = model_with(R"("purpose": "P.")");
+  const auto set = InstructionSet::scalar;
+  EXPECT_EQ(now->reference_digest(set), before->reference_digest(set));
+  std::uint64_t former = fnv1a(before->description());
+  for (int run = 0; run < 3; ++run) former = fnv1a(former, std::bit_cast<std::uint64_t>(1.5));
+  EXPECT_NE(former, now->reference_digest(set));
+  ModelRecord record{.version = "ruler-1",
+                     .description = std::string(before->description()),
+                     .reference_digest = former};
+  EXPECT_EQ(current_reference_digest(*now, record), now->reference_digest(set));
+  // Where the program is not, nobody can tell; nor is another result the same.
+  EXPECT_EQ(current_reference_digest(ruler(record.description), record), former);
+  record.reference_digest = 0x1234;
+  EXPECT_EQ(current_reference_digest(*now, record), 0x1234U);
 }
 
 /// What is wrong with the names of a model program.
