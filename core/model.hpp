@@ -89,6 +89,9 @@ class Model {
   /// The text by which others know the model who do not have its program, see
   /// proto/model_program/README.md. Empty if it has none, as models in C++.
   [[nodiscard]] virtual std::string_view description() const { return {}; }
+  /// Of what description() says of the results: the same where only limits differ, such as the time
+  /// that a run may take. 0 without a description.
+  [[nodiscard]] virtual std::uint64_t description_digest() const { return 0; }
   /// Why nothing computes runs of a model that is known by its description alone, and what to do;
   /// empty for one that can. What needs it to compute throws an Error with this text.
   [[nodiscard]] virtual std::string why_no_runs() const { return {}; }

@@ -20,7 +20,6 @@
 #include "core/campaign/device.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
-#include "core/math/hash.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
@@ -234,7 +233,7 @@ void add_models(const Options& options, proto::Hello& hello, const wire::Log& lo
       proto::OtherModel& other = *hello.add_other_models();
       other.set_version(version);
       other.set_reference_digest(digest);
-      other.set_description_digest(fnv1a(model->description()));
+      other.set_description_digest(model->description_digest());
     }
   }
   if (!failure.empty() && hello.other_models_size() == 0) throw Error(failure);

@@ -9,9 +9,9 @@
 #include <optional>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "coordinator/archive/detail/hdf5_file.hpp"
-#include "coordinator/store/result_columns.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {

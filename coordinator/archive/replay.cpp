@@ -17,8 +17,8 @@
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/review.hpp"
-#include "coordinator/store/result_columns.hpp"
 #include "core/campaign/recording.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 

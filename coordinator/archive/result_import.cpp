@@ -261,8 +261,10 @@ MissingEstimates import_results(const std::filesystem::path& results,
       schema_file.string(),
       detail::read_definition_text(schema_file, schema_size_max, detail::Pipes::refused), {});
   ImportSchema schema = read_schema(document, results.filename().string());
-  wire::DescribedCampaign campaign(
-      wire::described_model(schema.description.dump(), 0, schema_file.string()));
+  const wire::DescribedModel& model =
+      wire::described_model(schema.description.dump(), 0, schema_file.string());
+  check_names(model, schema_file.string());
+  wire::DescribedCampaign campaign(model);
   campaign.name = schema.name;
   campaign.num_runs = read_columns(results, schema, heed_stop);
   for (const ResultColumn& column : schema.drawn) campaign.table_columns.push_back(column.values);

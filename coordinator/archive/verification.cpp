@@ -17,8 +17,9 @@
 #include "coordinator/archive/replay.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/read_results.hpp"
-#include "coordinator/store/result_columns.hpp"
+#include "coordinator/report/review.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
@@ -281,8 +282,9 @@ class Verification {
                                   found.stored_digest));
     }
     return Check::fails(
-        fmt::format("{} of {} second results {} not the stored one: a worker computes wrongly",
-                    contradictions.size(), num_compared, contradictions.size() == 1 ? "is" : "are"),
+        fmt::format("{} of {} second results {} not the stored one: {}", contradictions.size(),
+                    num_compared, contradictions.size() == 1 ? "is" : "are",
+                    cause_of_contradictions(store_->model())),
         std::move(lines));
   }
 

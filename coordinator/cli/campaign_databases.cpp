@@ -36,14 +36,15 @@ std::string model_difference(const Store& store, const Campaign& campaign) {
     return fmt::format("model: {} in the database, {} in this program", store.model_version(),
                        wanted.version());
   }
-  if (store.model().description() != wanted.description()) {
+  if (store.model().description_digest() != wanted.description_digest()) {
     return fmt::format(
         "model: {} has another description; a model that has changed needs another version",
         wanted.version());
   }
   if (campaign.tolerates_digests()) return {};
-  const std::uint64_t before = store.reference_digest();
-  const std::uint64_t now = before == 0 ? 0 : wanted.reference_digest(best_instruction_set());
+  if (store.reference_digest() == 0) return {};
+  const std::uint64_t before = store.reference_digest_for(wanted);
+  const std::uint64_t now = wanted.reference_digest(best_instruction_set());
   if (before == now) return {};
   return fmt::format(
       "model: {} computes something else than where the campaign began (digest of its first runs "
@@ -62,7 +63,7 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   std::vector<std::string> differences;
   const std::string of_model = model_difference(store, wanted);
   // Definitions of two models have nothing in common that could be compared.
-  if (store.model().description() == wanted.model().description()) {
+  if (store.model().description_digest() == wanted.model().description_digest()) {
     differences = definition_differences(*stored_campaign(store), wanted);
   }
   if (!of_model.empty()) differences.push_back(of_model);

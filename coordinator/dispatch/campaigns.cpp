@@ -6,7 +6,6 @@
 #include "coordinator/dispatch/detail.hpp"
 #include "coordinator/dispatch/events.hpp"
 #include "core/error.hpp"
-#include "core/math/hash.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
@@ -74,7 +73,7 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
                     .reference_digest = stored.reference_digest != 0
                                             ? stored.reference_digest
                                             : state.config.reference_digest,
-                    .description_digest = fnv1a(stored.definition->model().description())};
+                    .description_digest = stored.definition->model().description_digest()};
   campaign.phase = stored.control.phase;
   campaign.priority = stored.control.priority;
   campaign.audit_fraction = stored.control.audit_fraction;

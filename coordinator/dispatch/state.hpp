@@ -101,7 +101,7 @@ struct DispatchConfig {
 struct ModelIdentity {
   std::string version;                 ///< Model::version().
   std::uint64_t reference_digest = 0;  ///< Model::reference_digest().
-  /// fnv1a() of Model::description(): the same also where another digest is tolerated.
+  /// Model::description_digest(): the same also where another reference digest is tolerated.
   std::uint64_t description_digest = 0;
 };
 

@@ -32,7 +32,7 @@ namespace {
 std::uint64_t reference_digest_of(const ServedCampaign& campaign) {
   const Model& model = campaign.definition->model();
   if (&model == &built_in_model()) return 0;
-  const std::uint64_t recorded = campaign.store.reference_digest();
+  const std::uint64_t recorded = campaign.store.reference_digest_for(model);
   return recorded != 0 ? recorded : model.reference_digest(best_instruction_set());
 }
 

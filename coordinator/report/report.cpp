@@ -336,16 +336,24 @@ Json report_json(const Review& review, std::span<const StatedRequirement> stated
   return json;
 }
 
+std::string_view cause_of_contradictions(const Model& model) {
+  if (model.description().empty()) return "a worker computes wrongly";
+  return "answers of the model program depend on more than their question, such as earlier runs or "
+         "random numbers without its seeds, or a worker computes wrongly";
+}
+
 namespace {
 
-std::string note_of(const Campaign& campaign, std::uint64_t num_contradicting) {
+std::string note_of(const Campaign& campaign, const Store& store) {
   std::string note = campaign.note();
+  const std::uint64_t num_contradicting = store.num_contradicting();
   if (num_contradicting == 0) return note;
   if (!note.empty()) note += "; ";
   return note + fmt::format(
-                    "audits found {}: a worker computes wrongly, and no verdict can be relied on; "
-                    "`proofmass verify` names the runs",
-                    counted(num_contradicting, "contradiction"));
+                    "audits found {}: {}, and no verdict can be relied on; `proofmass verify` "
+                    "names the runs",
+                    counted(num_contradicting, "contradiction"),
+                    cause_of_contradictions(store.model()));
 }
 
 Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDepth depth,
@@ -356,7 +364,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
                 .model_version = store.model_version(),
                 .is_of_program = !store.model().description().empty(),
                 .is_imported = store.model().is_imported(),
-                .note = note_of(campaign, store.num_contradicting()),
+                .note = note_of(campaign, store),
                 .build = store.build(),
                 .created_utc = store.created_utc(),
                 .definition_digest = store.table_digest(),

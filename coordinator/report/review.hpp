@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/report/read_results.hpp"
@@ -172,6 +173,9 @@ enum class ReviewDepth : std::uint8_t {
   charts,  ///< Also how the campaign was executed.
   causes,
 };
+
+/// Why a run computed a second time has another result, for people: `a worker computes wrongly`.
+[[nodiscard]] std::string_view cause_of_contradictions(const Model& model);
 
 /// Reads all results, of one state of the file, as read_checked_results() does, and once more for
 /// the causes.

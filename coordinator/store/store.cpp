@@ -15,6 +15,7 @@
 #include "coordinator/store/detail/store_impl.hpp"
 #include "core/model.hpp"
 #include "proto/link/faults.hpp"
+#include "proto/model_program/described_model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -155,6 +156,13 @@ std::string Store::model_version() const {
 std::uint64_t Store::reference_digest() const {
   return detail::reference_digest_in(impl_->database,
                                      impl_->database.text("SELECT reference_digest FROM campaign"));
+}
+
+std::uint64_t Store::reference_digest_for(const Model& model) const {
+  return wire::current_reference_digest(
+      model, {.version = model_version(),
+              .description = impl_->database.text("SELECT model_description FROM campaign"),
+              .reference_digest = reference_digest()});
 }
 
 std::string Store::build() const { return impl_->database.text("SELECT build FROM campaign"); }

@@ -138,6 +138,8 @@ class Store {
   /// Model::reference_digest() where the campaign began; 0 if the model has no description, or an
   /// older program began it.
   [[nodiscard]] std::uint64_t reference_digest() const;
+  /// The same, to be compared with that of a model, see wire::current_reference_digest().
+  [[nodiscard]] std::uint64_t reference_digest_for(const Model& model) const;
   [[nodiscard]] std::string build() const;        ///< Of the program that made the file.
   [[nodiscard]] std::string created_utc() const;  ///< As in `2024-02-29T12:00:10Z`.
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.

@@ -22,6 +22,8 @@ double whole_power(double x, int exponent) {
   return exponent < 0 ? 1.0 / power : power;
 }
 
+constexpr std::string_view square_root = "sqrt", power = "pow";
+
 /// Reads and evaluates from left to right, one function for each level of precedence.
 class Evaluation {
  public:
@@ -118,10 +120,10 @@ class Evaluation {
       ++position_;
     }
     const std::string_view name = text_.substr(first, position_ - first);
-    if (name != "sqrt" && name != "pow") return value_of_(name);
+    if (!is_function(name)) return value_of_(name);
     expect('(');
     const double argument = sum();
-    const double value = name == "sqrt" ? std::sqrt(argument) : power_of(argument);
+    const double value = name == square_root ? std::sqrt(argument) : power_of(argument);
     expect(')');
     return value;
   }
@@ -143,6 +145,8 @@ class Evaluation {
 };
 
 }  // namespace
+
+bool is_function(std::string_view name) { return name == square_root || name == power; }
 
 double evaluate_expression(std::string_view text,
                            const std::function<double(std::string_view name)>& value_of) {

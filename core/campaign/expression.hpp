@@ -5,6 +5,9 @@
 
 namespace proofmass {
 
+/// True for `sqrt` and `pow`, which are no names of quantities in an expression.
+[[nodiscard]] bool is_function(std::string_view name);
+
 /// The value of an expression: numbers, names such as `offcentring_m.x`, + - * /, parentheses, a
 /// minus before a term, sqrt(x) and pow(x, n) with a whole number n from -16 to 16. Every operation
 /// has the same bits on every processor. Division by 0 and roots of negative numbers give what

@@ -263,7 +263,7 @@ Requirement parse_requirement(std::string_view text, std::span<const std::string
 
 Requirement detail::read_requirement(Phrase& phrase) {
   Requirement requirement;
-  if (phrase.takes("all")) {
+  if (phrase.takes(all_objectives_word)) {
     requirement.subject = Requirement::Subject::all_objectives;
     phrase.expect("objectives");
   } else {

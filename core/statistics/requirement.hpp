@@ -87,6 +87,9 @@ struct Requirement {
   }
 };
 
+/// Begins requirements and stop rules about all objectives: no parameter may have this name.
+inline constexpr std::string_view all_objectives_word = "all";
+
 /// Reads `a_c12 < 9e-4 for 99% with 95%`, `<` or `<=` and the limit in SI units, or
 /// `all objectives for 95% with 90%`.
 /// @param parameters  Their names.

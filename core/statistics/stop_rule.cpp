@@ -96,7 +96,7 @@ StopRule parse_stop_rule(std::string_view text, std::span<const std::string_view
       parameters);
   if (phrase.ends_with("decided")) return rule_about_verdict(phrase);
   StopRule rule;
-  if (phrase.takes("all")) {
+  if (phrase.takes(all_objectives_word)) {
     phrase.expect("objectives");
     rule.statistic = StopRule::Statistic::success;
     rule.requirement.subject = Requirement::Subject::all_objectives;

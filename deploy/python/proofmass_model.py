@@ -116,9 +116,9 @@ class Model:
         return {"run": question["run"], **self._result_of(question)}
 
     def _result_of(self, question):
-        drawn = question.get("drawn", {})
+        drawn = question["drawn"]
         try:
-            result = self.run(self._parameters, drawn, Random(question.get("seeds", {})))
+            result = self.run(self._parameters, drawn, Random(question["seeds"]))
             if result is None:
                 return {"lost": True}
             estimate, errors = result if isinstance(result, tuple) else (result, {})

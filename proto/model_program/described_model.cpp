@@ -198,29 +198,39 @@ ResultSchema DescribedModel::results_of(std::string_view, std::string_view) cons
   return DescribedCampaign(*this).results();
 }
 
-std::uint64_t DescribedModel::reference_digest(InstructionSet set) const {
-  const std::lock_guard lock(digest_mutex_);
-  if (reference_digest_) return *reference_digest_;
-  constexpr std::uint64_t num_runs = 3;
-  std::uint64_t digest = fnv1a_basis;
-  for (const char letter : parts_.text) digest = fnv1a(digest, static_cast<unsigned char>(letter));
-  const std::unique_ptr<const Plan> plan = DescribedCampaign(*this).prepare();
-  for (std::uint64_t run = 0; run < num_runs; ++run) {
-    const RunRequest request{RunIndex{run}, {}};
-    const std::vector<RunResult> results = plan->simulate_batch({&request, 1}, set, {});
-    for (const double value : results.front().estimate) {
+std::uint64_t DescribedModel::digest_of_reference_runs(std::uint64_t digest) const {
+  const std::lock_guard lock(reference_mutex_);
+  if (reference_runs_.empty()) {
+    constexpr std::uint64_t num_runs = 3;
+    const std::unique_ptr<const Plan> plan = DescribedCampaign(*this).prepare();
+    std::vector<RunResult> runs;
+    for (std::uint64_t run = 0; run < num_runs; ++run) {
+      const RunRequest request{RunIndex{run}, {}};
+      runs.push_back(plan->simulate_batch({&request, 1}, best_instruction_set()).front());
+    }
+    reference_runs_ = std::move(runs);
+  }
+  for (const RunResult& run : reference_runs_) {
+    for (const double value : run.estimate) {
       digest = fnv1a(digest, std::bit_cast<std::uint64_t>(value));
     }
-    last_reference_run_ = results.front();
   }
-  return *(reference_digest_ = digest);
+  return digest;
+}
+
+std::uint64_t DescribedModel::reference_digest(InstructionSet /*set*/) const {
+  return reference_digest_ ? *reference_digest_ : digest_of_reference_runs(parts_.digest);
+}
+
+std::uint64_t DescribedModel::former_reference_digest(std::string_view description) const {
+  return digest_of_reference_runs(fnv1a(description));
 }
 
 void DescribedModel::require_repeatable() const {
+  if (reference_digest_ || is_found_repeatable_) return;  // Once is enough.
   (void)reference_digest(best_instruction_set());
-  if (!last_reference_run_) return;
-  wire::require_repeatable(DescribedCampaign(*this), *last_reference_run_);
-  last_reference_run_.reset();  // Once is enough.
+  wire::require_repeatable(DescribedCampaign(*this), reference_runs_.back());
+  is_found_repeatable_ = true;
 }
 
 void require_repeatable(const Model& model) {
@@ -333,15 +343,9 @@ const DescribedModel& described_model(const std::string& text, std::uint64_t ref
 
 namespace {
 
-/// One of this program with the same version, and the same description if both have one; or one in
-/// C++ with the same name, which knows what its older versions recorded.
-const Model* own_model(const ModelRecord& record) {
-  const Model* const found = find_model(record.version);
-  if (found != nullptr && (found->description().empty() || record.description.empty() ||
-                           found->description() == record.description)) {
-    return found;
-  }
-  const std::string_view name = name_of_model(record.version);
+/// One in C++ with the same name, which knows what its older versions recorded.
+const Model* model_in_cpp(std::string_view version) {
+  const std::string_view name = name_of_model(version);
   if (name.empty()) return &built_in_model();
   const auto in_cpp = std::ranges::find_if(models(), [&](const Model* model) {
     return model->description().empty() && name_of_model(model->version()) == name;
@@ -352,16 +356,33 @@ const Model* own_model(const ModelRecord& record) {
 }  // namespace
 
 const Model& recorded_model(const ModelRecord& record) {
-  if (const Model* const own = own_model(record)) return *own;
+  const Model* const found = find_model(record.version);
+  if (found != nullptr && (found->description().empty() || record.description.empty())) {
+    return *found;
+  }
+  if (const Model* const in_cpp = model_in_cpp(record.version)) return *in_cpp;
   if (record.description.empty()) {
     throw DefinitionError(fmt::format(
         "is of the model {}, and this program has {}; --model-program names that of another model",
         record.version, model_versions()));
   }
   const std::string source = fmt::format("is of the model {}: description", record.version);
-  const Model& described = described_model(record.description, record.reference_digest, source);
-  if (described.version() == record.version) return described;
-  throw DefinitionError(fmt::format("{}: of {}", source, described.version()));
+  const DescribedModel& described =
+      described_model(record.description, record.reference_digest, source);
+  if (described.version() != record.version) {
+    throw DefinitionError(fmt::format("{}: of {}", source, described.version()));
+  }
+  const bool is_found =
+      found != nullptr && found->description_digest() == described.description_digest();
+  return is_found ? *found : described;
+}
+
+std::uint64_t current_reference_digest(const Model& model, const ModelRecord& record) {
+  const auto* const described = dynamic_cast<const DescribedModel*>(&model);
+  if (described == nullptr || !described->can_simulate()) return record.reference_digest;
+  return described->former_reference_digest(record.description) == record.reference_digest
+             ? model.reference_digest(best_instruction_set())
+             : record.reference_digest;
 }
 
 std::shared_ptr<const Campaign> recorded_campaign(

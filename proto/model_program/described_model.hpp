@@ -67,6 +67,8 @@ struct ProgramQuantity {
 /// What a model program says of itself when it is asked.
 struct ProgramDescription {
   std::string text;     ///< All of it as JSON without blanks, keys in alphabetical order.
+  /// fnv1a() of such a text without the purpose and the limits, which change no result.
+  std::uint64_t digest = 0;
   std::string version;  ///< NAME-VERSION, as Model::version().
   std::string purpose;
   /// The file that results of another program came from, which are all that there is of the model:
@@ -171,9 +173,10 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_; }
   [[nodiscard]] std::string_view step_name() const override { return "steps"; }
   [[nodiscard]] std::size_t batch_size() const override { return parts_.runs_at_once; }
-  /// Of the description and of the first three runs of the example, which are computed once.
+  /// Of description_digest() and the first three runs of the example, which are computed once.
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override;
   [[nodiscard]] std::string_view description() const override { return parts_.text; }
+  [[nodiscard]] std::uint64_t description_digest() const override { return parts_.digest; }
   [[nodiscard]] std::string why_no_runs() const override;
   [[nodiscard]] bool is_imported() const override { return !parts_.imported_from.empty(); }
   [[nodiscard]] std::unique_ptr<Campaign> campaign_of(Definition definition, TableColumns,
@@ -188,16 +191,30 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::unique_ptr<const Plan> prepare(const DescribedCampaign& campaign) const;
   /// Has the last of the reference runs computed again, once, see below.
   void require_repeatable() const;
+  /// reference_digest() as older programs took it: of all that a description says.
+  /// @pre The program is there.
+  [[nodiscard]] std::uint64_t former_reference_digest(std::string_view description) const;
 
  private:
+  /// Of the estimates of the reference runs, after what the digest begins with.
+  [[nodiscard]] std::uint64_t digest_of_reference_runs(std::uint64_t digest) const;
+
   ProgramDescription parts_;
   PrepareProgram prepare_;
   std::vector<DrawnQuantity> drawn_;
   std::string example_file_;
-  mutable std::mutex digest_mutex_;
-  mutable std::optional<std::uint64_t> reference_digest_;
-  mutable std::optional<RunResult> last_reference_run_;  // Until it was computed again.
+  const std::optional<std::uint64_t> reference_digest_;  // As computed elsewhere.
+  mutable std::mutex reference_mutex_;
+  mutable std::vector<RunResult> reference_runs_;  // Empty: not computed yet.
+  mutable bool is_found_repeatable_ = false;
 };
+
+/// Refuses what is drawn under the name of a column of results, which would be confused with it,
+/// and names that have another meaning in expressions and requirements. Databases may have such
+/// names.
+/// @param source  For messages: where the description is from.
+/// @throws DefinitionError
+void check_names(const DescribedModel& model, const std::string& source);
 
 /// Has the run computed again by a process of the program that no other run came before.
 /// @param campaign  Of a model with its program.
@@ -232,6 +249,11 @@ struct ModelRecord {
   /// Model::reference_digest() of a model with a description; 0 if it was not recorded.
   std::uint64_t reference_digest = 0;
 };
+
+/// The digest of a record as Model::reference_digest() is now: older programs took purpose and
+/// limits into it.
+/// @param model  Of the record; if its program is not there, the digest is left as it is.
+[[nodiscard]] std::uint64_t current_reference_digest(const Model& model, const ModelRecord& record);
 
 /// The model of a campaign from elsewhere: that of models() if it is there; else what is said of
 /// it, see described_model().

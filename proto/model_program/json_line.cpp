@@ -32,6 +32,23 @@ std::string without_overflow(std::string_view line) {
   return text;
 }
 
+/// Python's json module writes such numbers, far behind what an excerpt shows.
+/// @throws InvalidArgument if what begins as an object has one.
+void refuse_non_finite(std::string_view line) {
+  if (!line.starts_with('{')) return;
+  bool is_in_string = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') is_in_string = !is_in_string;
+    if (is_in_string && line[i] == '\\') ++i;
+    if (is_in_string) continue;
+    for (const std::string_view number : {"NaN", "Infinity"}) {
+      if (!line.substr(i).starts_with(number)) continue;
+      throw InvalidArgument(
+          fmt::format("has {} at character {}, a number that JSON does not have", number, i + 1));
+    }
+  }
+}
+
 }  // namespace
 
 Json object_in(std::string_view line) {
@@ -45,6 +62,7 @@ Json object_in(std::string_view line) {
   };
   Json json = Json::parse(line, is_kept, false);
   if (json.is_discarded()) json = Json::parse(without_overflow(line), is_kept, false);
+  if (json.is_discarded()) refuse_non_finite(line);
   if (!json.is_object()) throw InvalidArgument("is no object of JSON");
   if (!twice.empty())
     throw InvalidArgument(fmt::format("has the key \"{}\" twice", excerpt_of(twice)));

@@ -1,14 +1,18 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
 #include "core/campaign/expression.hpp"
 #include "core/campaign/name.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/definition/law_reader.hpp"
+#include "core/math/hash.hpp"
+#include "core/statistics/requirement.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/json_line.hpp"
 #include "proto/text/visible_text.hpp"
@@ -180,8 +184,32 @@ std::string read_name(Document& document, const std::string& path) {
   return {};
 }
 
+void check_names(const DescribedModel& model, const std::string& source) {
+  const auto refuse = [&](std::string_view list, std::string_view name, std::string_view meaning) {
+    throw DefinitionError(
+        fmt::format("{}: {}.{} (must have another name: {})", source, list, name, meaning));
+  };
+  const auto check_input = [&](std::string_view list, std::string_view name) {
+    if (is_function(name)) refuse(list, name, "it is a function of expressions");
+  };
+  for (const ProgramParameter& parameter : model.parts().parameters) {
+    check_input("parameters", parameter.name);
+  }
+  const std::vector<std::string> columns =
+      result_column_names(model.results_of({}, model.version()));
+  for (const DrawnQuantity& drawn : model.drawn()) {
+    check_input("drawn", drawn.name);
+    if (std::ranges::find(columns, drawn.name) == columns.end()) continue;
+    refuse("drawn", drawn.name, "it is a column of the results");
+  }
+  for (const ProgramQuantity& quantity : model.parts().quantities) {
+    if (quantity.name != all_objectives_word) continue;
+    refuse("quantities", quantity.name, "requirements say `all objectives`");
+  }
+}
+
 ProgramDescription description_in(std::string_view answer, const std::string& source) {
-  const Json json = json_in(answer, source);
+  Json json = json_in(answer, source);
   Document document = document_of(json, source);
   (void)document.find("proofmass_model_program");
   ProgramDescription description;
@@ -199,6 +227,10 @@ ProgramDescription description_in(std::string_view answer, const std::string& so
   document.read("memory_max_mib", limits.memory_max_mib, range::between(1, 1 << 20));
   read_lists(document, description);
   document.check();
+  for (const char* const key : {"purpose", "runs_at_once", "run_time_max_s", "memory_max_mib"}) {
+    json.erase(key);
+  }
+  description.digest = fnv1a(json.dump());
   const LawSet set = description.law_set(description.laws);
   for (std::size_t i = 0; i < set.laws.size(); ++i) {
     if (!has_covariances(document, fmt::format("drawn[{}]", i))) continue;

@@ -186,7 +186,8 @@ std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
 
 std::string ProgramPlan::question_of(RunIndex run, const std::vector<double>& drawn) const {
   const ProgramDescription& of = campaign_.description();
-  Json question{{"ask", "run"}, {"run", run.value}};
+  Json question{
+      {"ask", "run"}, {"run", run.value}, {"drawn", Json::object()}, {"seeds", Json::object()}};
   for (std::size_t i = 0; i < of.drawn_names.size(); ++i) {
     question["drawn"][of.drawn_names[i]] = drawn[i];
   }
@@ -306,11 +307,13 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
         fmt::format("{}: {}: display_unit = {} (needs display_scale, its size in units of {})",
                     source, quantity.name, quantity.display_unit, quantity.unit));
   }
-  FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
-  return std::make_unique<DescribedModel>(
+  auto model = std::make_unique<DescribedModel>(
       std::move(description), std::nullopt, [loaded](const DescribedCampaign& campaign) {
         return std::make_unique<const ProgramPlan>(loaded, campaign);
       });
+  check_names(*model, source);
+  FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});
+  return model;
 }
 
 void end_fresh_programs() { FreshProcesses::instance().end(); }

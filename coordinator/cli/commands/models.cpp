@@ -225,11 +225,17 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
       fmt::format("Draws     {} of {} accepted, for the first {} {}\n",
                   outlook.num_drawn - outlook.num_without_draw, outlook.num_draws,
                   outlook.num_drawn, campaign.num_realisations() > 1 ? "instruments" : "runs");
-  if (outlook.num_without_draw > 0) {
+  const std::uint32_t num_draws_max = campaign.results().num_draws_max;
+  if (outlook.num_without_draw > 0 && num_draws_max == 1) {  // The model has no bounds.
+    text += fmt::format(
+        "Warning   {} of these end without an estimate: a truth or a derived value is no\n"
+        "          number, or beyond {:g}; correct its expression or narrow the laws\n",
+        outlook.num_without_draw, magnitude_max);
+  } else if (outlook.num_without_draw > 0) {
     text += fmt::format(
         "Warning   {} of these find none in {} draws and end without an estimate:\n"
         "          widen the bounds or narrow the laws\n",
-        outlook.num_without_draw, campaign.results().num_draws_max);
+        outlook.num_without_draw, num_draws_max);
   }
   const std::uint64_t each = campaign.num_realisations(), rest = campaign.num_runs % each;
   if (rest > 0) {

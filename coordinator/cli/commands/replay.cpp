@@ -145,6 +145,10 @@ int replay_runs(const ReplayOptions& options, const HeedStop& heed_stop) {
   check_arguments(options);
   const Store store = Store::open_read_only(options.database);
   const Replay replay(store);
+  if (!options.output.empty() && replay.recording().sessions.empty()) {
+    refuse_output(options.output, fmt::format("must be left out: the model {} has no time series",
+                                              store.model_version()));
+  }
   const SignalSelection selection(replay.recording(), options.sessions, options.groups);
   const std::vector<RunResult> results =
       options.run ? std::vector{replay.stored_result(RunIndex{*options.run})}

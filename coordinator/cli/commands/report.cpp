@@ -82,10 +82,9 @@ int print_remote_report(const ReportOptions& options) {
 
 int exit_code_of(const Review& review, const std::vector<StatedRequirement>& stated) {
   const bool are_met = std::ranges::all_of(stated, [&](const StatedRequirement& each) {
-    return answer_to(each, review).check.verdict == RequirementVerdict::met &&
-           review.num_contradicting == 0;
+    return answer_to(each, review).check.verdict == RequirementVerdict::met;
   });
-  return are_met ? exit_done : exit_not_met;
+  return are_met && review.num_contradicting == 0 ? exit_done : exit_not_met;
 }
 
 /// Two texts in one stream would be neither.

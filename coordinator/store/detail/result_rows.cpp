@@ -13,8 +13,8 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/records.hpp"
-#include "coordinator/store/result_columns.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/result_columns.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 

@@ -1,4 +1,3 @@
-#include "core/math/hash.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/model.hpp"
 #include "tests/coordinator/dispatch/dispatch_fixture.hpp"
@@ -23,7 +22,7 @@ class ModelsTest : public DispatchFixture {
     proto::OtherModel& other = *said.add_other_models();
     other.set_version(std::string(model_version));
     other.set_reference_digest(digest);
-    other.set_description_digest(fnv1a(model().description()));
+    other.set_description_digest(model().description_digest());
     return said;
   }
 

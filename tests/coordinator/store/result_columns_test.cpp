@@ -1,8 +1,9 @@
-#include "coordinator/store/result_columns.hpp"
+#include "core/campaign/result_columns.hpp"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -11,6 +12,7 @@ namespace proofmass::coordinator {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAreArray;
 
 using ResultColumns = test::StoreTest;
 
@@ -33,6 +35,18 @@ TEST_F(ResultColumns, AreThoseOfTheTable) {
       EXPECT_TRUE(have_same_bits(*value, row.real(1))) << column.name;
     }
   }
+}
+
+TEST_F(ResultColumns, HaveNamesThatAreAllOfTheTable) {
+  create(1);
+  const detail::Database database(file(), detail::Access::read_only);
+  std::vector<std::string> names;
+  for (detail::Statement row =
+           database.prepare("SELECT name FROM pragma_table_xinfo('run_result')");
+       row.step();) {
+    names.push_back(row.text(0));
+  }
+  EXPECT_THAT(result_column_names(test::schema()), UnorderedElementsAreArray(names));
 }
 
 /// A result with standard errors σ_i = 2^(−10 − i): errors of 1σ, 2σ, 3σ in turn with the run.

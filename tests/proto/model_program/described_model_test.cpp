@@ -4,6 +4,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <bit>
+
+#include "core/campaign/recording.hpp"
+#include "core/campaign/result_columns.hpp"
+#include "core/math/hash.hpp"
 #include "core/model.hpp"
 #include "tests/test.hpp"
 
@@ -107,6 +113,101 @@ TEST(RecordedModel, IsOneForOneText) {
   EXPECT_EQ(ruler(std::string(other.description())).description(), other.description());
 }
 
+// A campaign whose runs took too long goes on with another limit, and its reference runs are the
+// same; what may change a result needs another version.
+TEST(RecordedModel, IsTheSameWithOtherLimits) {
+  const std::uint64_t digest = ruler(description()).description_digest();
+  for (const char* const limit : {R"("purpose": "Measures.")", R"("runs_at_once": 8)",
+                                  R"("run_time_max_s": 7)", R"("memory_max_mib": 100)"}) {
+    EXPECT_EQ(ruler(description(limit)).description_digest(), digest) << limit;
+  }
+  for (const char* const other : {R"("streams": [{"name": "noise"}])",
+                                  R"("parameters": [{"name": "offset_m", "value": 0.25}])"}) {
+    EXPECT_NE(ruler(description(other)).description_digest(), digest) << other;
+  }
+  EXPECT_NE(digest, 0U);
+}
+
+/// Of a program that estimates 1.5 in each run.
+class FixedPlan final : public Plan {
+ public:
+  [[nodiscard]] std::vector<RunResult> simulate_batch(
+      std::span<const RunRequest> requests, InstructionSet,
+      const std::function<void(int)>&) const override {
+    return {{.run = requests.front().run, .truth = {1.0}, .estimate = {1.5}}};
+  }
+  [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink&,
+                                 const std::function<void(int)>&) const override {
+    return simulate_batch({&request, 1}, InstructionSet::scalar, {}).front();
+  }
+  [[nodiscard]] const Recording& recording() const override { return recording_; }
+  [[nodiscard]] int num_steps() const override { return 1; }
+
+ private:
+  const Recording recording_;
+};
+
+// Campaigns that older programs began go on.
+TEST(ReferenceDigest, OfAnOlderProgramHadLimitsInIt) {
+  const auto model_with = [](const std::string& limit) {
+    return std::make_unique<DescribedModel>(
+        description_in(description(limit), "test"), std::nullopt,
+        [](const DescribedCampaign&) { return std::make_unique<const FixedPlan>(); });
+  };
+  const auto before = model_with(R"("run_time_max_s": 2)"), now = model_with(R"("purpose": "P.")");
+  const auto set = InstructionSet::scalar;
+  EXPECT_EQ(now->reference_digest(set), before->reference_digest(set));
+  std::uint64_t former = fnv1a(before->description());
+  for (int run = 0; run < 3; ++run) former = fnv1a(former, std::bit_cast<std::uint64_t>(1.5));
+  EXPECT_NE(former, now->reference_digest(set));
+  ModelRecord record{.version = "ruler-1",
+                     .description = std::string(before->description()),
+                     .reference_digest = former};
+  EXPECT_EQ(current_reference_digest(*now, record), now->reference_digest(set));
+  // Where the program is not, nobody can tell; nor is another result the same.
+  EXPECT_EQ(current_reference_digest(ruler(record.description), record), former);
+  record.reference_digest = 0x1234;
+  EXPECT_EQ(current_reference_digest(*now, record), 0x1234U);
+}
+
+/// What is wrong with the names of a model program.
+std::string name_refusal_of(const std::string& text) {
+  try {
+    check_names(static_cast<const DescribedModel&>(ruler(text)), "p.py: description");
+  } catch (const DefinitionError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Names, AreNotThoseOfColumnsAndFunctions) {
+  for (const char* const name : {"run_index", "status", "num_draws", "loss_cause", "truth_length",
+                                 "estimate_length", "error_length"}) {
+    const std::string more = fmt::format(R"(,{{"name": "{}", "law": "fixed", "value": 1}}])", name);
+    const std::string drawn = R"("drawn": [{"name": "scale", "law": "fixed", "value": 3})" + more;
+    EXPECT_EQ(name_refusal_of(description(drawn)),
+              fmt::format("p.py: description: drawn.{} (must have another name: it is a column of "
+                          "the results)",
+                          name));
+  }
+  EXPECT_EQ(
+      name_refusal_of(description(
+          R"("parameters": [{"name": "offset_m", "value": 1}, {"name": "sqrt", "value": 1}])")),
+      "p.py: description: parameters.sqrt (must have another name: it is a function of "
+      "expressions)");
+  EXPECT_EQ(name_refusal_of(description(R"("quantities": [{"name": "all", "truth": "scale"}])")),
+            "p.py: description: quantities.all (must have another name: requirements say `all "
+            "objectives`)");
+  // Nothing is confused with these.
+  EXPECT_EQ(name_refusal_of(description(R"("quantities": [{"name": "scale", "truth": "scale"},)"
+                                        R"({"name": "status", "truth": "1"}])")),
+            "accepted");
+  const std::vector<std::string> columns = result_column_names(example_results());
+  for (const DrawnQuantity& drawn : model().drawn()) {
+    EXPECT_EQ(std::ranges::count(columns, drawn.name), 0) << drawn.name;
+  }
+}
+
 /// As many quantities, each of which is the next one.
 std::string chain(int count) {
   std::string drawn = R"({"name": "scale", "law": "fixed", "value": 3})";
@@ -180,6 +281,8 @@ TEST(RecordedModel, IsRefusedIfItsDescriptionBreaksARule) {
   } const cases[] = {
       {"DROP TABLE campaign", "description: is no object of JSON"},
       {"[]", "description: is no object of JSON"},
+      {description(R"("purpose": "NaN \" Infinity", "objective": -Infinity)"),
+       "description: has Infinity at character 301, a number that JSON does not have: {"},
       {description(R"("name": "ruler", "name": "ruler")"), "has the key \"name\" twice: {"},
       {description(R"("version": "2")"), "description: of ruler-2"},
       {description(R"("version": "1\u001b[2J")"), "(must be a text of one line"},

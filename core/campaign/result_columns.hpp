@@ -10,7 +10,7 @@
 
 #include "core/campaign/run_result.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass {
 
 /// What is known of a quantity in one run, or of the health of the run.
 enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, fit, health };
@@ -39,4 +39,7 @@ struct ValueColumn {
 /// columns of values of the table `run_result`.
 [[nodiscard]] std::vector<ValueColumn> value_columns(const ResultSchema& schema);
 
-}  // namespace proofmass::coordinator
+/// The names of all columns of that table, with those that no value is in: `run_index`, `status`.
+[[nodiscard]] std::vector<std::string> result_column_names(const ResultSchema& schema);
+
+}  // namespace proofmass

@@ -1,10 +1,11 @@
-#include "coordinator/store/result_columns.hpp"
+#include "core/campaign/result_columns.hpp"
 
 #include <fmt/format.h>
 
 #include <array>
+#include <utility>
 
-namespace proofmass::coordinator {
+namespace proofmass {
 namespace {
 
 void append(std::vector<ValueColumn>& columns, ValueKind kind, std::size_t index,
@@ -39,6 +40,13 @@ std::vector<ValueColumn> value_columns(const ResultSchema& schema) {
   return columns;
 }
 
+std::vector<std::string> result_column_names(const ResultSchema& schema) {
+  std::vector<std::string> names{"run_index",  "status",       "num_draws",   "num_rounds",
+                                 "loss_cause", "loss_session", "correlations"};
+  for (ValueColumn& column : value_columns(schema)) names.push_back(std::move(column.name));
+  return names;
+}
+
 std::string_view name_of(ValueKind kind) {
   constexpr std::array<std::string_view, 6> names{"truth",          "estimate", "error",
                                                   "standard_error", "fit",      "health"};
@@ -56,4 +64,4 @@ std::optional<double> ValueColumn::value_in(const RunResult& result) const {
   return kind == ValueKind::error ? result.error(index) : values[index];
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass
