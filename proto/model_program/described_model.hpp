@@ -66,7 +66,7 @@ struct ProgramQuantity {
 
 /// What a model program says of itself when it is asked.
 struct ProgramDescription {
-  std::string text;     ///< All of it as JSON without blanks, keys in alphabetical order.
+  std::string text;  ///< All of it as JSON without blanks, keys in alphabetical order.
   /// fnv1a() of such a text without the purpose and the limits, which change no result.
   std::uint64_t digest = 0;
   std::string version;  ///< NAME-VERSION, as Model::version().
