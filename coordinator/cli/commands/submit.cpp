@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -187,7 +189,8 @@ void WatchDisplay::update(const proto::StatusReply& status) {
       fmt::print(stream_, "{}", dumped(status_json(status), -1));
       break;
   }
-  std::fflush(stream_);
+  if (std::fflush(stream_) == 0) return;
+  throw Error(fmt::format("standard output: {}", std::strerror(errno)));
 }
 
 void WatchDisplay::show_screen(const proto::StatusReply& status) {

@@ -2,6 +2,7 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/program.hpp"
+#include "core/error.hpp"
 #include "proto/wire/names.hpp"
 #include "tests/coordinator/cli/display_output.hpp"
 #include "tests/proto/wire/requests.hpp"
@@ -108,6 +109,16 @@ TEST(WatchDisplay, DrawsTheTableAgain) {
     for (int i = 0; i < 2; ++i) display.update(status_of("a", 1));
   });
   EXPECT_EQ(text.find("\033[6A"), text.find("\033[J") + 3);
+}
+
+// It would go on for as long as the campaign does.
+TEST(WatchDisplay, EndsIfItCannotBeWritten) {
+  std::FILE* const file = std::fopen("/dev/full", "w");
+  ASSERT_NE(file, nullptr);
+  WatchDisplay display(WatchMode::json, file);
+  EXPECT_EQ(test::message_of<Error>([&] { display.update(status_of("a", 1)); }),
+            "standard output: No space left on device");
+  std::fclose(file);
 }
 
 TEST(WatchDisplay, WritesAnObjectALine) {
