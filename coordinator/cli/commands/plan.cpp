@@ -345,9 +345,9 @@ void print_changed_method(const Campaign& campaign, const std::string& method) {
 void print_former_chance(const Campaign& campaign, const PlanStudy& study) {
   const Planned former = planned(campaign, study, study.scope().num_steps);
   const std::string budget = budget_text(former.bound);
-  print_lines(fmt::format("before, with {} {}: {}{}{}\n", former.num_steps_in_all(),
-                          built_in_model().step_name(), chance_text(former),
-                          budget.empty() ? "" : "; ", budget));
+  print_lines(fitted(fmt::format("before, with {} {}: {}{}{}\n", former.num_steps_in_all(),
+                                 built_in_model().step_name(), chance_text(former),
+                                 budget.empty() ? "" : "; ", budget)));
 }
 
 /// Names the data files that a new campaign file in another folder does not find.
