@@ -148,9 +148,15 @@ class JointStudy final : public PlanStudy {
   [[nodiscard]] const PlanScope& scope() const override { return scope_; }
 
   [[nodiscard]] std::string remedy(std::size_t quantity) const override {
-    const std::string_view what = what_determines(static_cast<Parameter>(quantity));
+    const auto parameter = static_cast<Parameter>(quantity);
+    const std::string_view what = what_determines(parameter);
     if (what.empty()) return "longer sessions";
-    return fmt::format("a session that {}, longer or with a larger amplitude", what);
+    const Scenario& scenario = campaign_.scenario;
+    const PushLimits limits = push_limits(drawn_moments(campaign_.dispersions),
+                                          scenario.objectives[index(Parameter::a_d11_prime)]);
+    return may_be_larger(scenario.sessions, parameter, limits)
+               ? fmt::format("a session that {}, longer or with a larger amplitude", what)
+               : fmt::format("a longer session that {}", what);
   }
 
   [[nodiscard]] std::string limit(std::size_t quantity) const override {

@@ -430,6 +430,28 @@ TEST(Joint, RefusesPushesOfWhichItLeavesOutTooMuch) {
             "makes of it and the model leaves out may move a_d11' by 1/50 of its objective)");
 }
 
+// An amplitude has room below the limit that a campaign file is refused above, in any session.
+TEST(Joint, TellsWhichAmplitudesMayBeLarger) {
+  const PushLimits limits{.alone_along_x = 3e-6, .beside_others = 1.7e-7};
+  const auto shaken = [](Excitation excitation, double amplitude) {
+    excitation.amplitude = amplitude;
+    return excitation;
+  };
+  using enum Parameter;
+  const auto apart = [&](double amplitude_m) {
+    return session_with({shaken(move_along(Axis::y), amplitude_m)});
+  };
+  EXPECT_TRUE(may_be_larger({apart(1.9e-5)}, a_c12, limits));
+  EXPECT_FALSE(may_be_larger({apart(2e-5)}, a_c12, limits));
+  EXPECT_TRUE(may_be_larger({apart(2e-5), apart(1e-5)}, a_c12, limits));
+  EXPECT_FALSE(may_be_larger({apart(1e-5)}, a_c13, limits));
+  EXPECT_FALSE(may_be_larger({apart(1e-5)}, a_c11_delta_x, limits));
+  const Excitation along_x = shaken(push_along(Axis::x), 2e-7);
+  EXPECT_TRUE(may_be_larger({session_with({along_x})}, a_d11_prime, limits));
+  EXPECT_FALSE(may_be_larger({session_with({along_x, push_along(Axis::y)})}, a_d11_prime, limits));
+  EXPECT_TRUE(may_be_larger({session_with({along_x, push_along(Axis::y)})}, a_d12, limits));
+}
+
 TEST(Joint, RefusesRecordsShorterThanAnOrbit) {
   std::vector<Session> sessions = hardy2013_sessions();
   sessions[4].num_orbits = 2;
