@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -149,6 +150,17 @@ const Need* need_of(Parameter parameter) {
   return need == needs.end() ? nullptr : &*need;
 }
 
+/// A limit in as few digits as do not exceed it, so that what the text says is accepted.
+std::string allowed_text(double limit) {
+  std::string text;
+  double shown = std::numeric_limits<double>::infinity();
+  for (int num_digits = 2; shown > limit; ++num_digits) {
+    text = fmt::format("{:.{}g}", limit, num_digits);
+    std::from_chars(text.data(), text.data() + text.size(), shown);
+  }
+  return text;
+}
+
 /// Whether at most one excitation shakes the masses along X.
 bool shakes_x_once(const Session& session) {
   return std::ranges::count_if(session.excitations, [](const Excitation& excitation) {
@@ -258,11 +270,10 @@ void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& 
       throw ConfigError(
           fmt::format("session[{}].excitations[{}].amplitude_m_s2", i, k),
           fmt::format("{}", excitations[k].amplitude),
-          fmt::format(
-              "must be <= {:.2g} for estimation.method = \"joint\"{}: beyond, what K2 makes "
-              "of it and the model leaves out may move a_d11' by 1/50 of its objective",
-              limit_m_s2,
-              shakes_x_once(sessions[i]) ? "" : " beside the session's other excitations"));
+          fmt::format("must be <= {} for estimation.method = \"joint\"{}: beyond, what K2 makes "
+                      "of it and the model leaves out may move a_d11' by 1/50 of its objective",
+                      allowed_text(limit_m_s2),
+                      shakes_x_once(sessions[i]) ? "" : " beside the session's other excitations"));
     }
   }
 }

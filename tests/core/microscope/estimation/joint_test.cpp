@@ -416,9 +416,9 @@ TEST(Joint, RefusesPushesOfWhichItLeavesOutTooMuch) {
     excitation.amplitude = amplitude_m_s2;
     return excitation;
   };
-  EXPECT_EQ(refused({push(Axis::x, 2.9e-6)}), "");
+  EXPECT_EQ(refused({push(Axis::x, 2.99e-6)}), "");
   EXPECT_EQ(refused({push(Axis::x, 3.1e-6)}),
-            "session[0].excitations[0].amplitude_m_s2 = 3.1e-06 (must be <= 3e-06 for "
+            "session[0].excitations[0].amplitude_m_s2 = 3.1e-06 (must be <= 2.99e-06 for "
             "estimation.method = \"joint\": beyond, what K2 makes of it and the model leaves out "
             "may move a_d11' by 1/50 of its objective)");
   EXPECT_EQ(refused({move_along(Axis::y), push(Axis::x, 2.9e-6)}), "");
