@@ -4,9 +4,12 @@
 #include <cmath>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
+#include "coordinator/report/budget_notes.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/table.hpp"
@@ -115,18 +118,14 @@ std::string joint_sentence(const Review& review) {
                      name_of(review.interpretation));
 }
 
-/// What the level of a budget is, and that it is the one of the runs or an assumed one.
-std::string level_sentence(const Review& review) {
-  const ErrorBudget& budget = *review.budget;
+/// Of which runs the level of a budget is, as level_notes() takes it.
+std::string told_level(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
-  const std::string_view unit = review.schema.health.at(review.schema.budget_level).unit;
-  const bool is_told = budget.level < statistics.health.size();
-  const HealthStatistic level = is_told ? statistics.health[budget.level] : HealthStatistic{};
-  if (level.worst == 0.0) {
-    return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
-  }
-  return fmt::format("{} is that of the runs: worst {:.3g}, mean {:.3g} {}; assumed was {:.3g}",
-                     budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
+  const std::size_t of_budget = review.budget->level;
+  if (of_budget >= statistics.health.size()) return {};
+  const HealthStatistic& level = statistics.health[of_budget];
+  if (level.worst == 0.0) return {};
+  return fmt::format("the runs: worst {:.3g}, mean {:.3g}", level.worst, level.mean);
 }
 
 // Published totals, too, add up the worst errors of all parameters, which no single run has.
@@ -139,15 +138,28 @@ std::string totals_sentence(const RunTotals& totals) {
 
 std::vector<std::string> budget_notes(const Review& review) {
   std::vector<std::string> notes{
-      "before: bounds of construction; worst, mean: left by errors of the estimates",
-      level_sentence(review)};
-  std::istringstream lines(review.budget->note);
-  for (std::string line; std::getline(lines, line);) notes.push_back(line);
+      "before: bounds of construction; worst, mean: left by errors of the estimates"};
+  const std::string_view unit = review.schema.health.at(review.schema.budget_level).unit;
+  for (std::string& note : level_notes(*review.budget, unit, told_level(review))) {
+    notes.push_back(std::move(note));
+  }
   if (const auto& totals = review.results.totals) notes.push_back(totals_sentence(*totals));
   return notes;
 }
 
 }  // namespace
+
+std::vector<std::string> level_notes(const ErrorBudget& budget, std::string_view unit,
+                                     std::string_view told) {
+  std::vector<std::string> notes{
+      told.empty()
+          ? fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit)
+          : fmt::format("{} is that of {} {}; assumed was {:.3g}", budget.level_label, told, unit,
+                        budget.assumed_level)};
+  std::istringstream lines(budget.note);
+  for (std::string line; std::getline(lines, line);) notes.push_back(line);
+  return notes;
+}
 
 bool is_biased(const Review& review, std::size_t quantity) {
   const CampaignStatistics& statistics = review.results.statistics;

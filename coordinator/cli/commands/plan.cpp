@@ -16,6 +16,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
+#include "coordinator/report/budget_notes.hpp"
 #include "coordinator/report/json.hpp"
 #include "coordinator/table/table.hpp"
 #include "core/campaign/allocation.hpp"
@@ -43,8 +44,9 @@ struct Planned {
   PlanBound bound;
   std::vector<Quantity> quantities;
   std::vector<double> objectives;
-  std::vector<std::string> others;  ///< Symbols of what has an objective and no bound.
-  std::string note;                 ///< Campaign::note().
+  std::vector<std::string> others;        ///< Symbols of what has an objective and no bound.
+  std::vector<std::string> budget_notes;  ///< Of a campaign with a budget.
+  std::string note;                       ///< Campaign::note().
 
   [[nodiscard]] int num_steps_in_all() const {
     return std::accumulate(num_steps.begin(), num_steps.end(), 0);
@@ -57,6 +59,15 @@ std::string percent_text(double miss) {
   if (miss < 5e-8) return "100";
   const int decimals = static_cast<int>(std::ceil(-std::log10(miss))) - 1;
   return fmt::format("{:.{}f}", 100.0 * (1.0 - miss), std::clamp(decimals, 1, 5));
+}
+
+/// What the mean budget takes for its level, and what else `report` says of the budget.
+std::vector<std::string> budget_notes_of(const Campaign& campaign, const PlanScope& scope) {
+  const std::optional<ErrorBudget> budget = campaign.error_budget();
+  if (!budget) return {};
+  const std::string told =
+      scope.probed_level == 0.0 ? "" : fmt::format("the probed runs: {:.3g}", scope.probed_level);
+  return level_notes(*budget, campaign.results().health.at(budget->level).unit, told);
 }
 
 Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<int> num_steps) {
@@ -76,6 +87,7 @@ Planned planned(const Campaign& campaign, const PlanStudy& study, std::vector<in
           std::move(quantities),
           std::move(objectives),
           std::move(others),
+          budget_notes_of(campaign, study.scope()),
           campaign.note()};
 }
 
@@ -165,6 +177,7 @@ Table bound_table(const Planned& plan) {
       "to be normal, and the chance that all objectives hold is the product of the single ones; "
       "correlated errors can only raise it",
       plan.study.scope().method, plan.study.scope().num_instruments));
+  table.notes.insert(table.notes.end(), plan.budget_notes.begin(), plan.budget_notes.end());
   if (!plan.others.empty()) {
     table.notes.push_back(fmt::format(
         "these objectives have no bound, and a `run` of the campaign tells how often they hold: {}",
@@ -217,6 +230,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"num_misfits", plan.study.scope().num_misfits},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", plan.bound.mean_budget},
+            {"probed_level", plan.study.scope().probed_level},
             {"losses", array_of(plan.bound.losses, of_loss)},
             {"parameters", Json::array()},
             {"sessions", Json::array()}};
@@ -331,9 +345,9 @@ void print_changed_method(const Campaign& campaign, const std::string& method) {
 void print_former_chance(const Campaign& campaign, const PlanStudy& study) {
   const Planned former = planned(campaign, study, study.scope().num_steps);
   const std::string budget = budget_text(former.bound);
-  print_lines(fmt::format("before, with {} {}: {}{}{}\n", former.num_steps_in_all(),
-                          built_in_model().step_name(), chance_text(former),
-                          budget.empty() ? "" : "; ", budget));
+  print_lines(fitted(fmt::format("before, with {} {}: {}{}{}\n", former.num_steps_in_all(),
+                                 built_in_model().step_name(), chance_text(former),
+                                 budget.empty() ? "" : "; ", budget)));
 }
 
 /// Names the data files that a new campaign file in another folder does not find.

@@ -6,18 +6,16 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
-#include "core/math/instruction_set.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
+#include "core/microscope/planning/probed_runs.hpp"
 #include "core/microscope/simulation/run.hpp"
-#include "core/microscope/simulation/run_health.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass {
@@ -27,9 +25,6 @@ namespace {
 /// from one to another.
 constexpr std::uint64_t num_instruments_max = 256;
 
-/// Orbits in which a session's lines are measured, if they can be told apart in so few.
-constexpr int num_measured_orbits = 3;
-
 /// Most orbits of a session that a campaign file may have.
 constexpr int num_session_orbits_max = 10'000;
 
@@ -37,41 +32,6 @@ EstimationMethod method_named(std::string_view name) {
   const auto methods = estimation_methods();
   const auto found = std::ranges::find(methods, name, &EstimationMethodInfo::name);
   return static_cast<EstimationMethod>(found - methods.begin() + 1);
-}
-
-/// Whether the session's record tells all lines apart that are fitted in it, by the method or as
-/// the session's own, and is long against the transient.
-bool tells_lines_apart(const Scenario& scenario, const Session& session) {
-  const double duration_s = session.num_orbits * scenario.orbit.period_s;
-  if (duration_s < 4.0 * scenario.estimation.transient_s) return false;
-  const RecordNeeds needs = joint_needs(session);
-  std::vector<double> lines_hz{0.0};
-  const auto add = [&](const LineMultiple& line) {
-    lines_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
-  };
-  for (const WantedLine& wanted : needs.lines) add(wanted.line);
-  for (const LineMultiple& neighbour : needs.neighbours) add(neighbour);
-  for (const LineMultiple& line : session.fit_lines) add(line);
-  for (const LineMultiple& line : session.known_lines) add(line);
-  std::ranges::sort(lines_hz);
-  for (std::size_t i = 1; i < lines_hz.size(); ++i) {
-    const double difference = (lines_hz[i] - lines_hz[i - 1]) * duration_s;
-    const bool is_same = difference < 1e-6;  // A neighbour may be one of the lines.
-    if (!is_same && difference < 1.0) return false;
-  }
-  return true;
-}
-
-/// The campaign with as few orbits of each session as leave its lines what they are.
-MicroscopeCampaign short_campaign(MicroscopeCampaign campaign) {
-  for (Session& session : campaign.scenario.sessions) {
-    const int num_orbits = session.num_orbits;
-    session.num_orbits = std::min(num_orbits, num_measured_orbits);
-    while (session.num_orbits < num_orbits && !tells_lines_apart(campaign.scenario, session)) {
-      ++session.num_orbits;
-    }
-  }
-  return campaign;
 }
 
 /// A short campaign without noise and without the errors of instruments, which change the
@@ -89,61 +49,6 @@ MicroscopeCampaign measured_campaign(MicroscopeCampaign campaign) {
     session.known_lines.clear();
   }
   return campaign;
-}
-
-/// A run that was simulated, and what became of it.
-struct Probe {
-  RunRecord record;
-  bool is_misfit = false;  ///< Its data do not fit the model, beyond chance.
-};
-
-/// The first runs that have an instrument, with noise and the loops of the campaign.
-std::vector<Probe> probes_of(const MicroscopeCampaign& campaign,
-                             const std::vector<RunIndex>& runs) {
-  // One by one a run takes as long as a batch, a second or more.
-  constexpr std::size_t one_by_one_max = 4;
-  const std::size_t num_max = campaign.scenario.has_plain_loops() ? batch_lanes : one_by_one_max;
-  std::vector<RunRequest> requests;
-  for (std::size_t i = 0; i < std::min(runs.size(), num_max); ++i) {
-    requests.push_back({runs[i], campaign.table_values(runs[i])});
-  }
-  const RunPlan plan(campaign, joint_method);
-  std::vector<Probe> probes;
-  for (RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
-    const RunResult result = plan.estimate(record);
-    const bool is_misfit = !result.fit.empty() && is_beyond_chance(result.fit[0], result.fit[1]);
-    probes.push_back({.record = std::move(record), .is_misfit = is_misfit});
-  }
-  return probes;
-}
-
-/// What the squares of a record would have been, had it been longer.
-void lengthen(LoopMonitor<double>& monitor, double factor) {
-  monitor.quadratic.squares *= factor;
-  monitor.common_square.squares *= factor;
-  for (BlockSteps<double>& steps : monitor.sensor_square) steps.squares *= factor;
-}
-
-/// What a run is lost by.
-/// @param record  That `finding` is of.
-PlanLoss plan_loss(const Scenario& scenario, const HealthRecord& record,
-                   const HealthFinding& finding) {
-  PlanLoss loss{.cause = std::string(name_of(finding.loss.cause)), .session = {}, .detail = {}};
-  if (finding.loss.cause != LossCause::saturation) {
-    loss.session = name_of(finding.loss.session);
-    loss.detail = fmt::format("may move the estimate of {} beyond its objective", loss.session);
-    return loss;
-  }
-  const double range_m_s2 = scenario.sensor.range_m_s2;
-  const auto is_beyond = [range_m_s2](const SessionHealth& health) {
-    return !(health.acceleration_m_s2 <= range_m_s2);
-  };
-  const auto first = std::ranges::find_if(record, is_beyond);
-  const auto i = static_cast<std::size_t>(first - record.begin());
-  loss.session = scenario.sessions[std::min(i, record.size() - 1)].name;
-  loss.detail = fmt::format("a sensor measures more than sensor.range_m_s2 = {} in session {}",
-                            range_m_s2, loss.session);
-  return loss;
 }
 
 // The chance that all objectives hold, in logarithms: they have slopes where it rounds to 0 or 1.
@@ -208,11 +113,10 @@ class JointStudy final : public PlanStudy {
     campaign_.scenario.validate();
     check_joint_campaign(campaign_);
     const Scenario& scenario = campaign_.scenario;
-    const MicroscopeCampaign brief = short_campaign(campaign_);
-    for (const Session& session : brief.scenario.sessions) {
+    const MicroscopeCampaign measured = measured_campaign(short_campaign(campaign_));
+    for (const Session& session : measured.scenario.sessions) {
       measured_orbits_.push_back(session.num_orbits);
     }
-    const MicroscopeCampaign measured = measured_campaign(brief);
     const RunRecord record = RunPlan(measured, joint_method).record(RunIndex{0}, {});
     const DrawnMoments laws = drawn_moments(campaign_.dispersions);
     const EstimationInput input{.sessions = measured.scenario.sessions,
@@ -223,14 +127,15 @@ class JointStudy final : public PlanStudy {
                                 .laws = laws,
                                 .orbit_period_s = scenario.orbit.period_s,
                                 .sample_period_s = scenario.simulation.sample_period_s};
-    probes_ = probes_of(brief, add_instruments(record.phasors, input));
+    probes_.emplace(whole_, add_instruments(record.phasors, input));
     scope_ = {
         .method = std::string(joint_method.name),
         .num_steps_min = joint_orbits_min(scenario.orbit.period_s, scenario.estimation.transient_s),
         .num_steps_max = num_session_orbits_max,
         .num_instruments = instruments_.size(),
-        .num_probed = probes_.size(),
-        .num_misfits = static_cast<std::size_t>(std::ranges::count_if(probes_, &Probe::is_misfit))};
+        .num_probed = probes_->size(),
+        .num_misfits = probes_->num_misfits(),
+        .probed_level = probes_->level_m_s2()};
     for (const Session& session : whole_.scenario.sessions) {
       if (is_test(session)) {
         scope_.num_steps_beside += session.num_orbits;
@@ -244,9 +149,15 @@ class JointStudy final : public PlanStudy {
   [[nodiscard]] const PlanScope& scope() const override { return scope_; }
 
   [[nodiscard]] std::string remedy(std::size_t quantity) const override {
-    const std::string_view what = what_determines(static_cast<Parameter>(quantity));
+    const auto parameter = static_cast<Parameter>(quantity);
+    const std::string_view what = what_determines(parameter);
     if (what.empty()) return "longer sessions";
-    return fmt::format("a session that {}, longer or with a larger amplitude", what);
+    const Scenario& scenario = campaign_.scenario;
+    const PushLimits limits = push_limits(drawn_moments(campaign_.dispersions),
+                                          scenario.objectives[index(Parameter::a_d11_prime)]);
+    return may_be_larger(scenario.sessions, parameter, limits)
+               ? fmt::format("a session that {}, longer or with a larger amplitude", what)
+               : fmt::format("a longer session that {}", what);
   }
 
   [[nodiscard]] std::string limit(std::size_t quantity) const override {
@@ -271,7 +182,7 @@ class JointStudy final : public PlanStudy {
     const std::vector<ParameterArray> errors = standard_errors(num_orbits);
     PlanBound bound{.standard_errors = means(errors),
                     .misses = std::vector<double>(num_parameters),
-                    .losses = losses(num_orbits, errors)};
+                    .losses = probes_->losses(with_lengths(num_orbits).scenario, errors)};
     const double part = 1.0 / static_cast<double>(errors.size());
     const ParameterArray& objectives = campaign_.scenario.objectives;
     for (const ParameterArray& of_instrument : errors) {
@@ -281,7 +192,8 @@ class JointStudy final : public PlanStudy {
       bound.misses_any += part * miss_chance(objectives, of_instrument).miss;
     }
     // A run that is lost misses everything.
-    const double lost = static_cast<double>(bound.num_lost()) / static_cast<double>(probes_.size());
+    const double lost =
+        static_cast<double>(bound.num_lost()) / static_cast<double>(probes_->size());
     for (double& miss : bound.misses) miss += lost * (1.0 - miss);
     bound.misses_any += lost * (1.0 - bound.misses_any);
     if (campaign_.error_budget()) bound.mean_budget = mean_budget(bound.standard_errors);
@@ -301,11 +213,7 @@ class JointStudy final : public PlanStudy {
   }
 
   [[nodiscard]] std::string campaign_file(std::span<const int> num_orbits) const override {
-    MicroscopeCampaign campaign = whole_;
-    std::size_t i = 0;
-    for (Session& session : campaign.scenario.sessions) {
-      if (!is_test(session)) session.num_orbits = num_orbits[i++];
-    }
+    const MicroscopeCampaign campaign = with_lengths(num_orbits);
     campaign.validate();
     return commented_campaign(campaign);
   }
@@ -317,12 +225,14 @@ class JointStudy final : public PlanStudy {
            campaign_.scenario.estimation.transient_s;
   }
 
-  [[nodiscard]] Scenario scenario_of(std::span<const int> num_orbits) const {
-    Scenario scenario = campaign_.scenario;
-    for (std::size_t i = 0; i < num_orbits.size(); ++i) {
-      scenario.sessions[i].num_orbits = num_orbits[i];
+  /// The whole campaign, if the sessions that calibrate had these lengths.
+  [[nodiscard]] MicroscopeCampaign with_lengths(std::span<const int> num_orbits) const {
+    MicroscopeCampaign campaign = whole_;
+    std::size_t i = 0;
+    for (Session& session : campaign.scenario.sessions) {
+      if (!is_test(session)) session.num_orbits = num_orbits[i++];
     }
-    return scenario;
+    return campaign;
   }
 
   /// Of each instrument, if the sessions had these lengths.
@@ -353,34 +263,7 @@ class JointStudy final : public PlanStudy {
   [[nodiscard]] double mean_budget(std::vector<double> errors) const {
     for (double& error : errors) error *= std::sqrt(2.0 / std::numbers::pi);
     const ErrorBudget budget = campaign_.error_budget().value();
-    return budget.after(errors, budget.assumed_level).total;
-  }
-
-  /// What loses probed runs if the sessions have these lengths, most of them first.
-  /// @param errors  Of each instrument.
-  [[nodiscard]] std::vector<PlanLoss> losses(std::span<const int> num_orbits,
-                                             const std::vector<ParameterArray>& errors) const {
-    const Scenario scenario = scenario_of(num_orbits);
-    const ShiftBounds bounds(scenario);
-    std::vector<PlanLoss> losses;
-    for (std::size_t k = 0; k < probes_.size(); ++k) {
-      const RunRecord& probe = probes_[k].record;
-      HealthRecord record = probe.health;
-      for (std::size_t i = 0; i < record.size(); ++i) {
-        lengthen(record[i].monitor, static_cast<double>(num_orbits[i]) / measured_orbits_[i]);
-      }
-      const bool are_usable = std::ranges::all_of(errors[k], is_in_range);
-      const HealthFinding finding =
-          judge_health(scenario, bounds, record, probe.phasors, probe.truth,
-                       are_usable ? std::span<const double>(errors[k]) : std::span<const double>());
-      if (finding.loss.cause == LossCause::none) continue;
-      PlanLoss loss = plan_loss(scenario, record, finding);
-      auto same = std::ranges::find(losses, loss.detail, &PlanLoss::detail);
-      if (same == losses.end()) same = losses.insert(same, std::move(loss));
-      ++same->num_runs;
-    }
-    std::ranges::stable_sort(losses, std::greater<>(), &PlanLoss::num_runs);
-    return losses;
+    return budget.after(errors, scope_.probed_level).total;
   }
 
   /// @return The runs that have these instruments.
@@ -427,7 +310,7 @@ class JointStudy final : public PlanStudy {
   MicroscopeCampaign campaign_;       ///< Of those that calibrate.
   std::vector<int> measured_orbits_;  ///< Of each session: what `instruments_` is of.
   std::vector<JointInformation> instruments_;
-  std::vector<Probe> probes_;  ///< Of the first instruments.
+  std::optional<ProbedRuns> probes_;  ///< Of the first instruments.
   PlanScope scope_;
 };
 

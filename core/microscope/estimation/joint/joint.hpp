@@ -76,6 +76,11 @@ struct PushLimits {
 };
 [[nodiscard]] PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective);
 
+/// Whether what_determines() a parameter could have a larger amplitude in one of the sessions;
+/// false if that is empty.
+[[nodiscard]] bool may_be_larger(const std::vector<Session>& sessions, Parameter parameter,
+                                 const PushLimits& limits);
+
 /// Largest amplitude of a moving mass, m: what it makes of the noise of the estimated attitude is
 /// not in the standard errors (README.md).
 inline constexpr double joint_motion_max_m = 2e-5;

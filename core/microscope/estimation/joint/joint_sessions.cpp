@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -140,14 +142,57 @@ constexpr std::array needs{
          {Parameter::a_c13, Parameter::a_c13}},
     Need{"moves one mass along x", moves_one_along_x, {Parameter::k2d, Parameter::k2c}}};
 
+/// Null for a parameter that every session determines if it is long enough.
+const Need* need_of(Parameter parameter) {
+  const auto* const need = std::ranges::find_if(needs, [&](const Need& each) {
+    return std::ranges::find(each.parameters, parameter) != each.parameters.end();
+  });
+  return need == needs.end() ? nullptr : &*need;
+}
+
+/// A limit in as few digits as do not exceed it, so that what the text says is accepted.
+std::string allowed_text(double limit) {
+  std::string text;
+  double shown = std::numeric_limits<double>::infinity();
+  for (int num_digits = 2; shown > limit; ++num_digits) {
+    text = fmt::format("{:.{}g}", limit, num_digits);
+    std::from_chars(text.data(), text.data() + text.size(), shown);
+  }
+  return text;
+}
+
+/// Whether at most one excitation shakes the masses along X.
+bool shakes_x_once(const Session& session) {
+  return std::ranges::count_if(session.excitations, [](const Excitation& excitation) {
+           return excitation.kind == ExcitationKind::drag_free || tells_of_squares(excitation);
+         }) <= 1;
+}
+
+/// Of an excitation of a session, in its own unit; infinite if `joint` takes any.
+double amplitude_max(const Session& session, const Excitation& excitation,
+                     const PushLimits& limits) {
+  if (excitation.kind == ExcitationKind::test_mass) return joint_motion_max_m;
+  if (!pushes_along_x(excitation)) return std::numeric_limits<double>::infinity();
+  return shakes_x_once(session) ? limits.alone_along_x : limits.beside_others;
+}
+
 }  // namespace
 
 std::string_view what_determines(Parameter parameter) {
-  const auto is_for = [&](const Need& need) {
-    return std::ranges::find(need.parameters, parameter) != need.parameters.end();
-  };
-  const auto* const need = std::ranges::find_if(needs, is_for);
-  return need == needs.end() ? std::string_view() : need->what;
+  const Need* const need = need_of(parameter);
+  return need == nullptr ? std::string_view() : need->what;
+}
+
+bool may_be_larger(const std::vector<Session>& sessions, Parameter parameter,
+                   const PushLimits& limits) {
+  const Need* const need = need_of(parameter);
+  if (need == nullptr) return false;
+  return std::ranges::any_of(sessions, [&](const Session& session) {
+    return std::ranges::any_of(session.excitations, [&](const Excitation& excitation) {
+      return need->is_it(excitation) &&
+             excitation.amplitude < amplitude_max(session, excitation, limits);
+    });
+  });
 }
 
 void check_joint(const std::vector<Session>& sessions) {
@@ -219,21 +264,16 @@ void check_joint_motions(const std::vector<Session>& sessions) {
 void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& limits) {
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     const std::vector<Excitation>& excitations = sessions[i].excitations;
-    if (is_test(sessions[i])) continue;
-    const auto disturbs = [](const Excitation& excitation) {
-      return excitation.kind == ExcitationKind::drag_free || tells_of_squares(excitation);
-    };
-    const bool is_alone = std::ranges::count_if(excitations, disturbs) == 1;
-    const double limit_m_s2 = is_alone ? limits.alone_along_x : limits.beside_others;
     for (std::size_t k = 0; k < excitations.size(); ++k) {
+      const double limit_m_s2 = amplitude_max(sessions[i], excitations[k], limits);
       if (!pushes_along_x(excitations[k]) || excitations[k].amplitude <= limit_m_s2) continue;
       throw ConfigError(
           fmt::format("session[{}].excitations[{}].amplitude_m_s2", i, k),
           fmt::format("{}", excitations[k].amplitude),
-          fmt::format(
-              "must be <= {:.2g} for estimation.method = \"joint\"{}: beyond, what K2 makes "
-              "of it and the model leaves out may move a_d11' by 1/50 of its objective",
-              limit_m_s2, is_alone ? "" : " beside the session's other excitations"));
+          fmt::format("must be <= {} for estimation.method = \"joint\"{}: beyond, what K2 makes "
+                      "of it and the model leaves out may move a_d11' by 1/50 of its objective",
+                      allowed_text(limit_m_s2),
+                      shakes_x_once(sessions[i]) ? "" : " beside the session's other excitations"));
     }
   }
 }

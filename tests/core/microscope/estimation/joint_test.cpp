@@ -416,9 +416,9 @@ TEST(Joint, RefusesPushesOfWhichItLeavesOutTooMuch) {
     excitation.amplitude = amplitude_m_s2;
     return excitation;
   };
-  EXPECT_EQ(refused({push(Axis::x, 2.9e-6)}), "");
+  EXPECT_EQ(refused({push(Axis::x, 2.99e-6)}), "");
   EXPECT_EQ(refused({push(Axis::x, 3.1e-6)}),
-            "session[0].excitations[0].amplitude_m_s2 = 3.1e-06 (must be <= 3e-06 for "
+            "session[0].excitations[0].amplitude_m_s2 = 3.1e-06 (must be <= 2.99e-06 for "
             "estimation.method = \"joint\": beyond, what K2 makes of it and the model leaves out "
             "may move a_d11' by 1/50 of its objective)");
   EXPECT_EQ(refused({move_along(Axis::y), push(Axis::x, 2.9e-6)}), "");
@@ -428,6 +428,28 @@ TEST(Joint, RefusesPushesOfWhichItLeavesOutTooMuch) {
             "session[0].excitations[1].amplitude_m_s2 = 1.8e-07 (must be <= 1.7e-07 for "
             "estimation.method = \"joint\" beside the session's other excitations: beyond, what K2 "
             "makes of it and the model leaves out may move a_d11' by 1/50 of its objective)");
+}
+
+// An amplitude has room below the limit that a campaign file is refused above, in any session.
+TEST(Joint, TellsWhichAmplitudesMayBeLarger) {
+  const PushLimits limits{.alone_along_x = 3e-6, .beside_others = 1.7e-7};
+  const auto shaken = [](Excitation excitation, double amplitude) {
+    excitation.amplitude = amplitude;
+    return excitation;
+  };
+  using enum Parameter;
+  const auto apart = [&](double amplitude_m) {
+    return session_with({shaken(move_along(Axis::y), amplitude_m)});
+  };
+  EXPECT_TRUE(may_be_larger({apart(1.9e-5)}, a_c12, limits));
+  EXPECT_FALSE(may_be_larger({apart(2e-5)}, a_c12, limits));
+  EXPECT_TRUE(may_be_larger({apart(2e-5), apart(1e-5)}, a_c12, limits));
+  EXPECT_FALSE(may_be_larger({apart(1e-5)}, a_c13, limits));
+  EXPECT_FALSE(may_be_larger({apart(1e-5)}, a_c11_delta_x, limits));
+  const Excitation along_x = shaken(push_along(Axis::x), 2e-7);
+  EXPECT_TRUE(may_be_larger({session_with({along_x})}, a_d11_prime, limits));
+  EXPECT_FALSE(may_be_larger({session_with({along_x, push_along(Axis::y)})}, a_d11_prime, limits));
+  EXPECT_TRUE(may_be_larger({session_with({along_x, push_along(Axis::y)})}, a_d12, limits));
 }
 
 TEST(Joint, RefusesRecordsShorterThanAnOrbit) {

@@ -5,6 +5,7 @@
 
 #include "core/campaign/allocation.hpp"
 #include "core/error.hpp"
+#include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/joint/joint.hpp"
@@ -332,6 +333,68 @@ TEST(PlanStudy, ProbesTheLoopsOfTheCampaign) {
     const std::size_t num_lost = saturation == losses.end() ? 0 : saturation->num_runs;
     EXPECT_EQ(num_lost == study->scope().num_probed, is_lost) << num_lost;
   }
+}
+
+/// fixed_campaign() with a test that turns at 0.04 rad/s, between its sessions.
+MicroscopeCampaign tested_campaign() {
+  MicroscopeCampaign campaign = fixed_campaign();
+  Session test;
+  test.name = "turning";
+  test.target = SessionTarget::ep_test;
+  test.num_orbits = 8;
+  test.spin_rate_rad_s = 0.04;
+  std::vector<Session>& sessions = campaign.scenario.sessions;
+  sessions.insert(sessions.begin() + 2, test);
+  return campaign;
+}
+
+// Of every |error| the mean is σ√(2/π). A test at f_EP = 6.5 mHz is left more of the drag than
+// calibrations are, and the campaign file does not know how much.
+TEST(PlanStudy, TakesTheLevelOfTheBudgetFromProbedTests) {
+  MicroscopeCampaign campaign = tested_campaign();
+  campaign.scenario.budget.test_spin_rate_rad_s = 0.04;
+  const auto study = study_plan(campaign);
+  const std::size_t level = budget_level(campaign.scenario);
+  const double of_a_run = RunPlan(campaign).simulate(RunIndex{0}, {}).health[level];
+  ASSERT_GT(of_a_run, 100.0 * campaign.scenario.budget.residual_m_s2);
+  EXPECT_NEAR(study->scope().probed_level / of_a_run, 1.0, 0.03);
+  const PlanBound bound = study->bound(study->scope().num_steps);
+  std::vector<double> errors;
+  for (const double sigma : bound.standard_errors) {
+    errors.push_back(sigma * std::sqrt(2.0 / std::numbers::pi));
+  }
+  errors.resize(errors.size() + num_test_parameters);
+  const ErrorBudget budget = campaign.error_budget().value();
+  EXPECT_NEAR(*bound.mean_budget / budget.after(errors, study->scope().probed_level).total, 1.0,
+              1e-12);
+}
+
+// No session tells what the loop leaves if each is shaken.
+TEST(PlanStudy, AssumesTheLevelThatNoProbedRunTells) {
+  EXPECT_EQ(study_plan(fixed_campaign())->scope().probed_level, 0.0);
+}
+
+// Ω²r = 4.8e-4 m/s² at 0.3 m makes 2 K2 Ω²r = 13 of the scale factor, which turns the loop's sign:
+// in the test alone.
+TEST(PlanStudy, ProbesTestsToo) {
+  MicroscopeCampaign campaign = tested_campaign();
+  campaign.num_runs = 1;
+  for (const char* sensor : {"sensor_1_x", "sensor_2_x"}) {
+    test::fix(campaign, std::string("quadratic_factor_s2_m.") + sensor, 14000.0);
+  }
+  const auto losses = [&] {
+    const auto study = study_plan(campaign);
+    return study->bound(study->scope().num_steps).losses;
+  };
+  EXPECT_TRUE(losses().empty());
+  campaign.scenario.sensor.position_m[0] = 0.3;
+  const std::vector<PlanLoss> found = losses();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].cause, "saturation");
+  EXPECT_EQ(found[0].session, "turning");
+  EXPECT_EQ(found[0].num_runs, batch_lanes);
+  const Loss loss = RunPlan(campaign).simulate(RunIndex{0}, {}).loss;
+  EXPECT_EQ(loss.session, static_cast<std::uint32_t>(SessionTarget::ep_test));
 }
 
 TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
