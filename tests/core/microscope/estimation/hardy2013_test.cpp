@@ -149,6 +149,7 @@ Estimation calibrate(const RunPhasors& record, const EstimationConfig& config,
                                      .config = config,
                                      .objectives = scenario.objectives,
                                      .noise = scenario.noise,
+                                     .attitude = scenario.attitude,
                                      .laws = drawn_moments(nominal_dispersions()),
                                      .orbit_period_s = scenario.orbit.period_s,
                                      .sample_period_s = scenario.simulation.sample_period_s});
