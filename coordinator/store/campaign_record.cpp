@@ -44,10 +44,12 @@ bool is_complete(const Database& database, const proto::CampaignStatus& status) 
 std::optional<std::uint64_t> failures_exceeded(const Database& database,
                                                const proto::CampaignStatus& status) {
   if (status.phase() != proto::CAMPAIGN_PHASE_CANCELLED) return std::nullopt;
-  const auto failures_max =
-      database.first_row("SELECT failures_max FROM campaign").optional_count(0);
-  const std::uint64_t num_failures = status.num_without_estimate() + status.num_given_up();
-  return failures_max && *failures_max < num_failures ? failures_max : std::nullopt;
+  return database
+      .first_row(
+          "SELECT CASE WHEN failures_max < (SELECT count(*) FROM run_failure) +"
+          " (SELECT count(*) FROM run_result WHERE status <> 1) THEN failures_max END"
+          " FROM campaign")
+      .optional_count(0);
 }
 
 }  // namespace
@@ -85,8 +87,9 @@ CampaignRecord peek_campaign(const std::filesystem::path& path, PeekDepth depth)
   proto::CampaignStatus& status = record.status;
   status.set_num_given_up(database.count("SELECT count(*) FROM run_failure"));
   status.set_num_done(database.count("SELECT coalesce(max(num_finished), 0) FROM summary"));
-  status.set_num_without_estimate(
-      database.count("SELECT count(*) FROM run_result WHERE status <> 1"));
+  status.set_num_without_estimate(database.count(
+      "SELECT coalesce(max(num_not_converged + num_not_finite + num_no_draw + num_lost), 0)"
+      " FROM summary"));
   if (const auto failures_max = failures_exceeded(database, status)) {
     status.set_failures_max(*failures_max);
   }
