@@ -123,8 +123,8 @@ std::vector<Part> cause_parts(const Review& review) {
   std::vector<Part> parts;
   if (auto map = cause_map(review)) {
     parts.emplace_back(Markup{
-        "<p>Rows are drawn quantities, true parameters and products of two of them, each less its "
-        "mean; columns are "
+        "<p>Rows are drawn quantities, true parameters and products of two of them, less means "
+        "that are not 0; columns are "
         "the errors with their signs. Cells below four standard errors are empty.</p>\n"});
     parts.emplace_back(NamedPicture{"causes", *std::move(map)});
   }

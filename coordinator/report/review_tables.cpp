@@ -77,7 +77,8 @@ Table cause_table(const Review& review) {
                           term.found.p_value < 1e-9 ? "<10⁻⁹" : figure_text(term.found.p_value)});
   }
   table.notes.push_back(fmt::format(
-      "Computed from {} of {} runs with an estimate{}. Products: of quantities less their means. "
+      "Computed from {} of {} runs with an estimate{}. Products: of quantities less means that are "
+      "not 0. "
       "Of the variance: beyond that of the terms above. p: that chance alone makes one of all "
       "quantities, or of products beyond their "
       "factors, look so.",

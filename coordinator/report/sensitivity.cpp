@@ -162,19 +162,13 @@ std::string not_found_text(const DrawnRuns& drawn) {
       text, drawn.runs.size(), measured_figure(percent));
 }
 
-std::vector<double> less_its_mean(std::vector<double> values) {
-  const double mean = moments(values).mean;
-  for (double& value : values) value -= mean;
-  return values;
-}
-
 /// The values that a term has in the runs, see ExplanatoryTerm.
 std::vector<double> values_of_term(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  std::vector<double> values = less_its_mean(drawn.columns[term.first]);
-  if (!term.second) return values;
-  const std::vector<double> other = less_its_mean(drawn.columns[*term.second]);
+  if (!term.second) return drawn.columns[term.first];
+  std::vector<double> values = factor_values(drawn.columns[term.first]);
+  const std::vector<double> other = factor_values(drawn.columns[*term.second]);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] *= other[i];
-  return less_its_mean(std::move(values));
+  return values;
 }
 
 /// The name of a column, of its square or of the product of two: `truth_gain × truth_offset_m`.
@@ -196,9 +190,9 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
                           {"of variance", false, 13},
                           {"p", false, 11}}};
   table.notes = {
-      fmt::format("{}; products: of quantities less their means; of variance: R², beyond that of "
-                  "the terms above; p: that chance alone makes one of all quantities, or of "
-                  "products of two beyond their factors, look so in {}",
+      fmt::format("{}; products: of quantities less means that are not 0; of variance: R², "
+                  "beyond that of the terms above; p: that chance alone makes one of all "
+                  "quantities, or of products of two beyond their factors, look so in {}",
                   position ? fmt::format("of this run: what the term, less its mean, "
                                          "adds to the error, {}",
                                          info.display_unit)
@@ -207,7 +201,8 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
   for (const ExplanatoryTerm& term : terms) {
     double figure = term.slope;
     if (position) {
-      figure *= values_of_term(drawn, term)[*position] / info.display_scale;
+      const std::vector<double> values = values_of_term(drawn, term);
+      figure *= (values[*position] - moments(values).mean) / info.display_scale;
     }
     table.rows.push_back({term_name(drawn, term), fmt::format("{:.3g}", figure),
                           fmt::format("{:.1f} %", 100.0 * term.share), p_value_cell(term.p_value)});

@@ -54,7 +54,12 @@ using Column = std::span<const double>;
                                                                   double confidence,
                                                                   std::size_t num_outputs);
 
-/// One input, or the product of two, each less its mean, as a term of a sum that explains an
+/// The values of an input as factors of products have them: less their mean where chance alone,
+/// four standard errors, does not make it. A product with a scale factor that is nearly 1 would be
+/// the other factor itself, and that of two quantities about 0 is what makes an error.
+[[nodiscard]] std::vector<double> factor_values(Column input);
+
+/// One input, or the product of two by their factor_values(), as a term of a sum that explains an
 /// output.
 struct ExplanatoryTerm {
   std::size_t first = 0;              ///< Index of the column.
@@ -67,8 +72,7 @@ struct ExplanatoryTerm {
 /// Searches a sum of few terms that explains an output, a term at a time:
 ///
 /// 1. Of all inputs and all products of two inputs, squares among them, the one with the largest
-///    linear correlation with what is left of the output is the candidate. Factors are taken less
-///    their means: a product with a scale factor that is nearly 1 would be the other factor itself.
+///    linear correlation with what is left of the output is the candidate.
 /// 2. It is kept if its p-value times the number of all inputs and products, and times that of the
 ///    outputs that somebody looks at, is below 1 − confidence, and it explains at least
 ///    `term_share_min` of the output's variance. A product must explain more than its factors do:

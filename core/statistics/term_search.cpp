@@ -105,7 +105,7 @@ class TermSearch {
       // Products of values in units of the largest one stay within the range of a double.
       Values scaled(inputs[i].begin(), inputs[i].end());
       for (double& value : scaled) value /= largest;
-      columns_.push_back(centred(scaled));
+      columns_.push_back(factor_values(scaled));
       positions_.push_back(i);
       units_.push_back(largest);
     }
@@ -161,9 +161,9 @@ class TermSearch {
   [[nodiscard]] double p_value_of(const Candidate& candidate, Values values) const {
     Values rest = rest_;
     if (candidate.second) {
-      std::vector<Values> factors{columns_[candidate.first]};
+      std::vector<Values> factors{centred(columns_[candidate.first])};
       if (*candidate.second != candidate.first) {
-        factors.push_back(columns_[*candidate.second]);
+        factors.push_back(centred(columns_[*candidate.second]));
         remove(factors[0], factors[1]);
       }
       for (const Values& factor : factors) {
@@ -233,7 +233,7 @@ class TermSearch {
   double num_outputs_;
   std::vector<std::size_t> positions_;  ///< Of the inputs that vary.
   std::vector<double> units_;
-  std::vector<Values> columns_;  ///< Centred.
+  std::vector<Values> columns_;
   Values output_;
   Values rest_;
   double variance_;
@@ -242,6 +242,17 @@ class TermSearch {
 };
 
 }  // namespace
+
+std::vector<double> factor_values(Column input) {
+  constexpr double num_deviations = 4.0;
+  const Moments moments = proofmass::moments(input);
+  const double chance =
+      num_deviations * moments.standard_deviation / std::sqrt(static_cast<double>(input.size()));
+  Values values(input.begin(), input.end());
+  if (std::abs(moments.mean) <= chance) return values;
+  for (double& value : values) value -= moments.mean;
+  return values;
+}
 
 std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs, Column output,
                                                std::size_t num_max, double confidence,

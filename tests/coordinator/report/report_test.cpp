@@ -436,7 +436,8 @@ TEST_F(StoredRequirement, SaysWhatRunsAfterTheAnswerSpeakAgainst) {
   const Review review =
       read_review(store, test::campaign_of(75), ReviewDepth::matrix, numbered_requirements(texts));
   EXPECT_EQ(review.matrix[0].check.verdict, RequirementVerdict::met);
-  EXPECT_THAT(review_summary(review)[2].text, HasSubstr(". All runs together speak against R1."));
+  EXPECT_THAT(review_summary(review)[2].text,
+              HasSubstr(". All runs together speak against R1, all."));
   EXPECT_EQ(text_of_all(review.matrix[0]),
             "10 of all 75 runs; 6.58 to 23.2 % of all draws, with 95 %: they speak against this "
             "answer, which more runs may change");

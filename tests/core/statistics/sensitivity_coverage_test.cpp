@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <iostream>
-#include <numeric>
 
 #include "core/error.hpp"
 #include "core/random/stream.hpp"
@@ -230,13 +229,9 @@ TEST(ExplanatoryTerms, FitAllTermsAtOnce) {
   Columns inputs = normal_columns(5, 400, {.seed = 72});
   for (double& value : inputs[1]) value = 1e-9 * (value + 3.0);
   for (double& value : inputs[3]) value *= 1e12;
-  const auto difference = [&](std::size_t input, std::size_t i) {
-    const Values& values = inputs[input];
-    return values[i] - std::accumulate(values.begin(), values.end(), 0.0) / 400.0;
-  };
   const auto output = output_of(inputs, [&](std::size_t i) {
-    return 2.0 + 5e9 * inputs[1][i] - 4e-12 * difference(0, i) * difference(3, i) +
-           1.5 * difference(2, i) * difference(2, i);
+    return 2.0 + 5e9 * inputs[1][i] - 4e-12 * inputs[0][i] * inputs[3][i] +
+           1.5 * inputs[2][i] * inputs[2][i];
   });
   const auto terms = terms_of(inputs, output, 5);
   ASSERT_EQ(terms.size(), 3u);
