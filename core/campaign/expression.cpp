@@ -22,7 +22,7 @@ double whole_power(double x, int exponent) {
   return exponent < 0 ? 1.0 / power : power;
 }
 
-constexpr std::string_view square_root = "sqrt", power = "pow";
+constexpr std::string_view square_root_name = "sqrt", power_name = "pow";
 
 /// Reads and evaluates from left to right, one function for each level of precedence.
 class Evaluation {
@@ -123,7 +123,7 @@ class Evaluation {
     if (!is_function(name)) return value_of_(name);
     expect('(');
     const double argument = sum();
-    const double value = name == square_root ? std::sqrt(argument) : power_of(argument);
+    const double value = name == square_root_name ? std::sqrt(argument) : power_of(argument);
     expect(')');
     return value;
   }
@@ -146,7 +146,7 @@ class Evaluation {
 
 }  // namespace
 
-bool is_function(std::string_view name) { return name == square_root || name == power; }
+bool is_function(std::string_view name) { return name == square_root_name || name == power_name; }
 
 double evaluate_expression(std::string_view text,
                            const std::function<double(std::string_view name)>& value_of) {
