@@ -79,11 +79,16 @@ def free_ports(count):
     raise AssertionError("no ports are free")
 
 
-def environment_of(process):
+def told_of(process, what):
+    """A file of the process in /proc; nothing of one that has ended."""
     try:
-        pairs = Path(f"/proc/{process}/environ").read_bytes().split(b"\0")
+        return Path(f"/proc/{process}/{what}").read_bytes()
     except OSError:
-        return {}
+        return b""
+
+
+def environment_of(process):
+    pairs = told_of(process, "environ").split(b"\0")
     return dict(pair.split(b"=", 1) for pair in pairs if b"=" in pair)
 
 
@@ -175,10 +180,9 @@ class Cluster:
             if name is None or node not in (None, name.decode()):
                 continue
             found.add(process)
-            status = Path(f"/proc/{process}/status").read_text()
-            parent = int(re.search(r"PPid:\s*(\d+)", status)[1])
-            if Path(f"/proc/{parent}/comm").read_text().strip() == "slurmstepd":
-                found.add(parent)
+            parent = re.search(rb"PPid:\s*(\d+)", told_of(process, "status"))
+            if parent and told_of(int(parent[1]), "comm").strip() == b"slurmstepd":
+                found.add(int(parent[1]))
         return found
 
     def stop(self):
@@ -280,7 +284,7 @@ class Site:
 
     def kill_coordinator(self):
         for process in self.cluster.processes_of():
-            if Path(f"/proc/{process}/comm").read_text().startswith("proofmass-coord"):
+            if told_of(process, "comm").startswith(b"proofmass-coord"):
                 kill(process)
 
 
