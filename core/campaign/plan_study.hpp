@@ -59,8 +59,8 @@ struct PlanScope {
   /// Of these, those whose data do not fit what the method takes them for: its errors are larger
   /// than the bound.
   std::size_t num_misfits = 0;
-  /// Mean ErrorBudget::level of the probed runs that are not lost, SI; 0 if they tell none, so that
-  /// the assumed one holds.
+  /// ErrorBudget::level by all probed runs that are not lost, fitted together, SI; 0 if they tell
+  /// none, so that the assumed one holds.
   double probed_level = 0.0;
 };
 

@@ -78,8 +78,9 @@ std::optional<WindowSums> window_sums(const SessionPhasors& record) {
   return sums;
 }
 
-/// One-sided density of ½(a_c11Δx G_xx + a_c11Δy G_xy + a_c11Δz G_xz) at f_EP by the noise of the
-/// estimated attitude: (xx x² + xz x z + zz z² + yy y²), x = ½ a_c11Δx and so on; s⁻⁴/Hz.
+/// Factors, s⁻⁴/Hz, of the one-sided density at f_EP that noise of the estimated attitude gives
+/// ½(a_c11Δx G_xx + a_c11Δy G_xy + a_c11Δz G_xz), (m/s²)²/Hz: xx x² + xz x z + zz z² + yy y² with
+/// x = ½ a_c11Δx and so on.
 struct AttitudeNoise {
   double xx = 0.0, xz = 0.0, zz = 0.0, yy = 0.0;
 };
