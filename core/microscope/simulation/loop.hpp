@@ -34,7 +34,8 @@ struct Observation {
   std::array<T, 2> kinematic_S_x;        ///< Γ_App,k + p_k along X, m/s².
   Vector3<T> measured_omega_dot_IS_S;    ///< rad/s².
   Vector3<T> star_tracker_RS_S;          ///< Fused angles with what the session adds to them, rad.
-  AttitudeEstimator<T> attitude;         ///< With the commanded motion still in its angles.
+  Vector3<T> angle_RS_S;                 ///< Estimated, with the commanded motion in it, rad.
+  Vector3<T> omega_RS_S;                 ///< Likewise, rad/s.
 };
 
 /// Whether the largest acceleration and angle are looked at in a sample: in every fourth it costs
@@ -198,7 +199,8 @@ struct Loop {
                                     constants.star_tracker_bias_S_rad + noise.star_tracker_S +
                                     broadcast<T>(shared.attitude_command_S_rad);
     estimator.correct(attitude_gains, observation.star_tracker_RS_S);
-    observation.attitude = estimator;
+    observation.angle_RS_S = estimator.angle_RS_S;
+    observation.omega_RS_S = estimator.omega_RS_S;
     if (watch == Watch::yes) largest_angle = largest_magnitude(estimator.angle_RS_S, largest_angle);
     torque_command_S = controller.advance(attitude_gains, estimator);
     estimator.predict(attitude_gains, observation.measured_omega_dot_IS_S,
@@ -210,8 +212,7 @@ struct Loop {
                                          broadcast<T>(shared.drag_free_command_S_m_s2);
     const Vector3<T>& shaped_input_S = shaping(drag_free_input_S);
     thrust_command_S = drag_free.advance(drag_free_gains, shaped_input_S);
-    hardware.steer(shaped_input_S, observation.attitude.angle_RS_S, thrust_command_S,
-                   torque_command_S);
+    hardware.steer(shaped_input_S, observation.angle_RS_S, thrust_command_S, torque_command_S);
     rotate(satellite.omega_dot_IS_S, attitude_gains.sample_period_s);
     hardware.actuate(constants, omega_IS_S, thrust_command_S, torque_command_S);
     return observation;

@@ -53,7 +53,7 @@ PROOFMASS_INLINE T product_signal(Product kind, const T& common_x, const T& sens
 template <typename T, typename Shared>
 PROOFMASS_INLINE Vector3<T> ground_angle_RS_S(const Observation<T>& observation,
                                               const SharedSampleOf<Shared>& shared) {
-  return observation.attitude.angle_RS_S - broadcast<T>(shared.commanded.angle_RS_S);
+  return observation.angle_RS_S - broadcast<T>(shared.commanded.angle_RS_S);
 }
 
 /// û in the estimated attitude.
@@ -82,8 +82,7 @@ PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>&
   const Vector3<T> common = half * (m1 + m2);
 
   const Vector3<T> angle_RS_S = ground_angle_RS_S(observation, shared);
-  const Vector3<T> omega_IS_S = observation.attitude.omega_RS_S -
-                                broadcast<T>(shared.commanded.omega_RS_S) +
+  const Vector3<T> omega_IS_S = observation.omega_RS_S - broadcast<T>(shared.commanded.omega_RS_S) +
                                 broadcast<T>(shared.omega_IR_R);
   const Vector3<T> radial_S = ground_radial_S(angle_RS_S, shared);
   const auto [g] = gradient_matrix(shared.gradient_s2, radial_S, omega_IS_S,

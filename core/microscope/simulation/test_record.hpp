@@ -94,12 +94,12 @@ struct TestSums {
           T(1.0 / static_cast<double>(test_block_size)) * (rising[s] + falling[s]);
     }
     const T weight = window_weights.at(num_blocks - 1);
-    std::array<T, num_test_signals> weighted;
-    for (std::size_t s = 0; s < num_test_signals; ++s) weighted[s] = weight * means[s];
-    static constexpr auto pairs = test_product_pairs;  // A kernel's own: see batch_kernel-inl.hpp.
-    for (std::size_t k = 0; k < num_test_products; ++k) {
-      const auto [i, j] = pairs[k];
-      products[k] = products[k] + weighted[i] * means[j];
+    std::size_t k = 0;  // Of the products, in the order of test_product_pairs.
+    for (std::size_t i = 0; i < num_test_columns; ++i) {
+      const T weighted = weight * means[i];
+      for (std::size_t j = i; j < num_test_signals; ++j, ++k) {
+        products[k] = products[k] + weighted * means[j];
+      }
     }
     add_step({weight, means[index(TestSignal::common_squared)],
               means[index(TestSignal::common_product)]});
