@@ -69,14 +69,14 @@ struct Group {
   }
 };
 
-std::vector<Group> groups_of(std::span<const double> values) {
+/// @param scale  Of the differences.
+std::vector<Group> groups_of(std::span<const double> values, double mean, double scale) {
   const std::size_t count = values.size();
-  const double mean = compensated_sum(values) / static_cast<double>(count);
   std::vector<Group> groups(std::min(count, num_bootstrap_groups_max));
   std::size_t current = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (i == (current + 1) * count / groups.size()) ++current;
-    const double difference = values[i] - mean;
+    const double difference = (values[i] - mean) * scale;
     groups[current] += {1.0, difference, difference * difference};
   }
   return groups;
@@ -122,12 +122,10 @@ double acceleration(std::span<const Group> groups, const Group& all) {
   double largest = 0.0;
   for (const double value : left_out) largest = std::max(largest, std::abs(mean - value));
   if (largest <= 0.0) return 0.0;
-  // The ratio has no unit. With the largest difference near 1, exactly by a power of two, no cube
-  // leaves the range of a double.
-  const int exponent = std::ilogb(largest);
+  const double scale = scale_of(largest);  // The ratio has no unit.
   CompensatedSum squares, cubes;
   for (const double value : left_out) {
-    const double difference = std::scalbn(mean - value, -exponent);
+    const double difference = (mean - value) * scale;
     squares.add(difference * difference);
     cubes.add(difference * difference * difference);
   }
@@ -141,7 +139,12 @@ std::optional<Interval> bootstrap_deviation_interval(std::span<const double> val
   detail::check_fraction("confidence", confidence);
   detail::check_values("values", values, 0);
   if (values.size() < 3) return std::nullopt;
-  const std::vector<Group> groups = groups_of(values);
+  const double mean = compensated_sum(values) / static_cast<double>(values.size());
+  double largest = 0.0;
+  for (const double value : values) largest = std::max(largest, std::abs(value - mean));
+  const double scale = scale_of(largest);
+  if (scale == 0.0) return Interval{0.0, 0.0, confidence};
+  const std::vector<Group> groups = groups_of(values, mean, scale);
   Group all;
   for (const Group& group : groups) all += group;
   const double estimate = all.standard_deviation();
@@ -152,7 +155,8 @@ std::optional<Interval> bootstrap_deviation_interval(std::span<const double> val
   const double rate = acceleration(groups, all);
   const auto bound = [&](double probability) {
     const double shifted = bias + inverse_normal(probability);
-    return percentile(deviations, normal_cumulative(bias + shifted / (1.0 - rate * shifted)));
+    return percentile(deviations, normal_cumulative(bias + shifted / (1.0 - rate * shifted))) /
+           scale;
   };
   return Interval{bound(0.5 - 0.5 * confidence), bound(0.5 + 0.5 * confidence), confidence};
 }

@@ -25,16 +25,43 @@ TEST(Moments, HaveNoSkewnessOfTwoValuesAndNoKurtosisOfThree) {
   EXPECT_EQ(moments(std::vector<double>{1.0, 4.0, 5.0}).excess_kurtosis, 0.0);
 }
 
-// The fourth powers of 1e80 and of 1e-90 are no doubles.
-TEST(Moments, HaveNoKurtosisBeyondTheRangeOfDoubles) {
-  for (const double scale : {1e80, 1e-90}) {
-    std::vector<double> values = test::normal_column(100, {.seed = 11});
-    std::ranges::for_each(values, [&](double& value) { value *= scale; });
-    EXPECT_EQ(moments(values).excess_kurtosis, 0.0) << scale;
+// Fourth powers of these values are no doubles, and for the smallest two not even squares.
+TEST(Moments, OfAnyScaleHaveTheSameShape) {
+  const std::vector<double> values = test::normal_column(100, {.seed = 11});
+  const Moments about = moments(values);
+  const std::optional<Interval> spread = bootstrap_deviation_interval(values, 0.95);
+  for (const double scale : {0x1p300, 0x1p-300, 0x1p-600, 0x1p-1000}) {
+    std::vector<double> scaled = values;
+    std::ranges::for_each(scaled, [&](double& value) { value *= scale; });
+    const Moments same = moments(scaled);
+    EXPECT_EQ(same.mean, scale * about.mean);
+    EXPECT_EQ(same.standard_deviation, scale * about.standard_deviation);
+    EXPECT_EQ(same.rms, scale * about.rms);
+    EXPECT_EQ(same.skewness, about.skewness);
+    EXPECT_EQ(same.excess_kurtosis, about.excess_kurtosis);
+    const std::optional<Interval> interval = bootstrap_deviation_interval(scaled, 0.95);
+    EXPECT_EQ(interval->lower, scale * spread->lower);
+    EXPECT_EQ(interval->upper, scale * spread->upper);
   }
 }
 
-// A plain sum of these returns 0: the first 1 drowns in 1e16, and with it goes all that is left.
+// A centre from before the values were known may be of another size than they are.
+TEST(Moments, SeenOneByOneMayBeFarAboveTheirCentre) {
+  std::vector<double> values = test::normal_column(100, {.seed = 12});
+  std::ranges::for_each(values, [](double& value) { value *= 1e60; });
+  values[0] = 1e-90;
+  for (const double centre : {0.0, values[0]}) {
+    MomentSums sums(centre);
+    for (const double value : values) sums.add(value);
+    const Moments seen = sums.moments(), about = moments(values);
+    EXPECT_NEAR(seen.mean, about.mean, 1e-15 * about.standard_deviation);
+    EXPECT_NEAR(seen.standard_deviation, about.standard_deviation,
+                1e-15 * about.standard_deviation);
+    EXPECT_NEAR(seen.skewness, about.skewness, 1e-13);
+    EXPECT_NEAR(seen.excess_kurtosis, about.excess_kurtosis, 1e-13);
+  }
+}
+
 TEST(CompensatedSum, KeepsWhatAPlainSumLoses) {
   const std::vector<double> terms{1.0, 1e16, 1.0, -1e16};
   double plain = 0.0;
