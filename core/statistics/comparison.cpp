@@ -77,34 +77,52 @@ double law_p_value(std::uint64_t m, std::uint64_t n, std::uint64_t distance) {
   return kolmogorov_upper(root * static_cast<double>(distance) / product);
 }
 
-}  // namespace
-
-// Welch's t with the degrees of freedom of Satterthwaite.
-UnpairedComparison compare_means(const Moments& first, const Moments& second, double confidence) {
-  detail::check_fraction("confidence", confidence);
-  UnpairedComparison comparison;
+/// With the degrees of freedom of Satterthwaite.
+StandardError welch_error(const Moments& first, const Moments& second) {
   const auto squared_error = [](const Moments& one) {
     return one.standard_deviation * one.standard_deviation / static_cast<double>(one.count);
   };
-  const double a = squared_error(first);
-  const double b = squared_error(second);
-  comparison.mean_difference = second.mean - first.mean;
-  if (a + b <= 0.0) {
-    comparison.mean_p_value = comparison.mean_difference == 0.0 ? 1.0 : 0.0;
-    comparison.p_value = comparison.mean_p_value;
-    return comparison;
-  }
+  const double a = squared_error(first), b = squared_error(second);
+  if (a + b <= 0.0) return {};
   // From the shares of the squared error: the square of a large one leaves the range of a double.
-  const double share_a = a / (a + b);
-  const double share_b = b / (a + b);
-  const double degrees = 1.0 / (share_a * share_a / (static_cast<double>(first.count) - 1.0) +
-                                share_b * share_b / (static_cast<double>(second.count) - 1.0));
-  const double error = std::sqrt(a + b);
-  const double half_width = student_quantile(0.5 + 0.5 * confidence, degrees) * error;
-  comparison.mean_p_value = student_two_sided(comparison.mean_difference / error, degrees);
-  comparison.interval = Interval{comparison.mean_difference - half_width,
-                                 comparison.mean_difference + half_width, confidence};
+  const double share_a = a / (a + b), share_b = b / (a + b);
+  return {std::sqrt(a + b), 1.0 / (share_a * share_a / (static_cast<double>(first.count) - 1.0) +
+                                   share_b * share_b / (static_cast<double>(second.count) - 1.0))};
+}
+
+}  // namespace
+
+double student_p_value(double mean, const StandardError& error) {
+  if (error.value <= 0.0) return mean == 0.0 ? 1.0 : 0.0;
+  return student_two_sided(mean / error.value, error.degrees);
+}
+
+StandardError pooled_error(const Moments& first, const Moments& second) {
+  const auto m = static_cast<double>(first.count), n = static_cast<double>(second.count);
+  const double variance = ((m - 1.0) * first.standard_deviation * first.standard_deviation +
+                           (n - 1.0) * second.standard_deviation * second.standard_deviation) /
+                          (m + n - 2.0);
+  return {std::sqrt(variance * (1.0 / m + 1.0 / n)), m + n - 2.0};
+}
+
+UnpairedComparison compare_means(const Moments& first, const Moments& second, double confidence) {
+  detail::check_fraction("confidence", confidence);
+  UnpairedComparison comparison;
+  comparison.mean_difference = second.mean - first.mean;
+  comparison.mean_p_value = 0.0;
+  double half_width = 0.0;
+  for (const StandardError& of : {welch_error(first, second), pooled_error(first, second)}) {
+    comparison.mean_p_value =
+        std::max(comparison.mean_p_value, student_p_value(comparison.mean_difference, of));
+    if (of.value <= 0.0) continue;
+    half_width =
+        std::max(half_width, student_quantile(0.5 + 0.5 * confidence, of.degrees) * of.value);
+  }
   comparison.p_value = comparison.mean_p_value;
+  if (half_width > 0.0) {
+    comparison.interval = Interval{comparison.mean_difference - half_width,
+                                   comparison.mean_difference + half_width, confidence};
+  }
   return comparison;
 }
 

@@ -81,21 +81,8 @@ std::vector<double> scale_differences(std::span<const double> first,
   return differences;
 }
 
-/// Student's t, two-sided: is a mean 0?
-double student_p_value(double mean, double standard_error, double degrees) {
-  if (standard_error <= 0.0) return mean == 0.0 ? 1.0 : 0.0;
-  return student_two_sided(mean / standard_error, degrees);
-}
-
-/// Student's t with one scatter for both, which they have if nothing changes. With a scatter of its
-/// own, a small campaign that happens to have no rare value would seem too sure of its mean.
 double pooled_p_value(const Moments& first, const Moments& second) {
-  const auto m = static_cast<double>(first.count), n = static_cast<double>(second.count);
-  const double variance = ((m - 1.0) * first.standard_deviation * first.standard_deviation +
-                           (n - 1.0) * second.standard_deviation * second.standard_deviation) /
-                          (m + n - 2.0);
-  return student_p_value(second.mean - first.mean, std::sqrt(variance * (1.0 / m + 1.0 / n)),
-                         m + n - 2.0);
+  return student_p_value(second.mean - first.mean, pooled_error(first, second));
 }
 
 /// Is the mean of differences 0? Wilcoxon's test asks whether they are symmetric about it, too.
@@ -106,7 +93,7 @@ double paired_p_value(const std::vector<double>& differences) {
   const double by_rank = is_small ? rank_test_p_value(differences) : 0.0;
   if (differences.size() < 2) return by_rank;
   return std::max(by_rank,
-                  student_p_value(about.mean, about.standard_deviation / std::sqrt(n), n - 1.0));
+                  student_p_value(about.mean, {about.standard_deviation / std::sqrt(n), n - 1.0}));
 }
 
 }  // namespace
@@ -139,9 +126,7 @@ ChangePValues compare_errors(std::span<const double> first, std::span<const doub
         compare_unpaired(distances(first, centre), distances(second, centre), default_confidence)
             .p_value;
   } else {
-    const Moments a = moments(first), b = moments(second);
-    changes.location =
-        std::max(compare_means(a, b, default_confidence).p_value, pooled_p_value(a, b));
+    changes.location = compare_means(moments(first), moments(second), default_confidence).p_value;
     changes.scale = pooled_p_value(scale_moments(first), scale_moments(second));
   }
   return changes;

@@ -30,12 +30,11 @@ struct ChangePValues {
 };
 
 /// Of campaigns with draws of their own, two errors at least each. The tail: Fisher's exact test of
-/// the counts beyond tail_limit(). From num_welch_min errors on either side on, Student's t of the
-/// errors, the larger p-value of Welch's and that with one scatter for both; and with one scatter
-/// of their distances from the mean, with the scatter that holds for skew laws, too (Levene's test;
-/// README.md compares it with others). Of fewer errors compare_unpaired() of the
-/// errors and of |error − mean of both campaigns|: a large change of the bias then shows as one of
-/// the scale too.
+/// the counts beyond tail_limit(). From num_welch_min errors on either side on, compare_means() of
+/// the errors, and Student's t with one scatter of their distances from the mean, with the scatter
+/// that holds for skew laws, too (Levene's test; README.md compares it with others). Of fewer
+/// errors compare_unpaired() of the errors and of |error − mean of both campaigns|: a large change
+/// of the bias then shows as one of the scale too.
 [[nodiscard]] ChangePValues compare_errors(std::span<const double> first,
                                            std::span<const double> second);
 

@@ -240,14 +240,21 @@ def rank_test(a, b):
 
 def compare_unpaired(a, b, confidence):
     first, second = columns[a], columns[b]
-    welch = scipy.stats.ttest_ind(second, first, equal_var=False)
+    p_value = max(scipy.stats.ttest_ind(second, first, equal_var=equal).pvalue
+                  for equal in (False, True))
     m, s = zip(*[exact_moments(c)[:2] for c in (first, second)])
     e = [float(deviation) ** 2 / len(c) for deviation, c in zip(s, (first, second))]
     degrees = sum(e) ** 2 / (e[0] ** 2 / (len(first) - 1) + e[1] ** 2 / (len(second) - 1))
-    half = student_quantile(0.5 + 0.5 * float(confidence), degrees) * math.sqrt(sum(e))
+    rest = len(first) + len(second) - 2
+    variance = sum(float(deviation) ** 2 * (len(c) - 1)
+                   for deviation, c in zip(s, (first, second))) / rest
+    pooled = variance * (1 / len(first) + 1 / len(second))
+    level = 0.5 + 0.5 * float(confidence)
+    half = max(student_quantile(level, degrees) * math.sqrt(sum(e)),
+               student_quantile(level, rest) * math.sqrt(pooled))
     law = scipy.stats.ks_2samp(first, second, mode="exact")
     difference = m[1] - m[0]
-    return (difference, difference - half, difference + half, welch.pvalue, law.statistic,
+    return (difference, difference - half, difference + half, p_value, law.statistic,
             law.pvalue)
 
 
