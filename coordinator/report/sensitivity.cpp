@@ -158,7 +158,7 @@ std::string not_found_text(const DrawnRuns& drawn) {
   }
   return fmt::format(
       "{}: {} runs find a quantity that explains {} % of its variance in half of the cases, a "
-      "product less often",
+      "product, or what varies by a few draws far out, less often",
       text, drawn.runs.size(), measured_figure(percent));
 }
 

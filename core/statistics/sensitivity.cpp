@@ -40,24 +40,36 @@ double sum_of_squares(std::span<const double> values) {
   return sum.value();
 }
 
-// Half the squared differences of neighbours, added up. The first and the last one count half as
-// much again, as the values at the ends have one neighbour only.
-double sum_of_differences(std::span<const double> values) {
+/// Where parts of the order along an input end. Neighbours on both sides of a border are none.
+using Borders = std::vector<std::size_t>;
+
+// Half the squared differences of neighbours, added up. The first and the last one of a part count
+// half as much again, as the values at the ends have one neighbour only.
+double sum_of_differences(std::span<const double> values, const Borders& borders) {
   const auto half_square = [&](std::size_t i) {
     const double difference = values[i + 1] - values[i];
     return 0.5 * difference * difference;
   };
   CompensatedSum sum;
-  for (std::size_t i = 0; i + 1 < values.size(); ++i) sum.add(half_square(i));
-  sum.add(0.5 * half_square(0));
-  sum.add(0.5 * half_square(values.size() - 2));
+  std::size_t first = 0;
+  for (const std::size_t end : borders) {
+    for (std::size_t i = first; i + 1 < end; ++i) sum.add(half_square(i));
+    if (end - first > 1) {
+      sum.add(0.5 * half_square(first));
+      sum.add(0.5 * half_square(end - 2));
+    }
+    first = end;
+  }
   return sum.value();
 }
 
-/// A value minus the mean of its neighbours, two on either side where there are as many.
-double local_residual(std::span<const double> values, std::size_t i) {
-  const std::size_t first = i - std::min(i, num_neighbours);
-  const std::size_t last = std::min(i + num_neighbours, values.size() - 1);
+/// A value minus the mean of its neighbours in [begin, end), two on either side where there are as
+/// many; 0 without any.
+double local_residual(std::span<const double> values, std::size_t i, std::size_t begin,
+                      std::size_t end) {
+  const std::size_t first = std::max(begin + num_neighbours, i) - num_neighbours;
+  const std::size_t last = std::min(i + num_neighbours, end - 1);
+  if (first == last) return 0.0;
   double sum = 0.0;
   for (std::size_t j = first; j <= last; ++j) {
     if (j != i) sum += values[j];
@@ -69,13 +81,18 @@ double local_residual(std::span<const double> values, std::size_t i) {
 // all, is ψ = ((1 − index)(y − ȳ)² − (y − m(x))²)/v. Products of neighbours, whose sum is not an
 // influence of single runs, add w²/v². The mean of four neighbours in place of m(x) has the
 // variance w/4, which makes Σψ² larger by (2 ε m̂)² = 4·w²/4 a run: just these w²/v².
-double standard_error_of(double index, double variance, std::span<const double> differences) {
+double standard_error_of(double index, double variance, std::span<const double> differences,
+                         const Borders& borders) {
   const auto n = static_cast<double>(differences.size());
   std::vector<double> influences(differences.size());
-  for (std::size_t i = 0; i < differences.size(); ++i) {
-    const double residual = local_residual(differences, i);
-    influences[i] =
-        ((1.0 - index) * differences[i] * differences[i] - residual * residual) / variance;
+  std::size_t begin = 0;
+  for (const std::size_t end : borders) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const double residual = local_residual(differences, i, begin, end);
+      influences[i] =
+          ((1.0 - index) * differences[i] * differences[i] - residual * residual) / variance;
+    }
+    begin = end;
   }
   centre(influences);
   return std::sqrt(sum_of_squares(influences) / (n * (n - num_lost_degrees)));
@@ -105,38 +122,76 @@ Ranks ranks_of(Column column) {
   return ranks;
 }
 
+/// How the order along an input is cut.
+struct Cuts {
+  Borders bins;   ///< Of the test: of equal counts, but a value that fills one is one by itself.
+  Borders parts;  ///< So many equal values or more are one, and so is what lies between.
+};
+constexpr std::size_t part_size_min = 5;
+
+void sort_once(Borders& borders) {
+  std::ranges::sort(borders);
+  borders.erase(std::ranges::unique(borders).begin(), borders.end());
+}
+
+Cuts cuts_of(std::span<const std::size_t> order, Column input) {
+  const std::size_t n = order.size(), num_bins = num_bins_for(n);
+  Cuts cuts;
+  for (std::size_t bin = 0; bin < num_bins; ++bin) {
+    cuts.bins.push_back((bin + 1) * n / num_bins);
+  }
+  for (std::size_t first = 0, end = 0; first < n; first = end) {
+    while (end < n && input[order[end]] == input[order[first]]) ++end;
+    if (end - first >= part_size_min) cuts.parts.insert(cuts.parts.end(), {first, end});
+    if (end - first < n / num_bins) continue;
+    std::erase_if(cuts.bins, [&](std::size_t at) { return at > first && at < end; });
+    cuts.bins.insert(cuts.bins.end(), {first, end});
+  }
+  std::erase(cuts.bins, 0);
+  sort_once(cuts.bins);
+  sort_once(cuts.parts);
+  std::size_t begin = 0;
+  std::erase_if(cuts.parts, [&](std::size_t at) {
+    if (at - begin < part_size_min || n - at < part_size_min) return true;
+    begin = at;
+    return false;
+  });
+  cuts.parts.push_back(n);
+  return cuts;
+}
+
 // H = (n − 1) Σ(squared mean rank deviation of a bin · its size)/Σ(rank − mean)², by the chi-square
-// law; bins of equal counts along the input.
-double dependence_p_value(std::span<const std::size_t> order, const Ranks& output) {
-  const std::size_t num_bins = num_bins_for(order.size());
+// law.
+double dependence_p_value(std::span<const std::size_t> order, const Borders& bins,
+                          const Ranks& output) {
   const auto n = static_cast<double>(order.size());
   const double mean = 0.5 * (n + 1.0);
   CompensatedSum between;
-  for (std::size_t bin = 0; bin < num_bins; ++bin) {
-    const std::size_t first = bin * order.size() / num_bins;
-    const std::size_t end = (bin + 1) * order.size() / num_bins;
+  std::size_t first = 0;
+  for (const std::size_t end : bins) {
     double sum = 0.0;  // Of halves: exact.
     for (std::size_t i = first; i < end; ++i) sum += output.values[order[i]] - mean;
     between.add(sum * sum / static_cast<double>(end - first));
+    first = end;
   }
   const double statistic = (n - 1.0) * between.value() / output.square_sum;
-  return chi_square_above(statistic, static_cast<double>(num_bins) - 1.0);
+  return chi_square_above(statistic, static_cast<double>(bins.size()) - 1.0);
 }
 
 /// @pre Both columns vary and have sensitivity_values_min values.
-FirstOrderIndex index_of(std::span<const std::size_t> order, Column output, const Ranks& ranks,
-                         double confidence) {
+FirstOrderIndex index_of(std::span<const std::size_t> order, const Cuts& cuts, Column output,
+                         const Ranks& ranks, double confidence) {
   const auto n = static_cast<double>(order.size());
   std::vector<double> differences(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) differences[i] = output[order[i]];
   centre(differences);
   const double variance = sum_of_squares(differences) / (n - 1.0);
-  const double index = 1.0 - sum_of_differences(differences) / n / variance;
-  const double standard_error = standard_error_of(index, variance, differences);
+  const double index = 1.0 - sum_of_differences(differences, cuts.parts) / n / variance;
+  const double standard_error = standard_error_of(index, variance, differences, cuts.parts);
   return {.index = index,
           .standard_error = standard_error,
           .interval = interval_of(index, standard_error, n, confidence),
-          .p_value = dependence_p_value(order, ranks)};
+          .p_value = dependence_p_value(order, cuts.bins, ranks)};
 }
 
 /// Ranks of each output; none for one that does not vary.
@@ -181,14 +236,16 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
     detail::check_values("input", inputs[i], sensitivity_values_min);
     if (!detail::varies(inputs[i])) continue;
     const std::vector<std::size_t> order = ascending_order(inputs[i]);
+    const Cuts cuts = cuts_of(order, inputs[i]);
     const std::vector<double> ranks = average_ranks(inputs[i]);
     for (std::size_t j = 0; j < outputs.size(); ++j) {
       if (output_ranks[j].values.empty()) continue;
       const auto of_ranks = linear_correlation(ranks, output_ranks[j].values);
       if (!of_ranks) continue;
-      all[j].push_back({.input = i,
-                        .rank_correlation = *of_ranks,
-                        .first_order = index_of(order, outputs[j], output_ranks[j], confidence)});
+      all[j].push_back(
+          {.input = i,
+           .rank_correlation = *of_ranks,
+           .first_order = index_of(order, cuts, outputs[j], output_ranks[j], confidence)});
     }
   }
   for (std::vector<Sensitivity>& of_output : all) {

@@ -213,18 +213,34 @@ def first_order_index(x, y, confidence):
     mean = exact_moments(columns[y])[0]
     y = [mpmath.mpf(float(v)) - mean for v in ranked]
     n = len(y)
-    squares = [(b - a) ** 2 / 2 for a, b in zip(y, y[1:])]
+    # Five equal inputs or more are a part, unless five values do not remain beside them.
+    levels = np.flatnonzero(np.diff(np.sort(columns[x]))) + 1
+    runs = list(zip([0, *levels], [*levels, n]))
+    parts = [0]
+    for at in sorted({place for a, b in runs if b - a >= 5 for place in (a, b)}):
+        if at - parts[-1] >= 5 and n - at >= 5:
+            parts.append(at)
+    parts = [y[a:b] for a, b in zip(parts, parts[1:] + [n])]
+    squares = []
+    for part in parts:
+        steps = [(b - a) ** 2 / 2 for a, b in zip(part, part[1:])]
+        squares += steps + [steps[0] / 2, steps[-1] / 2]
     variance = sum(v * v for v in y) / (n - 1)
-    rest = (sum(squares) + (squares[0] + squares[-1]) / 2) / n / variance
+    rest = sum(squares) / n / variance
     influences = []
-    for i, v in enumerate(y):
-        near = y[max(i - 2, 0):i] + y[i + 1:i + 3]
-        influences.append((rest * v * v - (v - sum(near) / len(near)) ** 2) / variance)
+    for part in parts:
+        for i, v in enumerate(part):
+            near = part[max(i - 2, 0):i] + part[i + 1:i + 3]
+            influences.append((rest * v * v - (v - sum(near) / len(near)) ** 2) / variance)
     mean = sum(influences) / n
     error = mpmath.sqrt(sum((i - mean) ** 2 for i in influences) / (n * (n - 6)))
     half = student_quantile(0.5 + 0.5 * float(confidence), n - 6) * error / rest
     bins = min(max(math.isqrt(n) // 2, 4), 64)
-    edges = [b * n // bins for b in range(bins + 1)]
+    edges = {b * n // bins for b in range(bins + 1)}
+    for a, b in runs:
+        if b - a >= n // bins:
+            edges = {at for at in edges if at <= a or at >= b} | {a, b}
+    edges = sorted(edges)
     test = scipy.stats.kruskal(*[ranked[a:b] for a, b in zip(edges, edges[1:])])
     return (1 - rest, error, 1 - rest * mpmath.exp(half), 1 - rest * mpmath.exp(-half),
             test.pvalue)

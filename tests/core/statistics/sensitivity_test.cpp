@@ -46,6 +46,42 @@ TEST(FirstOrderIndex, NeedsValuesThatVary) {
   EXPECT_FALSE(test::first_order_index(std::vector<double>(16, 1.0), x, 0.95).has_value());
 }
 
+/// 1 in a share of the runs, else 0; in a hundredth of them 2, if `has_third`.
+std::vector<double> levels(double share, std::uint64_t seed, bool has_third) {
+  return test::column_of(1000, {.seed = seed}, [=](double u) {
+    return has_third && u > 0.99 ? 2.0 : (u < share ? 1.0 : 0.0);
+  });
+}
+
+// In ten of 1,000 runs a switch is thrown, and the ten worst magnitudes are those.
+TEST(FirstOrderIndex, TakesALevelOfAnInputForItself) {
+  const std::vector<double> noise = test::normal_column(1000, {.seed = 47});
+  for (const bool has_third : {false, true}) {
+    const std::vector<double> thrown = levels(0.01, 48, has_third);
+    std::vector<double> magnitudes;
+    for (std::size_t i = 0; i < noise.size(); ++i) {
+      magnitudes.push_back(std::abs(noise[i]) + (thrown[i] == 1.0 ? 100.0 : 0.0));
+    }
+    const FirstOrderIndex found = *test::first_order_index(thrown, magnitudes, 0.95);
+    EXPECT_LT(found.p_value, 1e-6) << has_third;
+    // Of |x| of a normal x the variance is 1 − 2/π.
+    const double share = 0.01 * 0.99 * 1e4;
+    EXPECT_NEAR(found.index, share / (share + 1.0 - 2.0 / std::numbers::pi), 2e-3) << has_third;
+  }
+}
+
+// 2,000 inputs of two and three levels, one of them rare, without influence: 5 % ± 3 · 0.5 %.
+TEST(FirstOrderIndex, OfLevelsWithoutInfluenceIsRarelyFound) {
+  const std::vector<double> noise = test::normal_column(1000, {.seed = 49});
+  int num_found = 0;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const std::vector<double> input = levels(i % 4 < 2 ? 0.01 : 0.3, 100 + i, i % 2 == 1);
+    if (test::first_order_index(input, noise, 0.95)->p_value < 0.05) ++num_found;
+  }
+  EXPECT_GE(num_found, 70);
+  EXPECT_LE(num_found, 130);
+}
+
 // Drawn: three quantities and a fixed one. Outputs: an error, its magnitude, a constant.
 class SensitivitiesOfAnError : public testing::Test {
  protected:
