@@ -276,6 +276,12 @@ Requirement detail::read_requirement(Phrase& phrase) {
   requirement.tolerance.coverage = phrase.percentage();
   phrase.expect("with");
   requirement.tolerance.confidence = phrase.percentage();
+  if (requirement.tolerance.confidence < 0.5) {
+    phrase.refuse(
+        fmt::format("a confidence of {}% must be at least 50%: with less, the same runs "
+                    "would show a requirement and its contrary",
+                    100.0 * requirement.tolerance.confidence));
+  }
   return requirement;
 }
 

@@ -294,7 +294,7 @@ def byte_order_marks_and_line_ends_of_windows_are_read(site):
     windows("options.toml", "[check]\njson = true\n")
     site.done("--config", "options.toml", "check", "c.toml")
     windows("requirements.toml", '[[requirements]]\nid = "R1"\ntext = "text"\n'
-            'requirement = "all objectives for 1% with 5%"\n')
+            'requirement = "all objectives for 1% with 50%"\n')
     code, errors = site.ends("report", "c.db", "--requirements", "requirements.toml")
     assert code in (0, 3), errors
     site.done("keygen", "windows")

@@ -358,12 +358,12 @@ TEST(MatrixRequirements, AreTheObjectivesIfThereAreNone) {
 TEST(MatrixRequirements, KeepTheirOrderAndEndWithAllObjectivesIfThatIsNotAmongThem) {
   const std::vector<double> objectives = ones();
   const auto two = matrix_requirements(
-      test::schema(), {stated("all objectives for 99% with 95%"), stated("k2c < 1 for 9% with 9%")},
-      objectives);
+      test::schema(),
+      {stated("all objectives for 99% with 95%"), stated("k2c < 1 for 9% with 90%")}, objectives);
   ASSERT_EQ(two.size(), 2U);
   EXPECT_EQ(two[0].requirement, "all objectives for 99% with 95%");
   const auto added =
-      matrix_requirements(test::schema(), {stated("k2c < 1 for 9% with 9%")}, objectives);
+      matrix_requirements(test::schema(), {stated("k2c < 1 for 9% with 90%")}, objectives);
   ASSERT_EQ(added.size(), 2U);
   EXPECT_EQ(added[1].requirement, "all objectives for 95% with 90%");
   const std::vector<double> none(num_parameters, std::numeric_limits<double>::infinity());

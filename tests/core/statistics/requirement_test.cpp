@@ -58,6 +58,14 @@ TEST(ParseRequirement, RefusesNumbersOutsideTheirRange) {
             "requirement = k2c < 1 for 100% with 9% (100% must be above 0% and below 100%)");
 }
 
+// Of 300 runs 5 exceed: P(≤ 5) is 0.917 and P(≥ 5) is 0.185 if 1 % of all draws do.
+TEST(ParseRequirement, RefusesARiskForAConfidence) {
+  EXPECT_EQ(refusal("k2c < 1 for 99% with 5%"),
+            "requirement = k2c < 1 for 99% with 5% (a confidence of 5% must be at least 50%: with "
+            "less, the same runs would show a requirement and its contrary)");
+  EXPECT_NO_THROW((void)test::parse_requirement("k2c < 1 for 99% with 50%"));
+}
+
 // 0.99²⁹⁹ = 0.0495: 299 runs without an exceedance show it, 298 do not.
 TEST(CheckRequirement, IsMetWithEnoughRunsBelowTheLimit) {
   const RequirementCheck check = fixed_check(a_c12_99_95, errors_with(299, 0), 0);
