@@ -110,9 +110,10 @@ std::optional<StopCheckRow> deciding_check(const Store& store, std::span<const d
   if (text.empty() || store.control().phase != wire::CampaignPhase::finished) return std::nullopt;
   const StopRule rule = parse_stop_rule(text, store.schema());
   const std::uint64_t num_runs = store.num_runs();
-  return StopCheckRow{.statistic = std::string(statistic_of(text)),
-                      .num_runs = num_runs,
-                      .check = check_with(rule, store, objectives, num_runs)};
+  const StopCheck check = check_with(rule, store, objectives, num_runs);
+  if (check.is_too_skewed) return std::nullopt;  // Older programs may have called it reached.
+  return StopCheckRow{
+      .statistic = std::string(statistic_of(text)), .num_runs = num_runs, .check = check};
 }
 
 /// Runs [0, n) that are finished, and were before any stop check of as many runs: none of them was
@@ -211,10 +212,13 @@ std::optional<StopOutcome> stop_outcome(const Store& store) {
     outcome.answer = name_of(verdict);
     outcome.text = fmt::format("Stopping  {}\n{}", outcome.rule, verdict_text(rule, row));
   } else {
+    const std::optional<double>& width = row.check.relative_half_width;
+    const bool is_too_skewed = !holds && width && *width <= rule.relative_half_width;
     outcome.answer = holds ? "reached" : "not reached";
-    outcome.text =
-        fmt::format("Stopping  {} {}          after {} runs; {}: {}\n", statistic_of(outcome.rule),
-                    width_text(rule, row), row.num_runs, outcome.rule, outcome.answer);
+    outcome.text = fmt::format(
+        "Stopping  {} {}          after {} runs; {}: {}{}\n", statistic_of(outcome.rule),
+        width_text(rule, row), row.num_runs, outcome.rule, outcome.answer,
+        is_too_skewed ? ", the errors being too skewed for this interval" : "");
   }
   outcome.is_missed = !holds || row.num_runs < store.num_runs();
   return outcome;

@@ -48,12 +48,16 @@ StopCheck estimated(const StopRule& rule, std::span<const double> errors) {
       const Moments about = moments(errors);
       check.estimate = about.mean;
       check.interval = mean_interval(about, default_confidence);
+      check.is_too_skewed = is_too_skewed(about.skewness, about.count);
       break;
     }
-    case StopRule::Statistic::standard_deviation:
-      check.estimate = moments(errors).standard_deviation;
+    case StopRule::Statistic::standard_deviation: {
+      const Moments about = moments(errors);
+      check.estimate = about.standard_deviation;
       check.interval = bootstrap_deviation_interval(errors, default_confidence);
+      check.is_too_skewed = is_too_skewed(about.skewness, about.count);
       break;
+    }
     case StopRule::Statistic::percentile: {
       const std::vector<double> ascending = sorted(errors);
       check.estimate = percentile(ascending, rule.level);
@@ -75,7 +79,7 @@ void check_width(const StopRule& rule, StopCheck& check) {
   const double relative = half_width / std::abs(check.estimate);
   if (!std::isfinite(relative)) return;
   check.relative_half_width = relative;
-  check.is_reached = relative <= rule.relative_half_width;
+  check.is_reached = relative <= rule.relative_half_width && !check.is_too_skewed;
 }
 
 StopRule rule_about_verdict(detail::Phrase& phrase) {

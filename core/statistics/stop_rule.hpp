@@ -59,6 +59,9 @@ struct StopCheck {
   /// Half the width of the interval over the estimate; empty without an interval, or if it is one
   /// about 0.
   std::optional<double> relative_half_width;
+  /// By is_too_skewed(): the interval is then narrow where large values happen to be missing, so
+  /// that a rule about a mean or a deviation is not reached by it.
+  bool is_too_skewed = false;
 };
 
 /// A pure function of its arguments. The intervals are mean_interval(), the bootstrap's and the

@@ -365,6 +365,20 @@ TEST(CheckStopRule, IsNotReachedWithoutAnInterval) {
   EXPECT_FALSE(check_stop_rule(rule, std::vector<double>(1000, 0.5)).is_reached);
 }
 
+// Errors of a lognormal law with σ = 2: 192 of them lack the large ones that make its mean, e², as
+// often as not, and the interval is then narrow below it.
+TEST(CheckStopRule, IsNotReachedByErrorsThatAreTooSkewed) {
+  const std::vector<double> errors = test::column_of(
+      192, {.seed = 64}, [](double u) { return std::exp(2.0 * inverse_normal(u)); });
+  for (const char* const rule : {"mean(k2c) within 99%", "std(k2c) within 99%"}) {
+    const StopCheck check = check_stop_rule(test::parse_stop_rule(rule), errors);
+    EXPECT_TRUE(check.is_too_skewed);
+    EXPECT_LT(*check.relative_half_width, 0.99);
+    EXPECT_FALSE(check.is_reached);
+  }
+  EXPECT_TRUE(check_stop_rule(test::parse_stop_rule("p50(k2c) within 99%"), errors).is_reached);
+}
+
 // Half of 128 runs have no error at all; whether the median of all is 0 is open.
 TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
   std::vector<double> errors(66, 0.0);
