@@ -252,6 +252,7 @@ Json json_of(const RequirementAnswer& answer) {
           {"exceedance_bounds", check.exceedance},
           {"all_runs", json_of_all(answer)},
           {"tolerance_bound", answer.is_joint() ? Json(nullptr) : Json(answer.bound)},
+          {"assumption", text_or_null(answer.assumption)},
           {"num_runs_at_best", check.num_runs_at_best},
           {"num_runs_at_this_rate", check.num_runs_at_this_rate}};
 }

@@ -104,6 +104,11 @@ std::string bound_line(const RequirementAnswer& answer) {
                      unit == "1" ? "" : unit, given_percent(tolerance.confidence));
 }
 
+std::string assumption_line(const RequirementAnswer& answer) {
+  if (answer.assumption.empty()) return "";
+  return fmt::format("Assumed      {}: no session tells it\n", answer.assumption);
+}
+
 std::string needed_line(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   if (check.verdict != RequirementVerdict::undecided) return "";
@@ -247,11 +252,12 @@ Tone tone_of(RequirementVerdict verdict) {
 
 std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
   return fitted(
-      fmt::format("Requirement  {}\n{}{}Answer       {}\nRule         {}\n{}{}{}",
+      fmt::format("Requirement  {}\n{}{}Answer       {}\nRule         {}\n{}{}{}{}",
                   wire::visible_text(answer.stated.requirement), statement_line(answer.stated),
                   limit_line(answer),
                   in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
-                  rule_text(answer), count_lines(answer), bound_line(answer), needed_line(answer)));
+                  rule_text(answer), count_lines(answer), bound_line(answer),
+                  assumption_line(answer), needed_line(answer)));
 }
 
 namespace {
@@ -324,7 +330,14 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
                                        std::uint64_t num_given_up,
                                        std::optional<std::uint64_t> num_fixed,
                                        const std::optional<ErrorBudget>& budget)
-    : num_fixed_(num_fixed), missing_{.num_given_up = num_given_up}, num_runs_(num_given_up) {
+    : num_fixed_(num_fixed),
+      budget_(budget),
+      missing_{.num_given_up = num_given_up},
+      num_runs_(num_given_up) {
+  if (budget_) {
+    assumed_level_ = fmt::format("{} = {:.3g} {}", budget_->level_label, budget_->assumed_level,
+                                 schema.health.at(budget_->level).unit);
+  }
   for (StatedRequirement& each : stated) {
     RequirementAnswer answer;
     answer.stated = std::move(each);
@@ -351,9 +364,11 @@ void VerificationMatrix::add(const RunResult& result) {
   ++num_runs_;
   missing_.add(result);
   if (!result.is_completed()) return;
+  const bool tells_level = budget_ && budget_->level_of_run(result) != 0.0;
   for (Row& row : rows_) {
     const double value = row.of_all.exceedances.add(result);
     if (!row.answer.is_of_error) row.values.push_back(value);
+    if (row.answer.is_of_budget() && !tells_level) row.answer.assumption = assumed_level_;
     std::optional<RunValue>& worst = row.of_all.worst;
     if (!worst || value > worst->value) worst = {.run = result.run, .value = value};
   }

@@ -95,10 +95,13 @@ struct RequirementAnswer {
   std::optional<double> bound;
   bool is_of_error = false;       ///< About the |error| of a parameter, not a budget or all.
   std::optional<RunValue> worst;  ///< In the unit of the limit; empty if no run has an estimate.
+  /// Of one about the budget, what not every run tells: `Γ_res = 1e-12 m/s²`. Empty if all do.
+  std::string assumption = {};
 
   [[nodiscard]] bool is_joint() const {
     return requirement.subject == Requirement::Subject::all_objectives;
   }
+  [[nodiscard]] bool is_of_budget() const { return !is_joint() && !is_of_error; }
   /// 1 − bound / limit.
   [[nodiscard]] std::optional<double> relative_margin() const;
   /// Of the probability that a draw exceeds, by all runs: two-sided, 95 %. @pre of_all
@@ -184,6 +187,8 @@ class VerificationMatrix {
   void keep_fixed_verdict(Row& row) const;
 
   std::optional<std::uint64_t> num_fixed_;
+  std::optional<ErrorBudget> budget_;
+  std::string assumed_level_;
   std::vector<Row> rows_;
   MissingEstimates missing_, missing_of_fixed_;
   std::uint64_t num_runs_ = 0;

@@ -254,7 +254,8 @@ std::vector<std::string> matrix_notes(const Review& review) {
       "Verdicts: " +
           (review.matrix.empty() ? std::string("none") : rule_text(review.matrix.front())) +
           ". With the confidence c of a row a requirement that does not hold is called met with "
-          "probability 1 − c at most, the consumer's risk; so is one that holds called not met. "
+          "probability 1 − c at most, the consumer's risk, each row by itself; so is one that "
+          "holds called not met. "
           "The producer's risk, that one that holds is not called met, is the smaller the better "
           "it holds and the more draws there are.",
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
@@ -262,6 +263,10 @@ std::vector<std::string> matrix_notes(const Review& review) {
       "Bound: with the confidence of the row, the stated part of all draws does not exceed it "
       "(order statistics, any law). Margin: (limit − bound) / limit."};
   for (const RequirementAnswer& row : review.matrix) {
+    if (!row.assumption.empty()) {
+      notes.push_back(fmt::format("{} is answered with {}, which no session tells.",
+                                  requirement_name(row), row.assumption));
+    }
     if (!row.of_all) continue;
     notes.push_back(fmt::format("{} was decided by the first {} draws. {}: {}.",
                                 requirement_name(row), row.check.num_runs,

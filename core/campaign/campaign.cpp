@@ -78,7 +78,7 @@ Budget ErrorBudget::after(std::span<const double> errors, double level_of_runs) 
 Budget ErrorBudget::of_run(const RunResult& result) const {
   std::vector<double> errors(result.estimate.size());
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::abs(result.error(i));
-  return after(errors, level < result.health.size() ? result.health[level] : 0.0);
+  return after(errors, level_of_run(result));
 }
 
 }  // namespace proofmass

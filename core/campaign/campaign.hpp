@@ -68,6 +68,10 @@ struct ErrorBudget {
   [[nodiscard]] Budget before(double level_of_runs) const;
   /// @param errors  |estimate − truth| of each quantity, SI.
   [[nodiscard]] Budget after(std::span<const double> errors, double level_of_runs) const;
+  /// 0: unknown.
+  [[nodiscard]] double level_of_run(const RunResult& result) const {
+    return level < result.health.size() ? result.health[level] : 0.0;
+  }
   /// What is left by the errors of one run, which has an estimate, at its own level.
   [[nodiscard]] Budget of_run(const RunResult& result) const;
 };

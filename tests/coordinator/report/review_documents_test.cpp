@@ -382,5 +382,25 @@ TEST(VerificationMatrix, BoundsByTheRuleOfItsVerdict) {
   EXPECT_LT(*fixed.bound, *open.bound);
 }
 
+// Runs without a session that watches the loops do not tell the level of a budget.
+TEST(VerificationMatrix, NamesTheLevelThatItAssumes) {
+  const std::vector<StatedRequirement> both{stated("budget < 1 for 95% with 90%"),
+                                            stated("k2c < 1 for 95% with 90%")};
+  RunResult told = result_with(0, 0.1), untold = result_with(1, 0.1);
+  told.health = test::values_of({.residual_m_s2 = 1e-10});
+  untold.health = test::values_of({});
+  const auto assumptions = [&](const RunResult& second) {
+    VerificationMatrix matrix(test::schema(), both, ones(), 0, {},
+                              MicroscopeCampaign().error_budget());
+    matrix.add(told);
+    matrix.add(second);
+    std::vector<std::string> all;
+    for (const RequirementAnswer& row : matrix.answers()) all.push_back(row.assumption);
+    return all;
+  };
+  EXPECT_THAT(assumptions(told), ElementsAre("", ""));
+  EXPECT_THAT(assumptions(untold), ElementsAre("Γ_res = 1e-12 m/s²", ""));
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator
