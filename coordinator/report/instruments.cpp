@@ -96,8 +96,8 @@ void RunningInstruments::add_values(Runs runs, std::size_t i) {
 
 InstrumentQuantity RunningInstruments::statistics_of(std::size_t i) const {
   const Quantity& quantity = quantities_[i];
-  InstrumentQuantity of{.error = quantity.errors.analysis(default_confidence),
-                        .beyond = share_of(quantity.beyond)};
+  InstrumentQuantity of{.error = quantity.errors.analysis(default_confidence)};
+  if (std::isfinite(objectives_[i])) of.beyond = share_of(quantity.beyond);
   if (of.error.num_groups > 0) {
     const Moments magnitudes = quantity.magnitudes.moments();
     of.mean_magnitude = magnitudes.mean;
@@ -243,8 +243,10 @@ Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& s
   add_ends(table, {"from", false, 8, "bias"}, {"to", false, 9, "bias"}, [&](auto i) {
     return IntervalAndScale(all[i].error.mean_interval, schema.quantities[i].display_scale);
   });
-  add_ends(table, {"from", false, 7, beyond, true}, {"to", false, 7, beyond},
-           [&](auto i) { return IntervalAndScale(all[i].beyond.interval, percent_scale); });
+  add_ends(table, {"from", false, 7, beyond, true}, {"to", false, 7, beyond}, [&](auto i) {
+    const auto& share = all[i].beyond;
+    return IntervalAndScale(share ? std::optional(share->interval) : std::nullopt, percent_scale);
+  });
   if (have_sigma) {
     const auto add_share = [&](Column from, Column to, GroupedShare GroupedStandardErrors::*share) {
       add_ends(table, std::move(from), std::move(to), [&](auto i) {
@@ -264,6 +266,7 @@ Table instrument_table(const ResultSchema& schema, const InstrumentStatistics& s
     table.notes.emplace_back(
         "within: about the mean of each instrument, whose variance there is s²; from, to in %");
   }
+  if (std::ranges::none_of(all, [](const auto& of) { return of.beyond.has_value(); })) return table;
   table.notes.insert(
       table.notes.end(),
       {fmt::format("all objectives (mixed): in {} of all runs", share_text(statistics.mixed)),

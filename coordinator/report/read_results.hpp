@@ -89,8 +89,9 @@ struct InstrumentQuantity {
   double mean_magnitude = 0.0;  ///< Of |error|, over the same ones.
   std::optional<Interval> magnitude_interval = {};
   bool is_too_skewed = false;  ///< The instruments' mean |error|, for Student's law.
-  /// Of the runs whose |error| is above the objective, and of those without an estimate.
-  GroupedShare beyond;
+  /// Of the runs whose |error| is above the objective, and of those without an estimate; empty
+  /// without an objective.
+  std::optional<GroupedShare> beyond = {};
   std::optional<GroupedStandardErrors> standard_errors = {};
 };
 
@@ -171,8 +172,9 @@ struct ReplicatedQuantity {
   ReplicatedMean magnitude;    ///< |error|.
   ReplicatedMean bias;         ///< error.
   ReplicatedMean mean_square;  ///< error².
-  /// Share of runs whose |error| is above the objective, or that have no estimate.
-  ReplicatedMean beyond;
+  /// Share of runs whose |error| is above the objective, or that have no estimate; empty without an
+  /// objective.
+  std::optional<ReplicatedMean> beyond = {};
   /// Share of completed runs whose |error| is within normal_95 standard errors; if there are any.
   std::optional<ReplicatedMean> covered = {};
 };

@@ -101,11 +101,12 @@ ReplicateStatistics RunningReplicates::statistics() {
   const std::uint64_t num_runs = statistics.num_replicates * statistics.design.points;
   statistics.within_objectives = within_.share(num_runs);
   if (statistics.num_estimated == 0) return statistics;
-  for (const Quantity& quantity : quantities_) {
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    const Quantity& quantity = quantities_[i];
     ReplicatedQuantity of{.magnitude = quantity.magnitude.mean(),
                           .bias = quantity.bias.mean(),
-                          .mean_square = quantity.mean_square.mean(),
-                          .beyond = quantity.beyond.share(num_runs)};
+                          .mean_square = quantity.mean_square.mean()};
+    if (std::isfinite(objectives_[i])) of.beyond = quantity.beyond.share(num_runs);
     if (have_standard_errors_ && quantity.position) {
       of.covered = quantity.covered.share(statistics.num_estimated);
     }
@@ -167,11 +168,14 @@ std::vector<std::string> replicate_notes(const ResultSchema& schema,
     notes.push_back(fmt::format("an interval needs {} replicates", num_replicates_of_interval));
   }
   const ReplicatedMean& within = statistics.within_objectives;
-  notes.push_back(fmt::format(
-      "all objectives: {:.3g} % of all runs{}", 100.0 * within.mean,
-      within.interval ? fmt::format(", {:.3g} to {:.3g} % of all draws",
-                                    100.0 * within.interval->lower, 100.0 * within.interval->upper)
-                      : std::string()));
+  if (std::ranges::any_of(statistics.quantities,
+                          [](const auto& of) { return of.beyond.has_value(); })) {
+    notes.push_back(fmt::format("all objectives: {:.3g} % of all runs{}", 100.0 * within.mean,
+                                within.interval ? fmt::format(", {:.3g} to {:.3g} % of all draws",
+                                                              100.0 * within.interval->lower,
+                                                              100.0 * within.interval->upper)
+                                                : std::string()));
+  }
   notes.push_back(
       fmt::format("the interval of a share needs {} runs on each side, and replicates that differ; "
                   "worst, percentiles and verdicts need independent runs",
@@ -206,8 +210,10 @@ Table replicate_table(const ResultSchema& schema, const ReplicateStatistics& sta
   add_ends(table, {"from", false, 8, rms, true}, {"to", false, 9, rms}, [&](auto i) {
     return IntervalAndScale(root_of(all[i].mean_square.interval), scale(i));
   });
-  add_ends(table, {"from", false, 8, beyond, true}, {"to", false, 8, beyond},
-           [&](auto i) { return IntervalAndScale(all[i].beyond.interval, percent_scale); });
+  add_ends(table, {"from", false, 8, beyond, true}, {"to", false, 8, beyond}, [&](auto i) {
+    const auto& share = all[i].beyond;
+    return IntervalAndScale(share ? share->interval : std::nullopt, percent_scale);
+  });
   return table;
 }
 

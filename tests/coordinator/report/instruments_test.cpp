@@ -37,10 +37,21 @@ TEST(Instruments, CountARunWithoutAnEstimateAsBeyondAndSayNothingOfItsStandardEr
   EXPECT_EQ(statistics.temporal_instrument, 1U);
   ASSERT_EQ(statistics.quantities.size(), objectives().size());
   for (const InstrumentQuantity& of : statistics.quantities) {
-    EXPECT_DOUBLE_EQ(of.beyond.share, 2.0 / 6.0);
+    EXPECT_DOUBLE_EQ(of.beyond->share, 2.0 / 6.0);
     EXPECT_DOUBLE_EQ(of.standard_errors->covered.share, 1.0);
     EXPECT_DOUBLE_EQ(of.standard_errors->covered_within.share, 1.0);
   }
+}
+
+TEST(Instruments, AreBeyondNoObjectiveThatTheyHaveNot) {
+  const std::vector<double> none(objectives().size(), std::numeric_limits<double>::infinity());
+  RunningInstruments running(test::schema(), none, 2);
+  running.add(test::result_off_by(0, -1.0));
+  running.add(test::result_off_by(1, 1.0));
+  const InstrumentStatistics statistics = running.statistics();
+  EXPECT_FALSE(statistics.quantities.front().beyond);
+  EXPECT_THAT(terminal_text(instrument_table(test::schema(), statistics), {}),
+              Not(HasSubstr("all objectives")));
 }
 
 // Errors of ±0.1 objectives have the variance 2·0.1², which is twice the squared standard error.

@@ -51,8 +51,18 @@ TEST(Replicates, MakeIntervalsOfTheirMeans) {
   EXPECT_NEAR(of.bias.interval->lower / objective, 0.65 - half_width, 1e-12);
   EXPECT_NEAR(of.bias.interval->upper / objective, 0.65 + half_width, 1e-12);
   EXPECT_NEAR(of.magnitude.mean / objective, (3.0 + 0.3 * 4.0) / 4.0, 1e-12);
-  EXPECT_NEAR(of.beyond.mean, (8.0 + 3.0) / 32.0, 1e-12);
-  EXPECT_FALSE(of.beyond.interval);  // Of 11 runs.
+  EXPECT_NEAR(of.beyond->mean, (8.0 + 3.0) / 32.0, 1e-12);
+  EXPECT_FALSE(of.beyond->interval);  // Of 11 runs.
+}
+
+TEST(Replicates, AreBeyondNoObjectiveThatTheyHaveNot) {
+  const std::vector<double> none(10, std::numeric_limits<double>::infinity());
+  RunningReplicates running(test::schema(), none, of_four);
+  for (std::uint64_t run = 0; run < 4; ++run) running.add(*run_number(run));
+  const ReplicateStatistics statistics = running.statistics();
+  EXPECT_FALSE(statistics.quantities.front().beyond);
+  EXPECT_THAT(terminal_text(replicate_table(test::schema(), statistics), {}),
+              Not(HasSubstr("all objectives")));
 }
 
 // One of 20 means that is apart: their skewness is √20, of which √20/5 + 2√(6/20) = 2.0 may be
@@ -94,7 +104,7 @@ TEST(Replicates, StateNoIntervalOfSharesThatHardlyDiffer) {
     const ReplicateStatistics statistics = running.statistics();
     EXPECT_NEAR(statistics.within_objectives.mean, 0.75, 1e-12);
     EXPECT_EQ(statistics.within_objectives.interval.has_value(), alternates);
-    EXPECT_EQ(statistics.quantities.front().beyond.interval.has_value(), alternates);
+    EXPECT_EQ(statistics.quantities.front().beyond->interval.has_value(), alternates);
   }
 }
 
@@ -113,7 +123,7 @@ TEST(Replicates, CountRunsWithoutAnEstimateAsBeyondEveryObjective) {
   EXPECT_EQ(statistics.num_estimated, 7U);
   EXPECT_EQ(statistics.num_drawn_again, 1U);
   EXPECT_NEAR(statistics.within_objectives.mean, 7.0 / 8.0, 1e-12);
-  EXPECT_NEAR(statistics.quantities.front().beyond.mean, 1.0 / 8.0, 1e-12);
+  EXPECT_NEAR(statistics.quantities.front().beyond->mean, 1.0 / 8.0, 1e-12);
   EXPECT_FALSE(statistics.quantities.front().covered);
   EXPECT_THAT(terminal_text(replicate_table(test::schema(), statistics)),
               HasSubstr("1 run without an estimate is left out of the means of its replicate\n"));
@@ -170,7 +180,7 @@ TEST_F(ReadGroups, CountARunOfAReplicateThatWasGivenUpAsLost) {
   EXPECT_EQ(statistics.num_incomplete, 0U);
   EXPECT_EQ(statistics.num_estimated, 5U);
   EXPECT_NEAR(statistics.within_objectives.mean, 5.0 / 8.0, 1e-12);
-  EXPECT_NEAR(statistics.quantities.front().beyond.mean, 3.0 / 8.0, 1e-12);
+  EXPECT_NEAR(statistics.quantities.front().beyond->mean, 3.0 / 8.0, 1e-12);
 }
 
 TEST_F(ReadGroups, GiveTheTableOfStandardErrorsItsInterval) {
