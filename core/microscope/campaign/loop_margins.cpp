@@ -62,7 +62,9 @@ AxisMargins drag_free_margins(const Scenario& scenario, const Instrument& instru
         factor * z_inverse * controller * actuator_response(scenario, z_inverse);
     return resonator.input == 0.0 ? loop : loop * response(resonator, z_inverse);
   };
-  return {ControlLoop::drag_free, axis, margins_of(open_loop, {resonator.cosine, resonator.sine}),
+  Resonances resonances = own ? own->resonances() : Resonances();
+  if (resonator.input != 0.0) resonances.poles.emplace_back(resonator.cosine, resonator.sine);
+  return {ControlLoop::drag_free, axis, margins_of(open_loop, resonances),
           resonator.input == 0.0 ? "" : session.name};
 }
 
@@ -134,7 +136,10 @@ AxisMargins attitude_margins(const Scenario& scenario, Axis axis) {
   std::vector<AxisMargins> of_modes;
   for (const double factor : extreme_mode_gains(realism)) {
     const auto of_mode = [&](ComplexDouble z_inverse) { return factor * open_loop(z_inverse); };
-    of_modes.push_back({ControlLoop::attitude, axis, margins_of(of_mode), {}});
+    of_modes.push_back({ControlLoop::attitude,
+                        axis,
+                        margins_of(of_mode, own ? own->resonances() : Resonances()),
+                        {}});
   }
   return {ControlLoop::attitude, axis, least(of_modes), {}};
 }

@@ -54,6 +54,14 @@ double rate_product(const Roots& roots, double period_s) {
   return product.real();
 }
 
+std::vector<ComplexDouble> upper(const Roots& roots) {
+  std::vector<ComplexDouble> upper;
+  for (const std::complex<double>& root : roots) {
+    if (root.imag() > 0.0) upper.emplace_back(root.real(), root.imag());
+  }
+  return upper;
+}
+
 void check_pairs(const std::string& path, const Roots& roots) {
   for (const std::complex<double>& root : roots) {
     if (std::ranges::count(roots, root) == std::ranges::count(roots, std::conj(root))) continue;
@@ -104,10 +112,12 @@ SampledController::SampledController(const ControllerConfig& config, double samp
   };
   const double gain = config.gain * rate_product(config.zeros_rad_s, sample_period_s) /
                       rate_product(config.poles_rad_s, sample_period_s);
+  const Roots poles = transformed(config.poles_rad_s);
   Roots zeros = transformed(config.zeros_rad_s);
+  resonances_ = {upper(poles), upper(zeros)};
   zeros.resize(config.poles_rad_s.size(), -1.0);  // Those at infinity.
   const std::vector<Quadratic> numerators = quadratics(zeros);
-  const std::vector<Quadratic> denominators = quadratics(transformed(config.poles_rad_s));
+  const std::vector<Quadratic> denominators = quadratics(poles);
   const std::size_t num_sections = std::max(numerators.size(), denominators.size());
   for (std::size_t i = 0; i < num_sections; ++i) {
     const Quadratic none{1.0, 0.0, 0.0};

@@ -9,6 +9,7 @@
 
 #include "core/campaign/field.hpp"
 #include "core/math/complex.hpp"
+#include "core/microscope/control/margins.hpp"
 #include "core/microscope/session/session.hpp"
 #include "core/signal/band_pass.hpp"
 
@@ -49,8 +50,10 @@ class SampledController {
 
   /// C(z), without memory.
   [[nodiscard]] ComplexDouble response(ComplexDouble z_inverse) const;
+  [[nodiscard]] const Resonances& resonances() const { return resonances_; }
 
  private:
+  Resonances resonances_;
   std::vector<Biquad> sections_;
   std::vector<BiquadState> states_;
   std::vector<double> delayed_;  ///< Commands of the last samples.

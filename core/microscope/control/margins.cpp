@@ -15,7 +15,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double first_angle = 2e-8 * pi;
-constexpr int num_angles = 16000;  // A peak that is narrower than a thousandth is missed.
+constexpr int num_angles = 16000;
 
 ComplexDouble at(const OpenLoop& loop, const SineCosine& turn, double radius) {
   return loop({turn.cosine / radius, -turn.sine / radius});
@@ -54,6 +54,31 @@ double root(const Function& function, double low, double high) {
   return high;
 }
 
+/// Angles on both sides of a root, from an eighth of its distance from the circle to where the grid
+/// is as fine.
+void add_angles(ComplexDouble number, std::vector<GridPoint>& points) {
+  const auto side = [&](double angle) {
+    const auto [sine, cosine] = sincos(angle);
+    return sine * number.real() - cosine * number.imag();
+  };
+  const double angle = root(side, 0.0, pi);
+  const double distance = std::abs(1.0 - std::sqrt(norm(number)));
+  for (double step = std::max(0.125 * distance, 1e-12); step < 1e-2 * angle; step *= 1.5) {
+    for (const double near : {angle - step, angle + step}) {
+      if (near > first_angle && near < pi) points.push_back({near, sincos(near)});
+    }
+  }
+}
+
+/// The grid, with the angles that an open loop's roots need.
+std::vector<GridPoint> points_for(const Resonances& resonances) {
+  std::vector<GridPoint> points = grid();
+  for (const ComplexDouble pole : resonances.poles) add_angles(pole, points);
+  for (const ComplexDouble zero : resonances.zeros) add_angles(zero, points);
+  std::ranges::sort(points, {}, &GridPoint::angle);
+  return points;
+}
+
 /// Middle of a number's quadrant, in quarters of a turn.
 double quadrant(ComplexDouble number) {
   if (number.imag() >= 0.0) return number.real() >= 0.0 ? 0.5 : 1.5;
@@ -63,14 +88,15 @@ double quadrant(ComplexDouble number) {
 /// The turns of 1 + L about 0 along half of a circle, of which the other half is the mirror image.
 class Winding {
  public:
-  /// @param sum  1 + L, or what turns as often.
-  explicit Winding(const OpenLoop& sum) : sum_(sum) {}
+  /// @param sum     1 + L, or what turns as often.
+  /// @param points  The last one is π.
+  Winding(const OpenLoop& sum, std::span<const GridPoint> points) : sum_(sum), points_(points) {}
 
   /// It begins and ends on the real axis. A zero outside makes it turn by half a turn at least.
   [[nodiscard]] bool is_none() {
     last_ = on_axis(0.0);
     double low = 0.0;
-    for (const GridPoint& point : std::span(grid()).first(num_angles)) {
+    for (const GridPoint& point : points_.first(points_.size() - 1)) {
       if (!is_known_) break;
       turn_to(low, point, halvings_max);
       low = point.angle;
@@ -105,6 +131,7 @@ class Winding {
   }
 
   const OpenLoop& sum_;
+  std::span<const GridPoint> points_;
   double last_ = 0.0;  ///< Quadrant.
   double num_quarters_ = 0.0;
   bool is_known_ = true;  ///< False if a zero is on the circle, or L is no number.
@@ -112,20 +139,24 @@ class Winding {
 
 }  // namespace
 
-Margins margins_of(const OpenLoop& open_loop, ComplexDouble resonance) {
+Margins margins_of(const OpenLoop& open_loop, const Resonances& resonances) {
+  // Beside a pole 1 + L makes half a turn at once, in either direction, and with a zero of its own
+  // there a whole one, which no quadrant tells: without the poles it makes half a turn at most.
   const OpenLoop sum = [&](ComplexDouble z_inverse) {
-    const ComplexDouble whole = 1.0 + open_loop(z_inverse);
-    if (resonance.imag() == 0.0) return whole;
-    // Beside a pole 1 + L makes half a turn at once, in either direction: without it none.
-    return (z_inverse - resonance) * (z_inverse - conjugate(resonance)) * whole;
+    ComplexDouble whole = 1.0 + open_loop(z_inverse);
+    for (const ComplexDouble pole : resonances.poles) {
+      whole = (1.0 - pole * z_inverse) * ((1.0 - conjugate(pole) * z_inverse) * whole);
+    }
+    return whole;
   };
-  if (!Winding(sum).is_none()) return {};
+  const std::vector<GridPoint> points = points_for(resonances);
+  if (!Winding(sum, points).is_none()) return {};
   const auto excess = [&](double angle) { return norm(at(open_loop, angle)) - 1.0; };
   const auto height = [&](double angle) { return at(open_loop, angle).imag(); };
   Margins margins{std::numeric_limits<double>::infinity(), pi};
   double high = 0.0;
   ComplexDouble at_high = at(open_loop, first_angle);
-  for (const GridPoint& point : grid()) {
+  for (const GridPoint& point : points) {
     const double low = std::exchange(high, point.angle);
     const ComplexDouble at_low = std::exchange(at_high, at(open_loop, point.turn, 1.0));
     if ((norm(at_low) > 1.0) != (norm(at_high) > 1.0)) {

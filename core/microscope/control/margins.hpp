@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "core/math/complex.hpp"
 
@@ -9,6 +10,12 @@ namespace proofmass {
 /// An open loop L of z⁻¹, so that 1/(1 + L) is left of a disturbance. L vanishes for z → ∞ and has
 /// no pole outside the unit circle.
 using OpenLoop = std::function<ComplexDouble(ComplexDouble z_inverse)>;
+
+/// Roots of an open loop near the unit circle, where it turns within less than any grid of angles
+/// resolves: z of the upper one of each conjugate pair. Others than these do no harm.
+struct Resonances {
+  std::vector<ComplexDouble> poles, zeros;
+};
 
 /// How far a closed loop is from instability.
 struct Margins {
@@ -23,7 +30,7 @@ struct Margins {
 /// far above 1. A closed loop counts as unstable if 1 + L has a zero at |z| > 1 + 1e-6, that is, if
 /// something grows by e within some days; 1 + L then winds about 0 along that circle.
 ///
-/// @param resonance  z⁻¹ of a pole of L on the unit circle, that of a resonator; real: it has none.
-[[nodiscard]] Margins margins_of(const OpenLoop& open_loop, ComplexDouble resonance = 0.0);
+/// @param resonances  Of L.
+[[nodiscard]] Margins margins_of(const OpenLoop& open_loop, const Resonances& resonances = {});
 
 }  // namespace proofmass

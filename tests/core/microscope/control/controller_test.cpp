@@ -1,8 +1,11 @@
 #include "core/microscope/control/controller.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/microscope/control/margins.hpp"
@@ -142,6 +145,85 @@ TEST(Margins, CountAGainThatFalls) {
   }
   // Growth counts from |z| = 1 + 1e-6 on: that is 5e-5 of the angle, 0.02, of the crossing.
   EXPECT_NEAR(loop(1.1 * high).gain, 1.1, 1e-4);
+}
+
+using Roots = std::vector<std::complex<double>>;
+
+Roots sampled(const Roots& roots, double period_s) {
+  Roots sampled;
+  for (const auto& root : roots) {
+    sampled.push_back((2.0 / period_s + root) / (2.0 / period_s - root));
+  }
+  return sampled;
+}
+
+/// Coefficients of Π (z − root), the highest power first.
+std::vector<std::complex<double>> polynomial(const Roots& roots) {
+  std::vector<std::complex<double>> coefficients{1.0};
+  for (const auto& root : roots) {
+    coefficients.push_back(0.0);
+    for (std::size_t i = coefficients.size() - 1; i > 0; --i) {
+      coefficients[i] -= root * coefficients[i - 1];
+    }
+  }
+  return coefficients;
+}
+
+/// Largest |z| of what a loop z⁻¹ C(z) leaves, from its characteristic polynomial z D(z) + N(z).
+double largest_root(const ControllerConfig& config, double period_s) {
+  Roots zeros = sampled(config.zeros_rad_s, period_s);
+  zeros.resize(config.poles_rad_s.size(), -1.0);
+  std::complex<double> gain = config.gain;
+  for (const auto& zero : config.zeros_rad_s) gain *= 2.0 / period_s - zero;
+  for (const auto& pole : config.poles_rad_s) gain /= 2.0 / period_s - pole;
+  auto characteristic = polynomial(sampled(config.poles_rad_s, period_s));
+  characteristic.push_back(0.0);
+  const auto numerator = polynomial(zeros);
+  for (std::size_t i = 0; i < numerator.size(); ++i) characteristic[i + 1] += gain * numerator[i];
+  const auto order = static_cast<Eigen::Index>(characteristic.size()) - 1;
+  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(order, order);
+  companion.diagonal(-1).setOnes();
+  for (Eigen::Index i = 0; i < order; ++i) {
+    companion(0, i) = -(characteristic[static_cast<std::size_t>(i) + 1] / characteristic[0]).real();
+  }
+  return companion.eigenvalues().cwiseAbs().maxCoeff();
+}
+
+/// A loop with two integrators, and a resonance of the controller that zeros of some damping follow
+/// at once.
+ControllerConfig resonant(double rad_s, double damping, double gain) {
+  const std::complex<double> zero{-damping * rad_s, rad_s * std::sqrt(1.0 - damping * damping)};
+  return {.gain = gain,
+          .zeros_rad_s = {-0.0314159, zero, std::conj(zero)},
+          .poles_rad_s = {0.0, 0.0, {0.0, rad_s}, {0.0, -rad_s}}};
+}
+
+// Pole and zero together turn L by a whole turn, between two angles of any grid.
+TEST(Margins, SeeAResonanceOfTheController) {
+  constexpr double period_s = 0.25;
+  const auto margins = [&](const ControllerConfig& config) {
+    const SampledController controller(config, period_s);
+    return margins_of([&](ComplexDouble z) { return z * controller.response(z); },
+                      controller.resonances());
+  };
+  int num_stable = 0, num_unstable = 0;
+  for (const double rad_s : {0.3, 0.5, 1.0, 1.7, 2.0, 2.5, 3.0, 3.5}) {
+    for (const double damping : {-0.01, 1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1}) {
+      const ControllerConfig config = resonant(rad_s, damping, 0.3);
+      const bool is_stable = largest_root(config, period_s) < 1.0;
+      ++(is_stable ? num_stable : num_unstable);
+      const Margins found = margins(config);
+      EXPECT_EQ(found.gain > 0.0, is_stable) << rad_s << ' ' << damping;
+      if (!is_stable) continue;
+      const auto grows_by = [&](double factor) {
+        return largest_root(resonant(rad_s, damping, 0.3 * factor), period_s) > 1.0 + 1e-10;
+      };
+      const double inside = 0.99 * found.gain, beyond = 1.1 * found.gain;
+      EXPECT_FALSE(grows_by(inside) || grows_by(1.0 / inside)) << rad_s << ' ' << damping;
+      EXPECT_TRUE(grows_by(beyond) || grows_by(1.0 / beyond)) << rad_s << ' ' << damping;
+    }
+  }
+  EXPECT_GT(std::min(num_stable, num_unstable), 15);
 }
 
 }  // namespace
