@@ -147,13 +147,22 @@ std::string drift_note(const Scenario& scenario) {
 /// What the loops' start leaves in a record looks like noise to fits and monitors.
 std::string settling_note(const Scenario& scenario) {
   constexpr double num_decays = 7.0;  // e⁻⁷ is a thousandth.
-  const double decay_s = slowest_decay_s(scenario);
-  if (scenario.simulation.settling_s >= num_decays * decay_s) return {};
-  return fmt::format(
+  const double decay_s = slowest_decay_s(scenario), least_s = std::ceil(num_decays * decay_s);
+  if (scenario.simulation.settling_s >= least_s) return {};
+  const std::string_view effect =
       "records begin before the loops have settled, which standard errors may take for noise: "
-      "their slowest mode decays by e in {:.0f} s, and simulation.settling_s = {} is less than the "
-      "{:.0f} s after which a thousandth of it is left",
-      decay_s, scenario.simulation.settling_s, std::ceil(num_decays * decay_s));
+      "their slowest mode";
+  if (decay_s > 1e6) {
+    return fmt::format("{} hardly decays: a [[controller]] does not hold what it steers", effect);
+  }
+  const std::string advice =
+      least_s > SimulationConfig::settling_max_s
+          ? "no simulation.settling_s is long enough; give the loop more gain"
+          : fmt::format(
+                "simulation.settling_s = {} is less than the {:.0f} s after which a "
+                "thousandth of it is left",
+                scenario.simulation.settling_s, least_s);
+  return fmt::format("{} decays by e in {:.0f} s, and {}", effect, decay_s, advice);
 }
 
 /// A file has the accelerations in the satellite's frame, and so those of one spin.

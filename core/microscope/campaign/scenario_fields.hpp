@@ -268,7 +268,8 @@ void for_each_field(Config& scenario, Visitor&& visit) {
   of_simulation("sample_period_s", "Rate of instrument and control.",
                 scenario.simulation.sample_period_s, range::between(0.05, 1.0));
   of_simulation("settling_s", "Loops run this long before a record begins.",
-                scenario.simulation.settling_s, range::between(0.0, 50000.0));
+                scenario.simulation.settling_s,
+                range::between(0.0, SimulationConfig::settling_max_s));
   detail::visit_environment(scenario.environment, visit);
   detail::visit_noise(scenario.noise, visit);
   detail::visit_control(scenario, visit);

@@ -21,6 +21,8 @@ namespace proofmass {
 struct SimulationConfig {
   double sample_period_s = 0.25;  ///< Of instrument, control loops and record.
   double settling_s = 4000.0;     ///< Time that the loops run before a session's record begins.
+
+  static constexpr double settling_max_s = 50000.0;
 };
 
 // Excitations.
