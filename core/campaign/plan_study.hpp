@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace proofmass {
@@ -15,6 +16,14 @@ struct PlanLoss {
   std::string session;       ///< Where, as RunResult::loss has it or by its name.
   std::string detail;        ///< What is beyond which limit, for people.
   std::size_t num_runs = 0;  ///< ≥ 1.
+};
+
+/// Warnings of probed runs that are not lost: something may move estimates beyond their bounds.
+struct PlanWarnings {
+  std::size_t num_runs = 0;      ///< Runs with a warning; 0: the rest says nothing.
+  double largest_part = 0.0;     ///< Of an objective, as Warning::part.
+  std::size_t quantity = 0;      ///< Whose objective that is.
+  std::string_view effect = {};  ///< As Warning::effect.
 };
 
 /// How well the estimates of a run can be known, before any run is computed.
@@ -30,6 +39,7 @@ struct PlanBound {
   std::optional<double> mean_budget{};
   /// What loses probed runs, most of them first.
   std::vector<PlanLoss> losses{};
+  PlanWarnings warnings{};
 
   /// Probed runs that are lost.
   [[nodiscard]] std::size_t num_lost() const {

@@ -128,6 +128,19 @@ void add_losses(const Planned& plan, Table& table) {
       "run");
 }
 
+void add_warnings(const Planned& plan, Table& table) {
+  const PlanWarnings& warnings = plan.bound.warnings;
+  if (warnings.num_runs == 0) return;
+  table.remarks.push_back(
+      {fmt::format(
+           "{} of {} probed runs {} a warning: {} may move {} by up to {} of its objective, "
+           "which the chances above leave out",
+           warnings.num_runs, plan.study.scope().num_probed,
+           warnings.num_runs == 1 ? "has" : "have", warnings.effect,
+           plan.quantities[warnings.quantity].symbol, measured_figure(warnings.largest_part)),
+       Tone::open});
+}
+
 void add_misfits(const PlanScope& scope, Table& table) {
   if (scope.num_misfits == 0) return;
   table.remarks.push_back(
@@ -185,6 +198,7 @@ Table bound_table(const Planned& plan) {
   }
   add_undetermined(plan, table);
   add_losses(plan, table);
+  add_warnings(plan, table);
   add_misfits(plan.study.scope(), table);
   if (!plan.note.empty()) table.notes.push_back(plan.note);
   return table;
@@ -232,6 +246,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"mean_budget", plan.bound.mean_budget},
             {"probed_level", plan.study.scope().probed_level},
             {"losses", array_of(plan.bound.losses, of_loss)},
+            {"num_warned", plan.bound.warnings.num_runs},
             {"parameters", Json::array()},
             {"sessions", Json::array()}};
   const std::vector<Quantity>& quantities = plan.quantities;

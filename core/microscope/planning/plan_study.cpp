@@ -181,8 +181,8 @@ class JointStudy final : public PlanStudy {
   [[nodiscard]] PlanBound bound(std::span<const int> num_orbits) const override {
     const std::vector<ParameterArray> errors = standard_errors(num_orbits);
     PlanBound bound{.standard_errors = means(errors),
-                    .misses = std::vector<double>(num_parameters),
-                    .losses = probes_->losses(with_lengths(num_orbits).scenario, errors)};
+                    .misses = std::vector<double>(num_parameters)};
+    probes_->judge(with_lengths(num_orbits).scenario, errors, bound);
     const double part = 1.0 / static_cast<double>(errors.size());
     const ParameterArray& objectives = campaign_.scenario.objectives;
     for (const ParameterArray& of_instrument : errors) {

@@ -71,6 +71,23 @@ PlanLoss plan_loss(const Scenario& scenario, const HealthRecord& record,
   return loss;
 }
 
+void add_loss(PlanLoss loss, std::vector<PlanLoss>& losses) {
+  auto same = std::ranges::find(losses, loss.detail, &PlanLoss::detail);
+  if (same == losses.end()) same = losses.insert(same, std::move(loss));
+  ++same->num_runs;
+}
+
+/// @param shifts  Of a run.
+void add_warning(const std::vector<Shift>& shifts, PlanWarnings& warnings) {
+  const auto largest = std::ranges::max_element(shifts, {}, &Shift::part);
+  if (largest == shifts.end() || largest->part < warned_part) return;
+  ++warnings.num_runs;
+  if (largest->part <= warnings.largest_part) return;
+  warnings.largest_part = largest->part;
+  warnings.quantity = index(largest->parameter);
+  warnings.effect = name_of(largest->effect);
+}
+
 /// Level of the budget that all runs have in common. Noise differs between them, so that it is as
 /// small in a fit of all together as in one run with sessions that are so many times as long.
 /// @return 0 without a run, or if no session tells it.
@@ -137,10 +154,9 @@ std::size_t ProbedRuns::num_misfits() const {
   return static_cast<std::size_t>(std::ranges::count_if(probes_, &Probe::is_misfit));
 }
 
-std::vector<PlanLoss> ProbedRuns::losses(const Scenario& scenario,
-                                         const std::vector<ParameterArray>& errors) const {
+void ProbedRuns::judge(const Scenario& scenario, const std::vector<ParameterArray>& errors,
+                       PlanBound& bound) const {
   const ShiftBounds bounds(scenario);
-  std::vector<PlanLoss> losses;
   for (std::size_t k = 0; k < probes_.size(); ++k) {
     const RunRecord& probe = probes_[k].record;
     HealthRecord record = probe.health;
@@ -149,17 +165,16 @@ std::vector<PlanLoss> ProbedRuns::losses(const Scenario& scenario,
       lengthen(record[i].monitor, num_orbits / num_orbits_[i]);
     }
     const bool are_usable = std::ranges::all_of(errors[k], is_in_range);
+    const auto usable = are_usable ? std::span<const double>(errors[k]) : std::span<const double>();
     const HealthFinding finding =
-        judge_health(scenario, bounds, record, probe.phasors, probe.truth,
-                     are_usable ? std::span<const double>(errors[k]) : std::span<const double>());
-    if (finding.loss.cause == LossCause::none) continue;
-    PlanLoss loss = plan_loss(scenario, record, finding);
-    auto same = std::ranges::find(losses, loss.detail, &PlanLoss::detail);
-    if (same == losses.end()) same = losses.insert(same, std::move(loss));
-    ++same->num_runs;
+        judge_health(scenario, bounds, record, probe.phasors, probe.truth, usable);
+    if (finding.loss.cause == LossCause::none) {
+      add_warning(bounds.of(finding.health, probe.truth, usable), bound.warnings);
+    } else {
+      add_loss(plan_loss(scenario, record, finding), bound.losses);
+    }
   }
-  std::ranges::stable_sort(losses, std::greater<>(), &PlanLoss::num_runs);
-  return losses;
+  std::ranges::stable_sort(bound.losses, std::greater<>(), &PlanLoss::num_runs);
 }
 
 }  // namespace proofmass

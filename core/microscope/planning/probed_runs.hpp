@@ -31,11 +31,11 @@ class ProbedRuns {
   /// it.
   [[nodiscard]] double level_m_s2() const { return level_m_s2_; }
 
-  /// What loses runs, most of them first.
+  /// Finds losses and warnings of the runs.
   /// @param scenario  Of the campaign, with any lengths of its sessions.
   /// @param errors    Standard errors with these lengths, SI; of each run, or of more.
-  [[nodiscard]] std::vector<PlanLoss> losses(const Scenario& scenario,
-                                             const std::vector<ParameterArray>& errors) const;
+  void judge(const Scenario& scenario, const std::vector<ParameterArray>& errors,
+             PlanBound& bound) const;
 
  private:
   struct Probe {

@@ -397,6 +397,21 @@ TEST(PlanStudy, ProbesTestsToo) {
   EXPECT_EQ(loss.session, static_cast<std::uint32_t>(SessionTarget::ep_test));
 }
 
+// Ten times the noise: in its square the line of K2d² is as small as the noise is large.
+TEST(PlanStudy, HasTheWarningsOfItsProbedRuns) {
+  MicroscopeCampaign campaign = tested_campaign();
+  const auto warnings = [&] {
+    const auto study = study_plan(campaign);
+    return study->bound(study->scope().num_steps).warnings;
+  };
+  EXPECT_EQ(warnings().num_runs, 0U);
+  campaign.scenario.noise.scale = 10.0;
+  const PlanWarnings found = warnings();
+  EXPECT_EQ(found.effect, "square_noise");
+  EXPECT_EQ(found.quantity, index(Parameter::k2d));
+  EXPECT_GT(found.largest_part, warned_part);
+}
+
 TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
   const auto study = study_plan(MicroscopeCampaign{});
   const PlanBound bound = study->bound(std::vector<int>(study->scope().num_steps.size(), 0));
