@@ -280,14 +280,18 @@ void check_regressors(const Scenario& scenario) {
       const double bound = construction_bounds[index(session.target)];
       // What noise makes of the line has to be less than what is known without any session.
       if (sigma <= 3.0 * bound) continue;
+      const double resolution_hz = 1.0 / (session.num_orbits * scenario.orbit.period_s);
+      const double strongest_line_hz = strongest_hz(session, resolution_hz, regressor);
+      const bool is_there = std::abs(strongest_line_hz - frequency_hz) < resolution_hz;
+      const std::string advice =
+          is_there ? "make the session longer, or its excitation larger"
+                   : fmt::format("the signal's strongest line is at {:.4g} Hz", strongest_line_hz);
       throw ConfigError(
           fmt::format("session[{}].fit_lines[{}]", i, k), text_of(line),
-          fmt::format("session {} has no signal of {} there, at {:.4g} Hz: noise would make an "
-                      "error of {:.2g}, and construction bounds it by {:g}; the signal's strongest "
-                      "line is at {:.4g} Hz{}",
-                      session.name, name_of(session.target), frequency_hz, sigma, bound,
-                      strongest_hz(session, 1.0 / (session.num_orbits * scenario.orbit.period_s),
-                                   regressor),
+          fmt::format("session {} has {} signal of {} there, at {:.4g} Hz: noise would make an "
+                      "error of {:.2g}, and construction bounds it by {:g}; {}{}",
+                      session.name, is_there ? "too little" : "no", name_of(session.target),
+                      frequency_hz, sigma, bound, advice,
                       session.spin_rate_rad_s != 0.0 && line.spin == 0.0
                           ? "; lines of the gravity gradient turn with the spin, as [2, 0, 2] does"
                           : ""));

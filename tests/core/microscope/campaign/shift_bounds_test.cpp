@@ -97,6 +97,15 @@ TEST(RegressorLines, MustBeThereWhereTheyAreFitted) {
   }
 }
 
+// The gradient of a geostationary orbit, 200 times as small: the line is the right one.
+TEST(RegressorLines, MayBeTooWeak) {
+  const std::string weak =
+      refusal_of([](MicroscopeCampaign& campaign) { campaign.scenario.orbit.period_s = 86164.0; });
+  EXPECT_NE(weak.find("session a_c12 has too little signal of a_c12 there"), std::string::npos)
+      << weak;
+  EXPECT_NE(weak.find("make the session longer, or its excitation larger"), std::string::npos);
+}
+
 // A sensor with twenty times the noise has its signals where others have them.
 TEST(RegressorLines, AreThereInEveryNoise) {
   EXPECT_EQ(refusal_of([](MicroscopeCampaign& campaign) {
