@@ -22,13 +22,14 @@ namespace {
 
 /// @throws Error if the action can have no effect. A finished campaign can only be archived or
 /// retried, the latter only if runs were given up; a cancelled one must be resumed before it is
-/// retried or gets a priority; one that is neither cannot be archived.
+/// retried, paused or gets a priority; one that is neither cannot be archived.
 void require_possible(const proto::CampaignStatus& campaign, proto::ControlAction action) {
   const auto refuse = [&](std::string_view why) {
     throw Error(fmt::format("campaign = {} ({})", campaign.name(), why));
   };
   const bool is_retry = action == proto::CONTROL_ACTION_RETRY;
-  const bool needs_resume = is_retry || action == proto::CONTROL_ACTION_SET_PRIORITY;
+  const bool needs_resume = is_retry || action == proto::CONTROL_ACTION_SET_PRIORITY ||
+                            action == proto::CONTROL_ACTION_PAUSE;
   if (action == proto::CONTROL_ACTION_ARCHIVE) {
     if (!has_ended(wire::phase_of(campaign))) refuse("is not finished; cancel it first");
     return;
@@ -102,11 +103,15 @@ void require_own_file(const CampaignRecord& campaign) {
 RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
     : context_(context), campaigns_(campaigns), answers_(context) {}
 
-void RequestService::refuse_as_not_served(const std::string& campaign) const {
+bool RequestService::is_archived(const std::string& campaign) const {
   const CampaignDirectory* const directory = context_.config.directory;
-  const bool is_archived = directory != nullptr && directory->has_archived(campaign);
-  throw Error(fmt::format("campaign = {} (is not served{})", campaign,
-                          is_archived ? fmt::format(": it is archived/{}.db", campaign) : ""));
+  return directory != nullptr && directory->has_archived(campaign);
+}
+
+void RequestService::refuse_as_not_served(const std::string& campaign) const {
+  throw Error(
+      fmt::format("campaign = {} (is not served{})", campaign,
+                  is_archived(campaign) ? fmt::format(": it is archived/{}.db", campaign) : ""));
 }
 
 void RequestService::control(const proto::ControlRequest& request, const Asker& asker,
@@ -245,6 +250,11 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     require_control(asker, name, entry->status.owner());
   } else {
     require_right(asker, Right::submit);
+    if (is_archived(name)) {
+      throw Error(fmt::format(
+          "campaign = {} (is archived/{}.db: move it back for more runs, or choose another name)",
+          name, name));
+    }
   }
   if (is_busy(name)) {
     return defer([this, request, asker, respond] { submit(request, asker, respond); }, respond);

@@ -88,9 +88,10 @@ class RequestService {
   /// @param closed  The campaign if it has been served; otherwise its file may have to be made.
   void open_file(const Submitted& request, const Asker& asker,
                  const std::optional<CampaignRecord>& closed, UnderWay under_way, Respond respond);
+  [[nodiscard]] bool is_archived(const std::string& campaign) const;
+  [[noreturn]] void refuse_as_not_served(const std::string& campaign) const;
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs, if its owner
   /// may have it unfinished.
-  [[noreturn]] void refuse_as_not_served(const std::string& campaign) const;
   void reopen(const CampaignRecord& campaign, proto::ControlAction action, const Respond& respond);
   void change_served(CampaignId id, const Submitted& request, UnderWay under_way, Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it. If that fails, a file that

@@ -78,8 +78,8 @@ TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
 TEST_F(ServiceClients, ResumeACancelledCampaignBeforeAnythingElse) {
   start_with({test::campaign_of("a", 1)});
   (void)control(proto::CONTROL_ACTION_CANCEL);
-  for (const ControlAction action :
-       {proto::CONTROL_ACTION_RETRY, proto::CONTROL_ACTION_SET_PRIORITY}) {
+  for (const ControlAction action : {proto::CONTROL_ACTION_RETRY, proto::CONTROL_ACTION_PAUSE,
+                                     proto::CONTROL_ACTION_SET_PRIORITY}) {
     EXPECT_EQ(client->error(test::control(action, "a", 1)),
               "campaign = a (is cancelled; resume it first)");
   }

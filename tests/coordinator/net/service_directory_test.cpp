@@ -320,6 +320,9 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   while (client->done(archive).starts_with("error")) std::this_thread::yield();
   EXPECT_EQ(Store::open_read_only(directory / "a.archived").finished_runs().size(), 1U);
   EXPECT_FALSE(has_journal(file));
+  // Its runs would all be computed again, into another file of that name.
+  EXPECT_EQ(client->error(test::submission(definition_of(test::campaign_of("a", 2)))),
+            "campaign = a (is archived/a.db: move it back for more runs, or choose another name)");
 }
 
 // The names say the opposite.
