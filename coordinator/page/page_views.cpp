@@ -346,6 +346,7 @@ input, select, button { font: inherit; color: inherit; background: var(--chart-g
 .pages a, .pages span { display: inline-block; padding: 0.25rem 0.5rem; }
 .pages .off { color: var(--faint); }
 time { white-space: nowrap; }
+tbody th:has(time) { position: static; max-width: none; }
 )css";
 
 // The new markup is merged into the old element by element, so that focus, scroll positions and

@@ -203,6 +203,7 @@ void WatchDisplay::show_screen(const proto::StatusReply& status) {
 }
 
 void WatchDisplay::show_lines(const proto::StatusReply& status) {
+  if (status.campaigns().empty()) fmt::print(stream_, "no campaigns\n");
   for (const proto::CampaignStatus& campaign : status.campaigns()) {
     std::string gist = gist_of(campaign);
     std::string& shown = shown_[campaign.name()];
