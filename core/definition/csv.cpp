@@ -75,11 +75,23 @@ void CsvReader::refuse(std::string_view reason) const {
 void CsvReader::split(std::string_view line) {
   cells_.clear();
   for (;;) {
-    const std::size_t comma = std::min(line.find(','), line.size());
-    cells_.push_back(trimmed(line.substr(0, comma)));
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    const std::size_t quoted = line.starts_with('"') ? end_of_quoted(line) : 0;
+    const std::size_t comma = std::min(line.find(',', quoted), line.size());
+    const std::string_view behind = trimmed(line.substr(quoted, comma - quoted));
+    if (quoted > 0 && !behind.empty()) refuse("a comma must follow a closing quote");
+    cells_.push_back(quoted > 0 ? line.substr(1, quoted - 2) : behind);
     if (comma == line.size()) return;
     line.remove_prefix(comma + 1);
   }
+}
+
+std::size_t CsvReader::end_of_quoted(std::string_view text) const {
+  for (std::size_t quote = text.find('"', 1); quote != std::string_view::npos;
+       quote = text.find('"', quote + 2)) {
+    if (!text.substr(quote + 1).starts_with('"')) return quote + 1;
+  }
+  refuse("a quote does not end in its line");
 }
 
 std::vector<double> parse_column(std::string_view text, const std::string& name,

@@ -8,7 +8,8 @@
 namespace proofmass {
 
 /// Goes through lines of comma-separated text; cells are trimmed, carriage returns at line ends
-/// dropped. Text and name outlive it.
+/// dropped. A cell may be quoted as in RFC 4180, within its line; a quote in it stays doubled. Text
+/// and name outlive it.
 class CsvReader {
  public:
   /// @param name  For messages: path of the file that has the text.
@@ -30,6 +31,8 @@ class CsvReader {
 
  private:
   void split(std::string_view line);
+  /// The place behind the closing quote of a text that begins with one.
+  [[nodiscard]] std::size_t end_of_quoted(std::string_view text) const;
 
   std::string_view rest_;
   const std::string& name_;
