@@ -60,7 +60,10 @@ int compare_databases(const CompareOptions& options, const HeedStop& heed_stop) 
     throw UsageError(
         fmt::format("DB = {} (needs independent draws: {})", member.file.string(), why));
   }
-  return exit_done;
+  const bool is_compared = std::ranges::all_of(members, [](const ComparedCampaign& member) {
+    return !member.comparison || member.comparison->why_not_compared.empty();
+  });
+  return is_compared ? exit_done : exit_cannot_be_done;
 }
 
 }  // namespace
