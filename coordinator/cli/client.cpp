@@ -121,8 +121,8 @@ proto::WorkersReply all_workers(const Ask& ask) {
 }
 
 std::string checked_campaign_name(const std::string& name) {
-  if (wire::is_name(name)) return name;
-  throw UsageError(fmt::format("campaign = \"{}\" ({})", name, is_name_rule));
+  check_campaign_name(name, NameOrigin::given);
+  return name;
 }
 
 // Questions about results.

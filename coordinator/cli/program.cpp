@@ -303,7 +303,8 @@ void add_stop_options(CLI::App& command, StopPlan& options) {
 
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {
   add_number(command, "--audit", audit_fraction, {0.0, 1.0},
-             "Fraction of the runs to compute a second time,\nelsewhere, and compare");
+             "Fraction of the runs to compute a second time, by\nanother worker if there is one, "
+             "and compare");
 }
 
 void add_page_options(CLI::App& app, PageConfig& page) {
