@@ -178,6 +178,7 @@ void check_integrity(const Database& database, const StoredKind& kind) {
   const std::string finding = database.text("PRAGMA integrity_check(1)");
   if (finding != "ok") database.refuse_as_damaged(finding);
   check_schema(database, schema_version(), *kind.model, results);
+  check_constraints(database);
   check_references(database);
   check_single_rows(database);
   check_largest_errors(database, results);

@@ -386,6 +386,36 @@ void check_schema(const Database& database, std::int64_t version, const Model& m
   if (!expected.empty()) database.refuse("lacks " + expected.begin()->first);
 }
 
+namespace {
+
+/// The conditions of the CHECK constraints of a table.
+/// @param sql  A definition of schema/: no quoted text in it has a parenthesis.
+std::vector<std::string> conditions_of(const std::string& sql) {
+  constexpr std::string_view check = "CHECK (";
+  std::vector<std::string> conditions;
+  for (std::size_t at = sql.find(check); at != std::string::npos; at = sql.find(check, at)) {
+    at += check.size();
+    std::size_t end = at;
+    for (int depth = 1; depth > 0; ++end) depth += sql[end] == '(' ? 1 : (sql[end] == ')' ? -1 : 0);
+    conditions.push_back(sql.substr(at, end - 1 - at));
+  }
+  return conditions;
+}
+
+}  // namespace
+
+void check_constraints(const Database& database) {
+  for (const std::string& table : table_names(database)) {
+    const std::vector<std::string> conditions = conditions_of(without_comments(
+        database.text(fmt::format("SELECT sql FROM sqlite_schema WHERE name = '{}'", table))));
+    if (conditions.empty()) continue;
+    const std::string failing = fmt::format("SELECT count(*) FROM \"{}\" WHERE NOT ({})", table,
+                                            fmt::join(conditions, ") OR NOT ("));
+    if (database.count(failing) == 0) continue;
+    database.refuse_as_damaged("CHECK constraint failed in " + table);
+  }
+}
+
 std::string plain_definition(std::string sql) {
   if (!sql.starts_with("CREATE TABLE")) return sql;
   const auto cut = [&sql](std::size_t begin, std::size_t end) { sql.erase(begin, end - begin); };

@@ -176,6 +176,16 @@ TEST_F(StoreIntegrity, IsMissedByAnIndexThatLacksARow) {
   EXPECT_THAT(finding(), HasSubstr("is damaged: row 1 missing from index"));
 }
 
+// SQLite forgets the constraints of a file that it opens for reading alone.
+TEST_F(StoreIntegrity, IsMissedByARowThatBreaksAConstraint) {
+  change("UPDATE campaign SET failures_max = -2");
+  EXPECT_EQ(finding(), "is damaged: CHECK constraint failed in campaign; restore it from a copy");
+  change("UPDATE campaign SET failures_max = 2");
+  EXPECT_EQ(finding(), "");
+  change("UPDATE run_result SET num_rounds = -1 WHERE run_index = 999");
+  EXPECT_EQ(finding(), "is damaged: CHECK constraint failed in run_result; restore it from a copy");
+}
+
 // The first delivery of each run counts for its worker; sums are of commits of any size.
 TEST_F(StoreIntegrity, IsThatOfWorkersWhoseSumsWereRoundedAnotherWay) {
   const std::filesystem::path path = directory() / "rounded.db";
