@@ -177,10 +177,13 @@ std::vector<std::pair<std::string, std::string>> reproducing_commands(const Revi
       {fmt::format("proofmass report {}{} --html report.html", database, review.options),
        "makes this report anew"}};
   if (const std::optional<RunIndex> worst = worst_run_of(review)) {
-    commands.emplace_back(fmt::format("proofmass replay {0} --run {1} --output run{1}.h5{2}",
-                                      database, worst->value, program),
-                          review.is_of_program ? "simulates the worst run again"
-                                               : "writes the time series of the worst run");
+    const std::string replay = fmt::format("proofmass replay {} --run {}", database, worst->value);
+    if (review.is_of_program) {
+      commands.emplace_back(replay + program, "simulates the worst run again");
+    } else {
+      commands.emplace_back(fmt::format("{} --output run{}.h5", replay, worst->value),
+                            "writes the time series of the worst run");
+    }
   }
   return commands;
 }

@@ -211,9 +211,11 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
 }
 
 /// Which runs were used, and which were not.
+bool is_part(const DrawnRuns& drawn) { return drawn.runs.size() < drawn.num_with_estimate; }
+
 std::string basis_text(const DrawnRuns& drawn) {
   std::string text;
-  if (drawn.runs.size() < drawn.num_with_estimate) {
+  if (is_part(drawn)) {
     text = fmt::format("Computed from {} of {} runs with an estimate: the first {}{}\n",
                        drawn.runs.size(), drawn.num_with_estimate, drawn.num_first,
                        drawn.runs.size() > drawn.num_first ? " and this one" : "");
@@ -353,18 +355,20 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                                                 info.symbol, quantity_text(errors[*position], info),
                                                 rank_of(errors, *position), errors.size())
                                   : fmt::format("{}: {} runs", info.symbol, errors.size());
-  return fmt::format(
-      "{}\n{}\n{}\n{}\n{}{}", heading, basis_text(drawn),
-      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
-      terminal_text(drivers, style),
-      terminal_text(term_table(drawn, quantity, terms, position), style),
-      position ? "" : fitted(fmt::format("\nLargest |error|: run {}{}\n", worst, why)));
+  return fmt::format("{}\n{}\n{}\n{}\n{}{}", heading, basis_text(drawn),
+                     terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
+                     terminal_text(drivers, style),
+                     terminal_text(term_table(drawn, quantity, terms, position), style),
+                     position ? ""
+                              : fitted(fmt::format("\nLargest |error|{}: run {}{}\n",
+                                                   is_part(drawn) ? " of these" : "", worst, why)));
 }
 
 std::string unexplained_text(const DrawnRuns& drawn, std::span<const std::size_t> quantities) {
   std::vector<std::string> names;
   for (const std::size_t quantity : quantities) {
-    names.push_back(fmt::format("{} (largest: run {})", drawn.quantities[quantity].symbol,
+    names.push_back(fmt::format("{} (largest{}: run {})", drawn.quantities[quantity].symbol,
+                                is_part(drawn) ? " of these" : "",
                                 worst_run_of(drawn, quantity).value));
   }
   const Table table{
