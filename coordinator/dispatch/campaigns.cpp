@@ -69,6 +69,8 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
   CampaignState& campaign = state.campaigns[id];
   state.order.push_back(id);
   campaign.definition = stored.definition;
+  campaign.num_audited = stored.num_audited;
+  campaign.num_mismatches = stored.num_mismatches;
   campaign.model = {.version = std::string(stored.definition->model().version()),
                     .reference_digest = stored.reference_digest != 0
                                             ? stored.reference_digest

@@ -177,7 +177,9 @@ FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const Coordinato
                            .control = store.control(),
                            .finished = store.finished_runs(),
                            .elsewhere = campaign.elsewhere,
-                           .compared = store.compared_runs()},
+                           .compared = store.compared_runs(),
+                           .num_audited = store.num_compared(),
+                           .num_mismatches = store.num_contradicting()},
                 .plan = store.stop_plan(),
                 .num_failures = store.num_without_estimate()};
   if (given_up == GivenUpRuns::keep) {

@@ -52,9 +52,11 @@ class ServiceWithADirectory : public test::ServiceTest {
 
   /// As another program may do it.
   void change_file(const std::string& name, const std::string& assignment) {
+    execute(name, "UPDATE campaign SET " + assignment);
+  }
+  void execute(const std::string& name, const std::string& sql) {
     sqlite3* file = nullptr;
     ASSERT_EQ(sqlite3_open((directory / (name + ".db")).c_str(), &file), SQLITE_OK);
-    const std::string sql = "UPDATE campaign SET " + assignment;
     EXPECT_EQ(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
     sqlite3_close(file);
   }
@@ -296,6 +298,25 @@ TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
             "campaign a: active, 1 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
   EXPECT_EQ(worker.borrow(1).first_run(), 0U);
+}
+
+// A coordinator that ended has compared them. One of the files is opened, of the other one it is
+// enough that it has ended.
+TEST_F(ServiceWithADirectory, TellsOfContradictionsThatWereFoundBefore) {
+  make_file("a");
+  make_file("b");
+  execute("a",
+          "INSERT INTO audit VALUES (0, 1, 0, 'aaaaaaaaaaaaaaaa', 'bbbbbbbbbbbbbbbb', 0), (0, 2, "
+          "1, 'aaaaaaaaaaaaaaaa', 'aaaaaaaaaaaaaaaa', 0)");
+  execute("b", "INSERT INTO audit VALUES (0, 1, 0, 'aaaaaaaaaaaaaaaa', 'bbbbbbbbbbbbbbbb', 0)");
+  change_file("b", "phase = 'cancelled'");
+  start_service();
+  const proto::StatusReply status = client->status();
+  ASSERT_EQ(status.campaigns_size(), 2);
+  for (const proto::CampaignStatus& campaign : status.campaigns()) {
+    EXPECT_EQ(campaign.num_audited(), campaign.name() == "a" ? 2U : 1U);
+    EXPECT_EQ(campaign.num_mismatches(), 1U);
+  }
 }
 
 // Who reads the newest state is in nobody's way until the end of the service is written down.
