@@ -349,6 +349,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
   constexpr int num_threads_beside = 4;  // ZeroMQ's, and one for heartbeats.
   config.session = start.session;
+  config.on_registered = start.note_registered;
   config.hello = hello_for(options, start, config.log);
   const Cards cards = open_cards(options, config.hello.reference_digest(), config.log);
   const unsigned num_threads = num_threads_of(options, cards.devices.size());

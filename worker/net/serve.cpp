@@ -177,6 +177,7 @@ class Service {
   Service(const ServeConfig& config, Execution& execution, const wire::Wake& progress,
           StopSignals& signals)
       : log_(config.log),
+        on_registered_(config.on_registered),
         endpoint_(config.endpoint),
         progress_(progress),
         signals_(signals),
@@ -267,7 +268,9 @@ class Service {
     if (message.has_run_lease()) wire::kill_point(wire::KillPoint::after_lease);
     const bool was_registered = conversation_.is_registered();
     conversation_.on_message(message, now);
-    if (conversation_.is_registered() && !was_registered) log_(wire::Event::info("registered"));
+    if (!conversation_.is_registered() || was_registered) return;
+    on_registered_();
+    log_(wire::Event::info("registered"));
   }
 
   void send(proto::Envelope message) {
@@ -316,6 +319,7 @@ class Service {
   }
 
   const wire::Log& log_;
+  const std::function<void()>& on_registered_;
   const std::string& endpoint_;
   const wire::Wake& progress_;
   StopSignals& signals_;

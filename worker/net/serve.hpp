@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -54,6 +55,7 @@ struct ServeConfig {
   ConversationConfig conversation;
   SignalSource signals = SignalSource::anyone;
   std::optional<std::filesystem::path> spool;  ///< Where results survive this process.
+  std::function<void()> on_registered = [] {};
   wire::Log log = [](const wire::Event&) {};   ///< Told of all that happens.
 };
 

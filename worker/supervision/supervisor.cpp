@@ -2,15 +2,18 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -31,6 +34,28 @@ sigset_t supervised_signals() {
   }
   return set;
 }
+
+bool asks_to_end(int signal) { return signal == SIGTERM || signal == SIGINT || signal == SIGHUP; }
+
+/// A flag that a child shares with the process that made it.
+class SharedFlag {
+ public:
+  SharedFlag() {
+    void* const place = mmap(nullptr, sizeof(std::atomic<bool>), PROT_READ | PROT_WRITE,
+                             MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (place == MAP_FAILED) throw Error(fmt::format("memory ({})", std::strerror(errno)));
+    flag_ = new (place) std::atomic<bool>(false);
+  }
+  ~SharedFlag() { munmap(flag_, sizeof *flag_); }
+  SharedFlag(const SharedFlag&) = delete;
+  SharedFlag& operator=(const SharedFlag&) = delete;
+
+  std::atomic<bool>& operator*() const { return *flag_; }
+
+ private:
+  std::atomic<bool>* flag_ = nullptr;
+};
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 timespec timespec_of(Clock::duration time) {
   const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(time).count();
@@ -58,13 +83,19 @@ class Supervisor {
   int run() {
     std::optional<proto::FormerSession> former;
     while (true) {
-      const ChildStart start{.session = wire::SessionId{wire::random_number()}, .former = former};
+      *is_registered_ = false;
+      const ChildStart start{.session = wire::SessionId{wire::random_number()},
+                             .former = former,
+                             .note_registered = [this] { *is_registered_ = true; }};
       const std::uint64_t num_killed_before = wire::num_oom_kills();
       const pid_t child = start_child(start);
       const int status = wait_for(child);
       if (WIFEXITED(status) && WEXITSTATUS(status) != exit_hung) return WEXITSTATUS(status);
       if (num_requests_ > 0) return exit_code_of(status);
-      former = former_session(start.session, status, wire::num_oom_kills() > num_killed_before);
+      // A session that nobody knows leaves no runs, but it may not have told of the one before.
+      if (*is_registered_) {
+        former = former_session(start.session, status, wire::num_oom_kills() > num_killed_before);
+      }
       if (!wait_before_restart(status)) return 0;
     }
   }
@@ -151,6 +182,7 @@ class Supervisor {
   RestartPolicy policy_;
   RestartConfig config_;
   sigset_t signals_;
+  SharedFlag is_registered_;  ///< Of the child that runs.
   int num_requests_ = 0;
 };
 

@@ -41,8 +41,15 @@ class RestartPolicy {
 /// What a child process begins with.
 struct ChildStart {
   wire::SessionId session;
-  std::optional<proto::FormerSession> former;  ///< Of the child before it, if a signal ended it.
+  /// Of the last child before it that registered, if a signal ended it and nobody was told yet.
+  std::optional<proto::FormerSession> former;
+  /// To be called once a coordinator knows the session and has been told of the former one.
+  std::function<void()> note_registered = [] {};
 };
+
+/// The signals that ask a worker to end: SIGTERM, SIGINT, and SIGHUP unless it is ignored, as
+/// `nohup` has it.
+[[nodiscard]] std::vector<int> end_signals();
 
 /// Signal by which a supervisor hands on to its child that it was asked to end; the value that
 /// comes with it says how often. The signals themselves may reach both processes, or one.

@@ -51,6 +51,7 @@ constexpr RestartConfig at_once{.delay = RestartConfig::Duration::zero(),
 /// What the processes of a test tell each other.
 struct Board {
   std::atomic<int> num_starts = 0;
+  std::atomic<std::uint64_t> registered_session = 0;
   std::atomic<std::uint64_t> former_session = 0;
   std::atomic<int> num_requests = 0;
   std::atomic<pid_t> child = 0;
@@ -102,12 +103,31 @@ TEST_F(SupervisorTest, HandsOnTheExitCode) {
 // Nothing says that memory was short: somebody killed it, and the runs have no part in that.
 TEST_F(SupervisorTest, TellsOfAKillThatNobodyIsToBlameForIt) {
   const int exit_code = supervise_here([&](const ChildStart& start) {
-    if (note(start) == 0) std::raise(SIGKILL);
+    if (note(start) == 0) {
+      start.note_registered();
+      std::raise(SIGKILL);
+    }
     return start.former->reason() == proto::LOSS_REASON_PREEMPTED ? 0 : 1;
   });
   EXPECT_EQ(exit_code, 0);
   EXPECT_EQ(board.num_starts, 2);
   EXPECT_NE(board.former_session, 0U);
+}
+
+// The second one ends before a coordinator is told of the first, whose runs it still waits for.
+TEST_F(SupervisorTest, TellsOfTheLastSessionThatACoordinatorKnows) {
+  const int exit_code = supervise_here([&](const ChildStart& start) {
+    const int num_before = note(start);
+    if (num_before == 0) {
+      board.registered_session = start.session.value;
+      start.note_registered();
+    }
+    if (num_before < 2) std::raise(SIGKILL);
+    return 0;
+  });
+  EXPECT_EQ(exit_code, 0);
+  EXPECT_EQ(board.num_starts, 3);
+  EXPECT_EQ(board.former_session, board.registered_session);
 }
 
 TEST_F(SupervisorTest, GivesUpAWorkerThatCrashesTooOften) {
