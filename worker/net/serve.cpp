@@ -210,8 +210,7 @@ class Service {
       for (const wire::Event& event : conversation_.take_events()) log_(event);
     }
     notices_.stopping();
-    keep_results();
-    return *conversation_.ending();
+    return keep_results(*conversation_.ending());
   }
 
  private:
@@ -230,11 +229,18 @@ class Service {
   }
 
   /// All that will not stay in memory, at the end.
-  void keep_results() {
-    if (spool_) return note_spool(spool_->finish(conversation_.unacknowledged()));
-    if (conversation_.num_unacknowledged() == 0) return;
-    log_(wire::Event::warning("results_lost", {{"results", conversation_.num_unacknowledged()},
-                                               Field::reason("no spool")}));
+  Ending keep_results(Ending ending) {
+    if (spool_) note_spool(spool_->finish(conversation_.unacknowledged()));
+    const std::size_t num_lost = conversation_.num_unacknowledged();
+    if (num_lost == 0 || (spool_ && !spool_failure_)) return ending;
+    log_(wire::Event::warning(
+        "results_lost",
+        {{"results", num_lost}, Field::reason(spool_ ? *spool_failure_ : "no spool")}));
+    if (!spool_ || ending.kind == Ending::Kind::failed) return ending;
+    return {.kind = Ending::Kind::failed,
+            .reason = fmt::format("{}; the spool cannot be written, and {} results are lost: they "
+                                  "are computed again",
+                                  ending.reason, num_lost)};
   }
 
   void note_spool(const std::optional<std::string>& failure) {
