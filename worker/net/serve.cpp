@@ -344,8 +344,7 @@ class Service {
 int open_signals(SignalSource source) {
   sigset_t set;
   sigemptyset(&set);
-  sigaddset(&set, SIGTERM);
-  sigaddset(&set, SIGINT);
+  for (const int signal : end_signals()) sigaddset(&set, signal);
   if (source == SignalSource::supervisor) sigaddset(&set, handed_on_signal());
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);

@@ -17,10 +17,10 @@ namespace proofmass::worker {
 
 /// Who asks a worker to end, and by which signals.
 enum class SignalSource : std::uint8_t {
-  anyone,      ///< SIGTERM and SIGINT: the first drains, the second ends at once.
-  supervisor,  ///< handed_on_signal(), with how often; SIGTERM and SIGINT drain, as they may come
-               ///< in addition.
-  campaign,    ///< SIGTERM ends at once; SIGINT is ignored: the campaign deals with it.
+  anyone,      ///< end_signals(): the first drains, the second ends at once.
+  supervisor,  ///< handed_on_signal(), with how often; end_signals() drain, as they may come in
+               ///< addition.
+  campaign,    ///< SIGTERM ends at once; others are ignored: the campaign deals with them.
 };
 
 /// What signals have asked for so far.

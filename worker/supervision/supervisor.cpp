@@ -29,9 +29,8 @@ using Clock = std::chrono::steady_clock;
 sigset_t supervised_signals() {
   sigset_t set;
   sigemptyset(&set);
-  for (const int signal : {SIGTERM, SIGINT, SIGCHLD, SIGCONT, handed_on_signal()}) {
-    sigaddset(&set, signal);
-  }
+  for (const int signal : {SIGCHLD, SIGCONT, handed_on_signal()}) sigaddset(&set, signal);
+  for (const int signal : end_signals()) sigaddset(&set, signal);
   return set;
 }
 
@@ -125,7 +124,7 @@ class Supervisor {
     std::optional<int> status;
     while (!(status = wire::status_if_ended(child))) {
       const int signal = sigwaitinfo(&signals_, nullptr);
-      if (signal == SIGTERM || signal == SIGINT) {
+      if (asks_to_end(signal)) {
         ++num_requests_;
         sigqueue(child, handed_on_signal(), {.sival_int = num_requests_});
         kill(child, SIGCONT);
@@ -172,7 +171,7 @@ class Supervisor {
     while (true) {
       const timespec left = timespec_of(std::max(Clock::duration::zero(), until - Clock::now()));
       const int signal = sigtimedwait(&signals_, nullptr, &left);
-      if (signal == SIGTERM || signal == SIGINT) return true;
+      if (asks_to_end(signal)) return true;
       if (signal < 0 && errno == EAGAIN) return false;
     }
   }
@@ -196,6 +195,14 @@ std::optional<RestartConfig::Duration> RestartPolicy::on_crash(
   RestartConfig::Duration delay = config_.delay;
   for (std::size_t i = 1; i < crashes_.size() && delay < config_.delay_max; ++i) delay *= 2;
   return std::min(delay, config_.delay_max);
+}
+
+std::vector<int> end_signals() {
+  std::vector<int> signals{SIGTERM, SIGINT};
+  struct sigaction now {};
+  sigaction(SIGHUP, nullptr, &now);
+  if (now.sa_handler != SIG_IGN) signals.push_back(SIGHUP);
+  return signals;
 }
 
 int handed_on_signal() { return SIGRTMIN; }

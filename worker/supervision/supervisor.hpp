@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "proto/proofmass.pb.h"
 #include "proto/text/event.hpp"
@@ -61,8 +62,8 @@ inline constexpr int exit_hung = 3;
 /// Runs the work in a child process, and again when that crashes or hangs. To be called before the
 /// process has other threads or sockets.
 ///
-/// SIGTERM and SIGINT are handed on to the child. In it they are blocked, as is handed_on_signal();
-/// it gets SIGTERM if the supervisor ends.
+/// end_signals() are handed on to the child. In it they are blocked, as is handed_on_signal(); it
+/// gets SIGTERM if the supervisor ends.
 ///
 /// @param work  Called in the child; must not throw. Its value is the child's exit code.
 /// @param log   Told when a child has crashed.

@@ -61,7 +61,9 @@ class SupervisorTest : public testing::Test {
  protected:
   SupervisorTest()
       : board(*new (mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
-                         -1, 0)) Board) {}
+                         -1, 0)) Board) {
+    std::signal(SIGHUP, SIG_DFL);  // Whoever runs the tests may have it ignored.
+  }
   ~SupervisorTest() override { munmap(&board, sizeof(Board)); }
 
   /// Supervises the work in a process of its own, whose exit code is returned: 99 if it throws.
@@ -172,13 +174,21 @@ void wait_until_stopped(const Board& board) {
 TEST_F(SupervisorTest, HandsOnThatItIsAskedToEndAndHowOften) {
   const pid_t supervisor = start_supervisor([&](const ChildStart&) {
     std::raise(SIGTERM);
-    return count_requests(board, 2);
+    return count_requests(board, 3);
   });
   while (board.child == 0) std::this_thread::yield();
   kill(supervisor, SIGTERM);
   while (board.num_requests == 0) std::this_thread::yield();
   kill(supervisor, SIGINT);
-  EXPECT_EQ(exit_code_of(supervisor), 42);
+  while (board.num_requests == 1) std::this_thread::yield();
+  kill(supervisor, SIGHUP);
+  EXPECT_EQ(exit_code_of(supervisor), 43);
+}
+
+TEST(EndSignals, LeaveOutAHangupThatIsIgnored) {
+  const auto before = std::signal(SIGHUP, SIG_IGN);
+  EXPECT_THAT(end_signals(), testing::ElementsAre(SIGTERM, SIGINT));
+  std::signal(SIGHUP, before);
 }
 
 // As the kernel may leave one that is forked while its group is stopped and continued.
