@@ -32,6 +32,7 @@
 #include "coordinator/store/records.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/stop_rule.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/model_program/described_model.hpp"
 #include "proto/model_program/model_choice.hpp"
@@ -187,6 +188,16 @@ struct Outcome {
   bool is_done = false;  ///< Every run is stored or given up, and the stop rule is decided.
 };
 
+/// A campaign that was asked for more runs before computes these first.
+void note_late_check(const Store& store, const RunOptions& options, ProgressDisplay& display) {
+  if (options.is_quiet || options.stop.stop_rule.empty()) return;
+  const std::uint64_t num_runs = store.num_runs();
+  if (num_runs <= next_stop_check(num_runs_in(store.finished_runs()))) return;
+  display.note(fmt::format(
+      "proofmass: the stop rule is checked after {} runs: so many were asked for before",
+      num_runs));
+}
+
 /// Computes the missing runs, up to `num_runs` in all.
 /// @param start  Null if nothing has begun yet.
 Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options,
@@ -208,6 +219,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   }
   make_active(campaign.store, options);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
+  note_late_check(campaign.store, options, display);
   GrowingFile file;
   std::vector<ServedCampaign> campaigns;
   campaigns.push_back(std::move(campaign));
