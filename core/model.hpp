@@ -130,6 +130,9 @@ class Model {
   [[nodiscard]] virtual std::unique_ptr<PlanStudy> study(const Campaign& /*campaign*/) const {
     return nullptr;
   }
+  /// Whether study() takes these sessions; at once, so that it may still find that they do not
+  /// determine every quantity.
+  [[nodiscard]] virtual bool can_study(const Campaign& /*campaign*/) const { return false; }
 
   /// The text of a data file that campaigns name and that follows from physics, for the sessions of
   /// one campaign.

@@ -351,6 +351,12 @@ class MicroscopeModel final : public Model {
     return study_plan(*own);
   }
 
+  [[nodiscard]] bool can_study(const Campaign& campaign) const override {
+    const auto* const own = dynamic_cast<const MicroscopeCampaign*>(&campaign);
+    PROOFMASS_EXPECT(own != nullptr);
+    return can_study_plan(*own);
+  }
+
   [[nodiscard]] EnvironmentFile environment_file(Document& campaign, Document& physics,
                                                  const std::string& session) const override {
     auto [table, note] = made_environment(campaign, physics, session);

@@ -205,11 +205,7 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
 
 /// Empty for a campaign that `plan` knows no more of.
 std::string advice_to_plan(const CheckOptions& options, const Campaign& campaign) {
-  try {
-    if (campaign.model().study(campaign) == nullptr) return "";
-  } catch (const Error&) {
-    return "";
-  }
+  if (!campaign.model().can_study(campaign)) return "";
   // Without them it would tell of another campaign.
   std::string command = "proofmass plan " + wire::shell_word(options.file.string());
   for (const std::string& assignment : options.overrides.assignments) {

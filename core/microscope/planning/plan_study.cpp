@@ -104,14 +104,24 @@ MissChance miss_chance(const ParameterArray& objectives, const ParameterArray& e
   return chance;
 }
 
+/// The campaign as `joint` calibrates, without tests.
+/// @throws ConfigError if it cannot use the sessions.
+MicroscopeCampaign calibration_of(MicroscopeCampaign campaign) {
+  std::erase_if(campaign.scenario.sessions, is_test);
+  campaign.scenario.validate();
+  check_joint_campaign(campaign);
+  return campaign;
+}
+
+MicroscopeCampaign with_joint(MicroscopeCampaign campaign) {
+  campaign.scenario.estimation.method = method_named(joint_method.name);
+  return campaign;
+}
+
 class JointStudy final : public PlanStudy {
  public:
-  explicit JointStudy(const MicroscopeCampaign& campaign) : whole_(campaign), campaign_(campaign) {
-    whole_.scenario.estimation.method = method_named(joint_method.name);
-    campaign_.scenario.estimation.method = whole_.scenario.estimation.method;
-    std::erase_if(campaign_.scenario.sessions, is_test);
-    campaign_.scenario.validate();
-    check_joint_campaign(campaign_);
+  explicit JointStudy(const MicroscopeCampaign& campaign)
+      : whole_(with_joint(campaign)), campaign_(calibration_of(whole_)) {
     const Scenario& scenario = campaign_.scenario;
     const MicroscopeCampaign measured = measured_campaign(short_campaign(campaign_));
     for (const Session& session : measured.scenario.sessions) {
@@ -315,6 +325,15 @@ class JointStudy final : public PlanStudy {
 };
 
 }  // namespace
+
+bool can_study_plan(const MicroscopeCampaign& campaign) {
+  try {
+    (void)calibration_of(with_joint(campaign));
+    return true;
+  } catch (const ConfigError&) {
+    return false;
+  }
+}
 
 std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign) {
   if (campaign.scenario.noise.scale == 0.0) {
