@@ -1,5 +1,7 @@
 #include "core/statistics/requirement.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
