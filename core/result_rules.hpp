@@ -47,11 +47,19 @@ namespace proofmass {
   return parse_stop_rule(text, quantity_names(results));
 }
 
+/// Checks a requirement that somebody states; those that are stored are what they are.
+/// @param requirement  Of a stop rule about a width: without a confidence.
 /// @param text  Of the requirement or of the stop rule that has it, which `field` gave.
-/// @throws ConfigError if it is about all objectives and no parameter has one: none could be
-///         missed.
-inline void require_objective(const Requirement& requirement, std::span<const double> objectives,
-                              const std::string& field, const std::string& text) {
+/// @throws ConfigError if the same runs could show the contrary, too, or if it is about all
+///         objectives and no parameter has one: none could be missed.
+inline void require_answerable(const Requirement& requirement, std::span<const double> objectives,
+                               const std::string& field, const std::string& text) {
+  const double confidence = requirement.tolerance.confidence;
+  if (confidence > 0.0 && confidence < 0.5) {
+    throw ConfigError(field, text,
+                      "its confidence must be at least 50%: with less, the same runs would show a "
+                      "requirement and its contrary");
+  }
   const auto is_objective = [](double objective) { return std::isfinite(objective); };
   if (requirement.subject != Requirement::Subject::all_objectives) return;
   if (std::ranges::any_of(objectives, is_objective)) return;

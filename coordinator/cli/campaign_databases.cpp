@@ -86,8 +86,8 @@ void require_no_fewer_runs(const Store& store, const Campaign& wanted,
 
 void check_until(const Campaign& wanted, const std::string& stop_rule) {
   if (stop_rule.empty()) return;
-  require_objective(parse_stop_rule(stop_rule, wanted.results()).requirement, wanted.objectives(),
-                    "until", stop_rule);
+  require_answerable(parse_stop_rule(stop_rule, wanted.results()).requirement, wanted.objectives(),
+                     "until", stop_rule);
   if (wanted.table_columns.empty()) return require_independent(wanted, "until", stop_rule);
   throw UsageError(
       fmt::format("until = {} (must not be with quantities whose law is a table)", stop_rule));

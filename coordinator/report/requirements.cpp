@@ -342,7 +342,7 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
     RequirementAnswer answer;
     answer.stated = std::move(each);
     answer.requirement = parse_requirement(answer.stated.requirement, schema);
-    require_objective(answer.requirement, objectives, "requirement", answer.stated.requirement);
+    require_answerable(answer.requirement, objectives, "requirement", answer.stated.requirement);
     if (!answer.is_joint()) {
       answer.subject = requirement_subject(schema, answer.requirement.parameter);
       answer.limit = answer.requirement.limit;

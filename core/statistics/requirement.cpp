@@ -1,7 +1,5 @@
 #include "core/statistics/requirement.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -278,12 +276,6 @@ Requirement detail::read_requirement(Phrase& phrase) {
   requirement.tolerance.coverage = phrase.percentage();
   phrase.expect("with");
   requirement.tolerance.confidence = phrase.percentage();
-  if (requirement.tolerance.confidence < 0.5) {
-    phrase.refuse(
-        fmt::format("a confidence of {}% must be at least 50%: with less, the same runs "
-                    "would show a requirement and its contrary",
-                    100.0 * requirement.tolerance.confidence));
-  }
   return requirement;
 }
 

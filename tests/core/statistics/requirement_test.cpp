@@ -59,11 +59,15 @@ TEST(ParseRequirement, RefusesNumbersOutsideTheirRange) {
 }
 
 // Of 300 runs 5 exceed: P(≤ 5) is 0.917 and P(≥ 5) is 0.185 if 1 % of all draws do.
-TEST(ParseRequirement, RefusesARiskForAConfidence) {
-  EXPECT_EQ(refusal("k2c < 1 for 99% with 5%"),
-            "requirement = k2c < 1 for 99% with 5% (a confidence of 5% must be at least 50%: with "
+TEST(RequireAnswerable, RefusesARiskForAConfidence) {
+  const auto refusal_of = [](const std::string& text) {
+    return test::message_of<ConfigError>(
+        [&] { require_answerable(test::parse_requirement(text), {}, "requirement", text); });
+  };
+  EXPECT_EQ(refusal_of("k2c < 1 for 99% with 7%"),
+            "requirement = k2c < 1 for 99% with 7% (its confidence must be at least 50%: with "
             "less, the same runs would show a requirement and its contrary)");
-  EXPECT_NO_THROW((void)test::parse_requirement("k2c < 1 for 99% with 50%"));
+  EXPECT_EQ(refusal_of("k2c < 1 for 99% with 50%"), "");
 }
 
 // 0.99²⁹⁹ = 0.0495: 299 runs without an exceedance show it, 298 do not.
