@@ -152,12 +152,13 @@ std::string settling_note(const Scenario& scenario) {
   const std::string_view effect =
       "records begin before the loops have settled, which standard errors may take for noise: "
       "their slowest mode";
-  if (decay_s > 1e6) {
-    return fmt::format("{} hardly decays: a [[controller]] does not hold what it steers", effect);
-  }
+  const std::string_view cause = scenario.controllers.empty()
+                                     ? "raise the integral_hz of the loop, or set it to 0"
+                                     : "a [[controller]] holds what it steers too weakly";
+  if (decay_s > 1e6) return fmt::format("{} hardly decays: {}", effect, cause);
   const std::string advice =
       least_s > SimulationConfig::settling_max_s
-          ? "no simulation.settling_s is long enough; give the loop more gain"
+          ? fmt::format("no simulation.settling_s is long enough: {}", cause)
           : fmt::format(
                 "simulation.settling_s = {} is less than the {:.0f} s after which a "
                 "thousandth of it is left",
@@ -346,15 +347,11 @@ class MicroscopeModel final : public Model {
   }
 
   [[nodiscard]] std::unique_ptr<PlanStudy> study(const Campaign& campaign) const override {
-    const auto* const own = dynamic_cast<const MicroscopeCampaign*>(&campaign);
-    PROOFMASS_EXPECT(own != nullptr);
-    return study_plan(*own);
+    return study_plan(microscope_of(campaign));
   }
 
   [[nodiscard]] bool can_study(const Campaign& campaign) const override {
-    const auto* const own = dynamic_cast<const MicroscopeCampaign*>(&campaign);
-    PROOFMASS_EXPECT(own != nullptr);
-    return can_study_plan(*own);
+    return can_study_plan(microscope_of(campaign));
   }
 
   [[nodiscard]] EnvironmentFile environment_file(Document& campaign, Document& physics,
@@ -368,6 +365,13 @@ class MicroscopeModel final : public Model {
   }
 
   [[nodiscard]] std::string_view example_file() const override { return "hardy2013.toml"; }
+
+ private:
+  static const MicroscopeCampaign& microscope_of(const Campaign& campaign) {
+    const auto* const own = dynamic_cast<const MicroscopeCampaign*>(&campaign);
+    PROOFMASS_EXPECT(own != nullptr);
+    return *own;
+  }
 };
 
 }  // namespace

@@ -329,7 +329,7 @@ class JointStudy final : public PlanStudy {
 bool can_study_plan(const MicroscopeCampaign& campaign) {
   try {
     (void)calibration_of(with_joint(campaign));
-    return true;
+    return campaign.scenario.noise.scale > 0.0;
   } catch (const ConfigError&) {
     return false;
   }

@@ -19,7 +19,7 @@ namespace proofmass {
 ///         determine; Error if no instrument is accepted, or its lines are not finite.
 [[nodiscard]] std::unique_ptr<PlanStudy> study_plan(const MicroscopeCampaign& campaign);
 
-/// Whether `joint` can use the sessions.
+/// Whether there is noise, and `joint` can use the sessions.
 [[nodiscard]] bool can_study_plan(const MicroscopeCampaign& campaign);
 
 /// The unknowns that a normal matrix leaves open, alone or in combination with others: those with a

@@ -399,7 +399,13 @@ TEST(PlanStudy, ProbesTestsToo) {
 
 // Ten times the noise: in its square the line of K2d² is as small as the noise is large.
 TEST(PlanStudy, HasTheWarningsOfItsProbedRuns) {
-  MicroscopeCampaign campaign = tested_campaign();
+  MicroscopeCampaign campaign = simultaneous_campaign();
+  Session quiet;
+  quiet.name = "quiet";
+  quiet.target = SessionTarget::no_target;
+  quiet.num_orbits = 4;
+  quiet.fit_lines = {{2.0}};
+  campaign.scenario.sessions.push_back(quiet);
   const auto warnings = [&] {
     const auto study = study_plan(campaign);
     return study->bound(study->scope().num_steps).warnings;
