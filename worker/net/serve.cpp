@@ -231,11 +231,12 @@ class Service {
   /// All that will not stay in memory, at the end.
   Ending keep_results(Ending ending) {
     if (spool_) note_spool(spool_->finish(conversation_.unacknowledged()));
-    const std::size_t num_lost = conversation_.num_unacknowledged();
-    if (num_lost == 0 || (spool_ && !spool_failure_)) return ending;
+    const std::size_t num_lost = spool_ ? spool_->num_missing(conversation_.unacknowledged())
+                                        : conversation_.num_unacknowledged();
+    if (num_lost == 0) return ending;
     log_(wire::Event::warning(
         "results_lost",
-        {{"results", num_lost}, Field::reason(spool_ ? *spool_failure_ : "no spool")}));
+        {{"results", num_lost}, Field::reason(spool_ ? spool_failure_.value_or("") : "no spool")}));
     if (!spool_ || ending.kind == Ending::Kind::failed) return ending;
     return {.kind = Ending::Kind::failed,
             .reason = fmt::format("{}; the spool cannot be written, and {} results are lost: they "

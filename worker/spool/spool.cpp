@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -208,6 +209,12 @@ std::optional<std::string> Spool::look(const std::vector<wire::LeasedResult>& un
 std::optional<std::string> Spool::finish(const std::vector<wire::LeasedResult>& unacknowledged) {
   (void)look(unacknowledged);
   return look(unacknowledged);
+}
+
+std::size_t Spool::num_missing(const std::vector<wire::LeasedResult>& unacknowledged) const {
+  return static_cast<std::size_t>(std::ranges::count_if(unacknowledged, [&](const auto& result) {
+    return !spooled_.contains({result.campaign, result.computed.result.run});
+  }));
 }
 
 }  // namespace proofmass::worker

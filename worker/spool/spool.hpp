@@ -49,6 +49,9 @@ class Spool {
   /// Bytes at its end that were no records and have been dropped.
   [[nodiscard]] std::uint64_t num_bytes_dropped() const { return num_bytes_dropped_; }
 
+  /// How many of these results it does not hold.
+  [[nodiscard]] std::size_t num_missing(
+      const std::vector<wire::LeasedResult>& unacknowledged) const;
   /// To be called now and then with the results that are not acknowledged. Returns why they could
   /// not be written, if so, as `spool = PATH (reason)`; they stay in memory, and the next call
   /// tries again. What is written survives the process and the machine.
