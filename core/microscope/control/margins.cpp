@@ -149,7 +149,12 @@ Margins margins_of(const OpenLoop& open_loop, const Resonances& resonances) {
     }
     return whole;
   };
-  const std::vector<GridPoint> points = points_for(resonances);
+  std::vector<GridPoint> own_points;
+  std::span<const GridPoint> points = grid();
+  if (!resonances.poles.empty() || !resonances.zeros.empty()) {
+    own_points = points_for(resonances);
+    points = own_points;
+  }
   if (!Winding(sum, points).is_none()) return {};
   const auto excess = [&](double angle) { return norm(at(open_loop, angle)) - 1.0; };
   const auto height = [&](double angle) { return at(open_loop, angle).imag(); };
