@@ -303,7 +303,7 @@ struct StoredCampaign {
   std::vector<RunRange> compared = {};   ///< Finished runs of which a second result was compared.
   std::uint64_t num_audited = 0;         ///< As of CampaignState.
   std::uint64_t num_mismatches = 0;
-  std::vector<BlamedRun> blamed = {};    ///< Open runs.
+  std::vector<BlamedRun> blamed = {};  ///< Open runs.
 };
 
 /// A computer with workers, or with a history.

@@ -211,11 +211,9 @@ Table term_table(const DrawnRuns& drawn, std::size_t quantity,
 }
 
 /// Which runs were used, and which were not.
-bool is_part(const DrawnRuns& drawn) { return drawn.runs.size() < drawn.num_with_estimate; }
-
 std::string basis_text(const DrawnRuns& drawn) {
   std::string text;
-  if (is_part(drawn)) {
+  if (drawn.is_part()) {
     text = fmt::format("Computed from {} of {} runs with an estimate: the first {}{}\n",
                        drawn.runs.size(), drawn.num_with_estimate, drawn.num_first,
                        drawn.runs.size() > drawn.num_first ? " and this one" : "");
@@ -348,8 +346,9 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
     if (!dependence.empty()) drivers.notes.push_back(dependence);
   }
   const std::uint64_t worst = worst_run_of(drawn, quantity).value;
-  const std::string why =
-      has_rows ? fmt::format("; why: --run {} --parameter {}", worst, info.name) : "";
+  const std::string largest =
+      fmt::format("\nLargest |error|{}: run {}{}\n", drawn.of_these(), worst,
+                  has_rows ? fmt::format("; why: --run {} --parameter {}", worst, info.name) : "");
   const std::string heading = position
                                   ? fmt::format("Run {}: error of {} {}, rank {} of {}", run->value,
                                                 info.symbol, quantity_text(errors[*position], info),
@@ -359,17 +358,14 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                      terminal_text(driver_table(drawn, of_magnitude, "|error|", position), style),
                      terminal_text(drivers, style),
                      terminal_text(term_table(drawn, quantity, terms, position), style),
-                     position ? ""
-                              : fitted(fmt::format("\nLargest |error|{}: run {}{}\n",
-                                                   is_part(drawn) ? " of these" : "", worst, why)));
+                     position ? "" : fitted(largest));
 }
 
 std::string unexplained_text(const DrawnRuns& drawn, std::span<const std::size_t> quantities) {
   std::vector<std::string> names;
   for (const std::size_t quantity : quantities) {
     names.push_back(fmt::format("{} (largest{}: run {})", drawn.quantities[quantity].symbol,
-                                is_part(drawn) ? " of these" : "",
-                                worst_run_of(drawn, quantity).value));
+                                drawn.of_these(), worst_run_of(drawn, quantity).value));
   }
   const Table table{
       .notes = {fmt::format("No input found whose influence on these errors or their magnitudes "

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/report/read_results.hpp"
@@ -32,6 +33,10 @@ struct DrawnRuns {
   std::vector<Quantity> quantities;          ///< Whose errors these are.
   std::vector<std::vector<double>> columns;  ///< Their values, shape [names.size()][n].
   std::vector<std::vector<double>> errors;   ///< estimate − truth, SI; shape [quantities][n].
+
+  [[nodiscard]] bool is_part() const { return runs.size() < num_with_estimate; }
+  /// What a superlative is followed by.
+  [[nodiscard]] std::string_view of_these() const { return is_part() ? " of these" : ""; }
 };
 
 /// The first runs of a campaign database that have an estimate, `num_runs_max` of them at most.

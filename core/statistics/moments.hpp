@@ -43,9 +43,9 @@ class CompensatedSum {
 ///     mean = c + d̄      Σ(x − mean)² = Σd² − n d̄²      Σ(x − mean)³ = Σd³ − 3 d̄ Σd² + 2 n d̄³
 ///     Σ(x − mean)⁴ = Σd⁴ − 4 d̄ Σd³ + 6 d̄² Σd² − 3 n d̄⁴
 ///
-/// Powers are those of d over a power of two near the largest |d|, so that none of any doubles up
-/// to 1e150 leaves their range. README.md derives the error, a few 1e-16 even for values 1e8 ±
-/// 2e-4.
+/// Powers are those of d times a power of two, that of c or, once a |d| is too far above it, of
+/// that one: none of any doubles up to 1e150 leaves their range. README.md derives the error, a few
+/// 1e-16 even for values 1e8 ± 2e-4.
 struct Moments {
   std::size_t count = 0;
   double mean = 0.0;                ///< Unit of the values.

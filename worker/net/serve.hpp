@@ -56,7 +56,7 @@ struct ServeConfig {
   SignalSource signals = SignalSource::anyone;
   std::optional<std::filesystem::path> spool;  ///< Where results survive this process.
   std::function<void()> on_registered = [] {};
-  wire::Log log = [](const wire::Event&) {};   ///< Told of all that happens.
+  wire::Log log = [](const wire::Event&) {};  ///< Told of all that happens.
 };
 
 /// Computes runs for the coordinator at the endpoint until told to stop. To be called by the thread

@@ -192,7 +192,9 @@ struct Outcome {
 void note_late_check(const Store& store, const RunOptions& options, ProgressDisplay& display) {
   if (options.is_quiet || options.stop.stop_rule.empty()) return;
   const std::uint64_t num_runs = store.num_runs();
-  if (num_runs <= next_stop_check(num_runs_in(store.finished_runs()))) return;
+  const std::uint64_t num_settled =
+      num_runs_in(store.finished_runs()) + num_runs_in(store.given_up_runs());
+  if (num_runs <= next_stop_check(num_settled)) return;
   display.note(fmt::format(
       "proofmass: the stop rule is checked after {} runs: so many were asked for before",
       num_runs));
