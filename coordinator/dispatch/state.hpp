@@ -301,9 +301,9 @@ struct StoredCampaign {
   std::vector<RunRange> given_up = {};
   std::vector<RunRange> elsewhere = {};  ///< Unfinished runs that are not to be lent here.
   std::vector<RunRange> compared = {};   ///< Finished runs of which a second result was compared.
-  std::uint64_t num_audited = 0;         ///< As of CampaignState.
-  std::uint64_t num_mismatches = 0;
-  std::vector<BlamedRun> blamed = {};  ///< Open runs.
+  std::uint64_t num_audited = 0;         ///< Compared by coordinators before, of CampaignState.
+  std::uint64_t num_mismatches = 0;      ///< Likewise.
+  std::vector<BlamedRun> blamed = {};    ///< Open runs.
 };
 
 /// A computer with workers, or with a history.

@@ -54,9 +54,9 @@ struct ServeConfig {
   proto::Hello hello;
   ConversationConfig conversation;
   SignalSource signals = SignalSource::anyone;
-  std::optional<std::filesystem::path> spool;  ///< Where results survive this process.
-  std::function<void()> on_registered = [] {};
-  wire::Log log = [](const wire::Event&) {};  ///< Told of all that happens.
+  std::optional<std::filesystem::path> spool;   ///< Where results survive this process.
+  std::function<void()> on_registered = [] {};  ///< Called once a coordinator knows the session.
+  wire::Log log = [](const wire::Event&) {};    ///< Told of all that happens.
 };
 
 /// Computes runs for the coordinator at the endpoint until told to stop. To be called by the thread

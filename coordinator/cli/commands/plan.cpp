@@ -128,6 +128,7 @@ void add_losses(const Planned& plan, Table& table) {
       "run");
 }
 
+/// What may move estimates beyond the bound, in runs that are not lost.
 void add_warnings(const Planned& plan, Table& table) {
   const PlanWarnings& warnings = plan.bound.warnings;
   if (warnings.num_runs == 0) return;
