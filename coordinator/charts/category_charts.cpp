@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "coordinator/charts/plot.hpp"
-#include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -68,8 +67,8 @@ void draw_group(const BarChart& chart, std::size_t category, double top, const A
     if (!value || !std::isfinite(*value)) continue;
     const double end = std::clamp(x.at(*value), x.begin, x.end);
     const std::string colour = writer.colour(series.ink);
-    writer.outlined_rectangle({x.begin, bar_top + 1.0, end - x.begin, bar_height - 2.0}, colour,
-                              opacity_of_series(i), {.colour = colour, .width = 1.0});
+    writer.rectangle({x.begin, bar_top + 1.0, end - x.begin, bar_height - 2.0}, colour,
+                     opacity_of_series(i), Stroke{.colour = colour});
     writer.text({end + 5.0, bar_top + bar_height - 2.0}, figure_text(*value));
   }
 }
@@ -88,9 +87,8 @@ void draw_cells(const HeatMap& map, Point corner, SvgWriter& writer) {
                   cell_height};
     const double value = cell.value.value_or(0.0);
     const double strength = std::isfinite(value) ? std::min(std::abs(value), 1.0) : 0.0;
-    writer.outlined_rectangle(box, writer.colour(value < 0.0 ? Ink::second : Ink::first),
-                              cell_opacity_max * strength,
-                              {.colour = writer.colour("--chart-grid"), .width = 1.0});
+    writer.rectangle(box, writer.colour(value < 0.0 ? Ink::second : Ink::first),
+                     cell_opacity_max * strength, Stroke{.colour = writer.colour(Ink::grid)});
     if (cell.label.empty()) continue;
     writer.text({box.left + cell_width / 2.0, box.bottom() - 7.0}, cell.label,
                 {.anchor = Anchor::middle});
@@ -180,7 +178,6 @@ void draw_bars(std::span<const TimelineBar> bars, Ink ink, const AxisMap& x, dou
 
 double draw_chart(const Timeline& timeline, Point corner, double width, SvgWriter& writer) {
   constexpr std::size_t num_ticks_max = 8;
-  PROOFMASS_EXPECT(timeline.x.scale == Scale::linear && timeline.x.from && timeline.x.to);
   const double height = draw_title(timeline.text.title, corner, width, writer);
   const Box box{corner.x + label_width, corner.y + height + 4.0, width - label_width - 12.0,
                 lane_height * static_cast<double>(timeline.lanes.size())};

@@ -17,7 +17,7 @@ namespace proofmass::coordinator {
 
 /// Colours by their role. A page or a theme says what they look like, see theme_colours(). Nothing
 /// is told by colour alone: layers also differ by dash, shape or label.
-enum class Ink : std::uint8_t { first, second, third, fourth, text };
+enum class Ink : std::uint8_t { ground, text, grid, first, second, third, fourth };
 enum class Dash : std::uint8_t { solid, dashed, dotted };
 enum class Shape : std::uint8_t { triangle, diamond };
 

@@ -118,7 +118,7 @@ double label_margin(const AxisRange& range) {
 void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
   for (const Tick& tick : y.range.ticks) {
     const double at = y.at(tick.value);
-    writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour("--chart-grid")});
+    writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour(Ink::grid)});
     writer.text({box.left - 6.0, at + 4.5}, tick.label, {.anchor = Anchor::end});
   }
   writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
@@ -296,8 +296,8 @@ void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
     writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
                 {.colour = colour, .width = 2.0, .dash = *dash});
   } else {
-    writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
-                              std::get<double>(entry.look), {.colour = colour, .width = 1.0});
+    writer.rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
+                     std::get<double>(entry.look), Stroke{.colour = colour});
   }
 }
 
@@ -364,7 +364,7 @@ void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWri
   double taken_to = -1e9;
   for (const Tick& tick : x.range.ticks) {
     const double at = x.at(tick.value);
-    writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
+    writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour(Ink::grid)});
     const double half = half_width(tick.label);
     if (at - half < taken_to) continue;  // It would touch the label before it.
     taken_to = at + half + 3.0;

@@ -48,14 +48,12 @@ struct Stroke {
 class SvgWriter {
  public:
   /// As a value of `fill` or `stroke`.
-  [[nodiscard]] std::string colour(std::string_view property) const;
   [[nodiscard]] std::string colour(Ink ink) const;
 
   /// @param place  Of the start, middle or end of the text's baseline.
   void text(Point place, std::string_view text, const TextStyle& style = {});
-  void rectangle(const Box& box, std::string_view fill);
-  void outlined_rectangle(const Box& box, std::string_view fill, double opacity,
-                          const Stroke& stroke);
+  void rectangle(const Box& box, std::string_view fill, double opacity = 1.0,
+                 const std::optional<Stroke>& stroke = {});
   void line(Point from, Point to, const Stroke& stroke);
   /// @param path  Data of a path, `M0 0L1 1`.
   void outline(std::string_view path, const Stroke& stroke);

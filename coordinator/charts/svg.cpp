@@ -11,7 +11,6 @@
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/charts/plot.hpp"
 #include "coordinator/table/table.hpp"
-#include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -26,18 +25,6 @@ double width_of_picture(const Picture& picture) {
   if (std::holds_alternative<Timeline>(picture)) return timeline_width;
   const auto* map = std::get_if<HeatMap>(&picture);
   return map == nullptr ? picture_width : std::max(picture_width, width_of(*map) + 2.0 * margin);
-}
-
-void check_id(const ChartText& text) {
-  static const std::regex rule("[A-Za-z][A-Za-z0-9_-]{0,199}");
-  PROOFMASS_EXPECT(std::regex_match(text.id, rule));
-}
-
-void check_ids(const Picture& picture) {
-  check_id(text_of(picture));
-  if (const auto* grid = std::get_if<ChartGrid>(&picture)) {
-    for (const Chart& chart : grid->charts) check_id(chart.text);
-  }
 }
 
 std::string opening(const ChartText& text, SvgUse use, double width, double height) {
@@ -64,7 +51,7 @@ const ChartText& text_of(const Picture& picture) {
 namespace {
 
 // The first inks are those of Okabe and Ito that differ from either ground by 3:1; on the light
-// one these are the darker half of the palette.
+// one these are the darker half of the palette. In the order of Ink.
 constexpr std::array<ThemeColour, 7> colours{{{"--chart-ground", "#ffffff", "#14171c"},
                                               {"--chart-text", "#1d2228", "#e8eaed"},
                                               {"--chart-grid", "#d7dbe0", "#3a4048"},
@@ -102,7 +89,6 @@ std::string standalone_style() {
 }  // namespace
 
 std::string svg_of(const Picture& picture, SvgUse use) {
-  check_ids(picture);
   const double width = width_of_picture(picture);
   SvgWriter body;
   const double height =
@@ -116,7 +102,7 @@ std::string svg_of(const Picture& picture, SvgUse use) {
   svg.raw(opening(text_of(picture), use, width, height));
   if (use == SvgUse::standalone) svg.raw(standalone_style() + "\n");
   if (use != SvgUse::embedded) {
-    svg.rectangle({0.0, 0.0, width, height}, svg.colour("--chart-ground"));
+    svg.rectangle({0.0, 0.0, width, height}, svg.colour(Ink::ground));
   }
   svg.raw(body.markup());
   const std::string markup = svg.markup() + "</svg>\n";
@@ -125,10 +111,6 @@ std::string svg_of(const Picture& picture, SvgUse use) {
 }
 
 namespace {
-
-/// In the order of Ink.
-constexpr std::array<std::string_view, 5> ink_properties{
-    "--chart-first", "--chart-second", "--chart-third", "--chart-fourth", "--chart-text"};
 
 std::string stroke_attributes(const Stroke& stroke) {
   const std::string_view dashes = stroke.dash == Dash::dashed   ? " stroke-dasharray=\"7 4\""
@@ -170,14 +152,9 @@ double text_width(std::string_view text) {
   return width_of_letter * text_size * static_cast<double>(wire::display_width(text));
 }
 
-std::string SvgWriter::colour(std::string_view property) const {
-  const auto found = std::ranges::find(theme_colours(), property, &ThemeColour::property);
-  PROOFMASS_EXPECT(found != theme_colours().end());
-  return fmt::format("var({},{})", property, found->light);
-}
-
 std::string SvgWriter::colour(Ink ink) const {
-  return colour(ink_properties.at(static_cast<std::size_t>(ink)));
+  const ThemeColour& colour = colours.at(static_cast<std::size_t>(ink));
+  return fmt::format("var({},{})", colour.property, colour.light);
 }
 
 void SvgWriter::text(Point place, std::string_view text, const TextStyle& style) {
@@ -194,14 +171,10 @@ void SvgWriter::text(Point place, std::string_view text, const TextStyle& style)
                   style.is_bold ? " font-weight=\"600\"" : "", rotation, wire::markup_text(text));
 }
 
-void SvgWriter::rectangle(const Box& box, std::string_view fill) {
-  markup_ += fmt::format("<rect{} fill=\"{}\"/>\n", box_attributes(box), fill);
-}
-
-void SvgWriter::outlined_rectangle(const Box& box, std::string_view fill, double opacity,
-                                   const Stroke& stroke) {
+void SvgWriter::rectangle(const Box& box, std::string_view fill, double opacity,
+                          const std::optional<Stroke>& stroke) {
   markup_ += fmt::format("<rect{} fill=\"{}\"{}{}/>\n", box_attributes(box), fill,
-                         opacity_attribute(opacity), stroke_attributes(stroke));
+                         opacity_attribute(opacity), stroke ? stroke_attributes(*stroke) : "");
 }
 
 void SvgWriter::line(Point from, Point to, const Stroke& stroke) {
@@ -222,7 +195,7 @@ void SvgWriter::area(std::string_view path, std::string_view fill, double opacit
 void SvgWriter::marker(Point centre, Shape shape, Ink ink) {
   markup_ +=
       fmt::format("<path d=\"{}\" fill=\"{}\"{}/>\n", marker_path(centre, shape), colour(ink),
-                  stroke_attributes({.colour = colour("--chart-ground"), .width = 1.0}));
+                  stroke_attributes({.colour = colour(Ink::ground), .width = 1.0}));
 }
 
 void SvgWriter::begin_group(std::string_view tooltip) {
