@@ -101,7 +101,7 @@ std::string attempts_of(const RecentAttempts& attempts) {
 std::string events_of(const std::deque<StoredEvent>& events, const std::string& name,
                       std::size_t page) {
   const std::size_t count = std::min(events.size(), shown_events_max);
-  const PageOfList list = page_of_list(page, count, rows_per_page);
+  const PageOfList list = page_of_list(page, count);
   Table table{.caption = "Events", .columns = {{"time", true}, {"event", true}, {"details", true}}};
   for (std::size_t i = list.first; i < list.end; ++i) {
     const StoredEvent& event = events[events.size() - 1 - i];

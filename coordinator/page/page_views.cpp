@@ -60,10 +60,6 @@ std::string age_line(TimePoint taken_at, TimePoint now) {
                     duration_text(age_s))}});
 }
 
-std::size_t page_number(const PageRequest& request, const std::string& parameter) {
-  return request.number(parameter).value_or(1);
-}
-
 std::vector<Remark> overview_notes(const ServiceSnapshot& service, const PageOfList& list) {
   std::vector<Remark> notes = service_notes(service.status);
   for (std::size_t i = list.first; i < list.end; ++i) {
@@ -86,7 +82,7 @@ std::string_view name_of(WorkerOrder order) {
 WorkerChoice worker_choice(const PageRequest& request) {
   constexpr std::size_t filter_size_max = 128;
   WorkerChoice choice{.filter = request.text("filter").substr(0, filter_size_max),
-                      .page = page_number(request, "page")};
+                      .page = request.number("page").value_or(1)};
   for (const WorkerOrder order : {WorkerOrder::state, WorkerOrder::throughput}) {
     if (request.text("sort") == name_of(order)) choice.order = order;
   }
@@ -190,7 +186,7 @@ ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
                            worker.status.host().find(choice.filter) != std::string::npos;
     if (is_wanted) chosen.push_back(&worker);
   }
-  const PageOfList list = page_of_list(choice.page, chosen.size(), rows_per_page);
+  const PageOfList list = page_of_list(choice.page, chosen.size());
   const auto before = [&](const RegisteredWorker* a, const RegisteredWorker* b) {
     return comes_before(*a, *b, choice.order);
   };
@@ -205,8 +201,7 @@ ChosenWorkers choose_workers(const std::vector<RegisteredWorker>& workers,
 PageContent overview_page(const ServiceSnapshot& snapshot, const PageRequest& request,
                           TimePoint now) {
   const std::vector<CampaignRecord>& campaigns = snapshot.campaigns;
-  const PageOfList list =
-      page_of_list(page_number(request, "page"), campaigns.size(), rows_per_page);
+  const PageOfList list = page_of_list(request.number("page").value_or(1), campaigns.size());
   Table table{.caption = "Campaigns", .columns = campaign_columns()};
   for (std::size_t i = list.first; i < list.end; ++i) {
     table.rows.push_back(row_of(campaigns[i].status));
@@ -237,8 +232,6 @@ PageContent workers_page(const ServiceSnapshot& snapshot, const PageRequest& req
 
 namespace {
 
-using wire::markup_text;
-
 std::string page_link(std::string_view address, std::size_t page, std::string_view text,
                       bool is_active) {
   if (!is_active) return fmt::format("<span class=\"off\">{}</span>", text);
@@ -267,7 +260,8 @@ std::string whole_page(const PageContent& content) {
       title, root, content.form, content.live);
 }
 
-PageOfList page_of_list(std::size_t page, std::size_t count, std::size_t num_per_page) {
+PageOfList page_of_list(std::size_t page, std::size_t count) {
+  constexpr std::size_t num_per_page = 50;
   PageOfList list{.count = count};
   list.num_pages = std::max<std::size_t>(1, (count + num_per_page - 1) / num_per_page);
   list.page = std::clamp<std::size_t>(page, 1, list.num_pages);

@@ -35,9 +35,8 @@ struct PageOfList {
   std::size_t count = 0;  ///< Of all.
 };
 
-/// The page that was asked for, or the last one if there are not so many.
-[[nodiscard]] PageOfList page_of_list(std::size_t page, std::size_t count,
-                                      std::size_t num_per_page);
+/// The page that was asked for, of 50 items, or the last one if there are not so many.
+[[nodiscard]] PageOfList page_of_list(std::size_t page, std::size_t count);
 
 /// `showing 1–50 of 10,000 workers`, and links to the first, previous, next and last page.
 /// @param address  Of a page, without its number: `workers?sort=name&amp;page=`; markup.
@@ -58,8 +57,6 @@ struct PageOfList {
 /// The style sheet and the script of all pages.
 [[nodiscard]] std::string page_style();
 [[nodiscard]] std::string_view page_script();
-
-inline constexpr std::size_t rows_per_page = 50;
 
 /// By what the workers are sorted.
 enum class WorkerOrder : std::uint8_t { name, state, throughput };

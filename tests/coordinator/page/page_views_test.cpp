@@ -22,26 +22,25 @@ void expect_harmless(const std::string& html) {
 }
 
 TEST(PageOfList, IsWithinTheList) {
-  const PageOfList second = page_of_list(2, 120, 50);
+  const PageOfList second = page_of_list(2, 120);
   EXPECT_EQ(second.first, 50U);
   EXPECT_EQ(second.end, 100U);
   EXPECT_EQ(second.num_pages, 3U);
-  EXPECT_EQ(page_of_list(99, 120, 50).page, 3U);
-  EXPECT_EQ(page_of_list(99, 120, 50).end, 120U);
-  EXPECT_EQ(page_of_list(0, 120, 50).page, 1U);
-  EXPECT_EQ(page_of_list(1, 0, 50).num_pages, 1U);
-  EXPECT_EQ(page_of_list(1, 0, 50).end, 0U);
+  EXPECT_EQ(page_of_list(99, 120).page, 3U);
+  EXPECT_EQ(page_of_list(99, 120).end, 120U);
+  EXPECT_EQ(page_of_list(0, 120).page, 1U);
+  EXPECT_EQ(page_of_list(1, 0).num_pages, 1U);
+  EXPECT_EQ(page_of_list(1, 0).end, 0U);
 }
 
 TEST(ListNavigation, SaysWhatIsShownOfAll) {
-  EXPECT_THAT(list_navigation(page_of_list(1, 10'000, 50), "workers", "workers?page="),
+  EXPECT_THAT(list_navigation(page_of_list(1, 10'000), "workers", "workers?page="),
               HasSubstr("showing 1–50 of 10,000 workers"));
-  const std::string last =
-      list_navigation(page_of_list(200, 10'000, 50), "workers", "workers?page=");
+  const std::string last = list_navigation(page_of_list(200, 10'000), "workers", "workers?page=");
   EXPECT_THAT(last, HasSubstr("showing 9,951–10,000 of 10,000 workers"));
   EXPECT_THAT(last, HasSubstr("<a href=\"workers?page=199\">previous</a>"));
   EXPECT_THAT(last, HasSubstr("<span class=\"off\">next</span>"));
-  EXPECT_THAT(list_navigation(page_of_list(1, 0, 50), "workers", ""), HasSubstr("no workers"));
+  EXPECT_THAT(list_navigation(page_of_list(1, 0), "workers", ""), HasSubstr("no workers"));
 }
 
 TEST(GroupedNumber, HasACommaEveryThreeDigits) {
@@ -114,7 +113,7 @@ TEST(Pages, ShowHostileTextAsText) {
 TEST(ChosenWorkers, AreThoseOfOnePageInOrder) {
   const std::vector<RegisteredWorker> workers = test::many_workers(120);
   const ChosenWorkers second = choose_workers(workers, {.page = 2});
-  ASSERT_EQ(second.workers.size(), rows_per_page);
+  ASSERT_EQ(second.workers.size(), 50U);
   EXPECT_EQ(second.workers.front()->status.name(), "w00050");
   EXPECT_EQ(second.workers.back()->status.name(), "w00099");
   EXPECT_EQ(choose_workers(workers, {.page = 3}).workers.size(), 20U);
