@@ -183,16 +183,15 @@ std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
 }
 
 EnvironmentFile environment_file(const std::filesystem::path& file, const Overrides& overrides,
-                                 const EnvironmentRequest& request) {
+                                 const std::filesystem::path& physics, const std::string& session) {
   Document campaign(file.string(), read_campaign_text(file), assignments_of(overrides));
   std::string text;
-  if (!request.physics.empty()) {
-    text = detail::read_definition_text(request.physics, campaign_file_size_max,
-                                        detail::Pipes::refused);
+  if (!physics.empty()) {
+    text = detail::read_definition_text(physics, campaign_file_size_max, detail::Pipes::refused);
   }
-  Document physics(request.physics.string(), text, {});
+  Document not_nominal(physics.string(), text, {});
   const Model* const named = named_model(campaign);
-  return (named != nullptr ? *named : model()).environment_file(campaign, physics, request.session);
+  return (named != nullptr ? *named : model()).environment_file(campaign, not_nominal, session);
 }
 
 std::unique_ptr<Campaign> example_campaign(const Model& of) {

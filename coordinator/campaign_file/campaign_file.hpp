@@ -66,17 +66,13 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 [[nodiscard]] std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
                                                       const Overrides& overrides = {});
 
-/// What an environment file is to be made for.
-struct EnvironmentRequest {
-  std::filesystem::path physics = {};  ///< File that says what is not nominal; empty: nothing.
-  std::string session = {};            ///< As in Model::environment_file().
-};
-
 /// Model::environment_file() for a campaign file, whose data files need not exist.
+/// @param physics  File that says what is not nominal; empty: nothing.
 /// @throws DefinitionError or ConfigError
 [[nodiscard]] EnvironmentFile environment_file(const std::filesystem::path& file,
                                                const Overrides& overrides,
-                                               const EnvironmentRequest& request);
+                                               const std::filesystem::path& physics,
+                                               const std::string& session);
 
 /// The campaign of Model::example().
 [[nodiscard]] std::unique_ptr<Campaign> example_campaign(const Model& of);

@@ -46,14 +46,16 @@ int write_example(const InitOptions& options) {
 struct EnvironmentOptions {
   std::filesystem::path file;
   Overrides overrides;
-  EnvironmentRequest request;
+  std::filesystem::path physics;
+  std::string session;
   std::filesystem::path output;
   wire::IfThere if_there = wire::IfThere::keep;
 };
 
 int write_environment(const EnvironmentOptions& options) {
   check_document(options.output, options.if_there);
-  const auto [text, note] = environment_file(options.file, options.overrides, options.request);
+  const auto [text, note] =
+      environment_file(options.file, options.overrides, options.physics, options.session);
   if (text.empty()) {
     throw UsageError(
         fmt::format("{}: campaigns of this model have no environment file", options.file.string()));
@@ -134,11 +136,9 @@ void add_environment(CLI::App& app, Command& chosen) {
   add_path(command, wire::file_type, "--output", options.output,
            "File (CSV) to write; - for standard output")
       ->required();
-  command
-      .add_option("--session", options.request.session,
-                  "Session that it is for, if their spins differ")
+  command.add_option("--session", options.session, "Session that it is for, if their spins differ")
       ->type_name("NAME");
-  add_path(command, wire::file_type, "--physics", options.request.physics,
+  add_path(command, wire::file_type, "--physics", options.physics,
            "File (TOML) of what is not nominal");
   add_force_flag(command, options.if_there);
   add_override_options(command, options.overrides);
