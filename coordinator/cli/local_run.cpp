@@ -63,10 +63,6 @@ std::string progress_line(const proto::CampaignStatus& status) {
   return fmt::format("{}/{} runs  {}", status.num_done(), status.num_runs(), figures(status));
 }
 
-DisplayMode display_mode_for(std::FILE* stream) {
-  return takes_escapes(stream) ? DisplayMode::bar : DisplayMode::lines;
-}
-
 ProgressDisplay::ProgressDisplay(DisplayMode mode, std::FILE* stream)
     : mode_(mode), stream_(stream) {}
 

@@ -60,9 +60,6 @@ class ProgressDisplay {
   std::string shown_;  ///< The bar, or what the last line was about.
 };
 
-/// `bar` if the stream takes_escapes(), `lines` otherwise.
-[[nodiscard]] DisplayMode display_mode_for(std::FILE* stream);
-
 /// Worker processes of this machine, of one thread each: what kills one costs the runs of that
 /// thread only. They end with this process, however it ends.
 class WorkerProcesses {

@@ -220,7 +220,10 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
         num_workers(options, *campaign.definition, part.count - num_finished_now), options.gpus);
   }
   make_active(campaign.store, options);
-  ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
+  ProgressDisplay display(options.is_quiet        ? DisplayMode::quiet
+                          : takes_escapes(stderr) ? DisplayMode::bar
+                                                  : DisplayMode::lines,
+                          stderr);
   note_late_check(campaign.store, options, display);
   GrowingFile file;
   std::vector<ServedCampaign> campaigns;
