@@ -105,6 +105,13 @@ void add_ends(Table& table, Column from, Column to,
 /// campaign without a budget has no rows; one without an estimate has.
 [[nodiscard]] Table budget_table(const Review& review);
 
+/// What a reader of a budget should know: what its level is, and ErrorBudget::note line by line.
+/// @param unit  Of the level.
+/// @param told  Of which runs the level is, with its value: `the runs: worst 2, mean 1`; empty if
+///              no run tells it, so that the assumed one holds.
+[[nodiscard]] std::vector<std::string> level_notes(const ErrorBudget& budget, std::string_view unit,
+                                                   std::string_view told);
+
 /// A value of a quantity in its display unit, as a report spells it: `32.4 nm`, `11.6×10⁻⁴ rad`.
 [[nodiscard]] std::string quantity_text(double value, const Quantity& quantity);
 

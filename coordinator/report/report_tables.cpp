@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
-#include "coordinator/report/budget_notes.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/table.hpp"
