@@ -342,23 +342,6 @@ std::vector<std::string> column_names(sqlite3_stmt* statement) {
 
 }  // namespace
 
-void check_attached_name(std::string_view name) {
-  const auto is_letter = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
-  };
-  const auto is_allowed = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); };
-  const bool is_name = !name.empty() && name.size() <= 64 && is_letter(name[0]) &&
-                       std::ranges::all_of(name, is_allowed);
-  const std::string text(name);
-  const bool is_taken =
-      sqlite3_stricmp(text.c_str(), "main") == 0 || sqlite3_stricmp(text.c_str(), "temp") == 0;
-  if (is_name && !is_taken) return;
-  throw InvalidArgument(fmt::format(
-      "name = {} (must be 1 to 64 letters, digits and _, not begin with a digit, and be neither "
-      "main nor temp)",
-      name));
-}
-
 std::string time_limit_text(const QueryLimits& limits) {
   return fmt::format("timeout = {} (the query did not end in so many seconds)",
                      limits.time_limit.count());

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <functional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -23,16 +22,12 @@ class QueryError : public InvalidArgument {
 
 /// Another campaign database, whose tables a query finds under `name.`.
 struct AttachedFile {
-  std::string name;  ///< Checked by check_attached_name().
+  std::string name;  ///< Letters, digits and _, no digit first; neither main nor temp.
   std::filesystem::path file;
 };
 
 /// Most files that one query attaches; SQLite has no room for more.
 inline constexpr std::size_t attached_files_max = 10;
-
-/// @throws InvalidArgument unless the name is 1 to 64 letters, digits and _, does not begin with a
-///         digit, and is neither main nor temp.
-void check_attached_name(std::string_view name);
 
 /// What a query may read.
 struct QueryFiles {

@@ -63,6 +63,13 @@ std::string read_standard_input() {
   return text;
 }
 
+/// A name in small letters that SQL takes without quotes and that SQLite has no other use for.
+bool is_attachable(const std::string& name) {
+  constexpr const char* allowed = "abcdefghijklmnopqrstuvwxyz0123456789_";
+  return !name.empty() && name.size() <= 64 && (name[0] < '0' || name[0] > '9') &&
+         name.find_first_not_of(allowed) == std::string::npos && name != "main" && name != "temp";
+}
+
 // `NAME=FILE`; the names differ, and letters in them have no case.
 std::vector<AttachedFile> attached_files_of(const std::vector<std::string>& texts) {
   std::vector<AttachedFile> files;
@@ -74,14 +81,15 @@ std::vector<AttachedFile> attached_files_of(const std::vector<std::string>& text
     const std::size_t sign = text.find('=');
     if (sign == std::string::npos || sign + 1 == text.size()) refuse("must be NAME=FILE");
     AttachedFile file{.name = text.substr(0, sign), .file = text.substr(sign + 1)};
-    try {
-      check_attached_name(file.name);
-    } catch (const InvalidArgument& error) {
-      refuse(error.what());
-    }
     std::string small = file.name;
     std::ranges::transform(small, small.begin(),
                            [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (!is_attachable(small)) {
+      refuse(
+          fmt::format("name = {} (must be 1 to 64 letters, digits and _, not begin with a digit, "
+                      "and be neither main nor temp)",
+                      file.name));
+    }
     if (!names.insert(small).second) refuse("its name is attached already");
     files.push_back(std::move(file));
   }
