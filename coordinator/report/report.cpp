@@ -266,7 +266,7 @@ Json json_of(const RequirementAnswer& row, Interpretation interpretation) {
             {"worst_run", row.worst ? Json(row.worst->run.value) : Json(nullptr)},
             {"worst_value", row.worst ? Json(row.worst->value) : Json(nullptr)}};
   json.update(json_of(row));
-  json["limit"] = row.limit;
+  json["limit"] = row.limit();
   return json;
 }
 

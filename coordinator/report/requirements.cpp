@@ -77,7 +77,7 @@ std::string count_lines(const RequirementAnswer& answer) {
 // Tables may show the quantity in another unit than that of the requirement.
 std::string limit_line(const RequirementAnswer& answer) {
   if (answer.is_joint() || answer.subject.unit == "1") return "";
-  return fmt::format("Limit        {:.6g} {}\n", answer.limit, answer.subject.unit);
+  return fmt::format("Limit        {:.6g} {}\n", answer.limit(), answer.subject.unit);
 }
 
 /// Of a requirement that a project's document states.
@@ -168,7 +168,7 @@ ExceedanceCount Exceedances::of(std::uint64_t num_runs) const {
 
 std::optional<double> RequirementAnswer::relative_margin() const {
   if (!bound) return std::nullopt;
-  return 1.0 - *bound / limit;
+  return 1.0 - *bound / limit();
 }
 
 Interval RequirementAnswer::exceedance_of_all() const {
@@ -345,7 +345,6 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
     require_answerable(answer.requirement, objectives, "requirement", answer.stated.requirement);
     if (!answer.is_joint()) {
       answer.subject = requirement_subject(schema, answer.requirement.parameter);
-      answer.limit = answer.requirement.limit;
     }
     answer.is_of_error = !answer.is_joint() && answer.requirement.parameter < objectives.size();
     rows_.push_back(

@@ -87,9 +87,6 @@ struct RequirementAnswer {
   /// What all runs have, where a number that was fixed decided before the last of them: its verdict
   /// stands, whatever follows. There is no bound then.
   std::optional<ExceedanceCount> of_all;
-  /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest
-  /// ratio of an |error| to its objective.
-  double limit = 1.0;
   /// Upper tolerance bound of the |error| or of that ratio by order statistics: with the confidence
   /// of the requirement, `coverage` of all draws do not exceed it. Empty if draws are too few.
   std::optional<double> bound;
@@ -102,6 +99,9 @@ struct RequirementAnswer {
     return requirement.subject == Requirement::Subject::all_objectives;
   }
   [[nodiscard]] bool is_of_budget() const { return !is_joint() && !is_of_error; }
+  /// The largest |error| that is admitted, SI; of all objectives together it is 1, the largest
+  /// ratio of an |error| to its objective.
+  [[nodiscard]] double limit() const { return is_joint() ? 1.0 : requirement.limit; }
   /// 1 − bound / limit.
   [[nodiscard]] std::optional<double> relative_margin() const;
   /// Of the probability that a draw exceeds, by all runs: two-sided, 95 %. @pre of_all

@@ -229,7 +229,7 @@ Row matrix_cells(const RequirementAnswer& row) {
   return {requirement_name(row),
           statement_of(row),
           {name_of(check.verdict), row.is_opposed() ? Tone::open : tone_of(check.verdict)},
-          value_cell(row, row.limit),
+          value_cell(row, row.limit()),
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
           count_cell(check.num_exceedances),
