@@ -263,7 +263,8 @@ ReadResults read_checked_results(const Store& store, const Campaign& campaign,
     results = read_results(store, campaign, further);
     results.is_digest_checked = check_digest(store, results.statistics.num_runs, results.digests);
     check_given_up(store, results);
-    check_stop_checks(store, campaign.objectives());
+    const auto differences = stop_check_differences(store, campaign.objectives());
+    if (!differences.empty()) store.refuse_as_damaged(differences.front());
   });
   return results;
 }

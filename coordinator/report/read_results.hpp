@@ -432,10 +432,6 @@ std::optional<std::uint64_t> summarise_file(
 [[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store,
                                                               std::span<const double> objectives);
 
-/// @throws StoreError `campaign database = x.db (is damaged: ...)` with the first of these
-/// differences.
-void check_stop_checks(const Store& store, std::span<const double> objectives);
-
 /// What came of a campaign's stop rule.
 struct StopOutcome {
   std::string rule = {};                   ///< As it was given.

@@ -154,11 +154,6 @@ std::vector<std::string> stop_check_differences(const Store& store,
   return differences;
 }
 
-void check_stop_checks(const Store& store, std::span<const double> objectives) {
-  const std::vector<std::string> differences = stop_check_differences(store, objectives);
-  if (!differences.empty()) store.refuse_as_damaged(differences.front());
-}
-
 namespace {
 
 RequirementVerdict verdict_of(const StopRule& rule, const StopCheck& check) {
