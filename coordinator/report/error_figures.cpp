@@ -9,6 +9,7 @@
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/standard_errors.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -288,8 +289,6 @@ std::optional<double> relative_percent(const std::optional<Interval>& interval, 
   return 50.0 * (interval->upper - interval->lower) / value;
 }
 
-}  // namespace
-
 Chart magnitude_chart(const Review& review, std::size_t index) {
   const Quantity& quantity = quantity_at(review, index);
   const Histogram& histogram = review.figures[index].magnitudes;
@@ -370,6 +369,22 @@ Chart convergence_chart(const Review& review, std::size_t index) {
     chart.layers.emplace_back(std::move(*curve));
   }
   return chart;
+}
+
+}  // namespace
+
+std::vector<Part> error_parts(const Review& review) {
+  std::vector<Part> parts;
+  const std::vector<Quantity>& quantities = review.schema.quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    const std::string& name = quantities[i].name;
+    parts.emplace_back(
+        Markup{fmt::format("<h3>{}</h3>\n", wire::markup_text(quantities[i].symbol))});
+    parts.emplace_back(NamedPicture{"histogram:" + name, magnitude_chart(review, i)});
+    parts.emplace_back(NamedPicture{"error:" + name, error_chart(review, i)});
+    parts.emplace_back(NamedPicture{"convergence:" + name, convergence_chart(review, i)});
+  }
+  return parts;
 }
 
 ChartGrid magnitude_overview(const Review& review) {

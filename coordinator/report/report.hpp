@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
@@ -121,27 +122,9 @@ void add_ends(Table& table, Column from, Column to,
 /// The id of a requirement; of an objective of the campaign, the symbol of its parameter.
 [[nodiscard]] std::string requirement_name(const RequirementAnswer& row);
 
-[[nodiscard]] Table matrix_table(const Review& review);
-
-/// budget_table() with the numbers of its notes in the spelling of documents.
-[[nodiscard]] Table review_budget_table(const Review& review);
-
-/// The sums that explain the errors. No rows without causes.
-[[nodiscard]] Table cause_table(const Review& review);
-
-/// The lines that the estimates use, and the noise about them. @pre There are spectra.
-[[nodiscard]] Table spectrum_table(const Review& review);
-
 /// Name, seed if it is known, digest, and how many runs ended how, each behind its name; what goes
 /// on about the one before has none. A row says so if the digest could not be checked.
 [[nodiscard]] std::vector<Row> summary_rows(const Review& review);
-
-/// What was run: that, warnings, model, build, definition, stop rule and note.
-[[nodiscard]] Table identity_table(const Review& review);
-
-/// Workers, core hours, losses.
-[[nodiscard]] Table execution_table(const Review& review);
-[[nodiscard]] Table host_table(const Review& review);
 
 /// The commands that repeat or check what the report shows, each with what it does.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> reproducing_commands(
@@ -158,15 +141,6 @@ struct SummarySentence {
 [[nodiscard]] std::vector<SummarySentence> review_summary(const Review& review);
 
 // The charts of a review report. Values are in the units of its tables.
-
-/// |error| of a quantity on a logarithmic axis, with its objective and the worst runs.
-[[nodiscard]] Chart magnitude_chart(const Review& review, std::size_t quantity);
-
-/// The error with its sign, with the interval of its bias.
-[[nodiscard]] Chart error_chart(const Review& review, std::size_t quantity);
-
-/// Worst, mean and standard deviation of |error| against the number of runs.
-[[nodiscard]] Chart convergence_chart(const Review& review, std::size_t quantity);
 
 /// |error| of all quantities beside each other, in units of their objectives; of those that have
 /// none, in units of the worst.
@@ -186,10 +160,6 @@ struct SummarySentence {
 /// Nothing without causes.
 [[nodiscard]] std::optional<HeatMap> cause_map(const Review& review);
 
-/// One for each session with a spectrum: measured, without the fitted lines, and of the noise
-/// model. @pre There are spectra.
-[[nodiscard]] std::vector<Chart> spectrum_charts(const Review& review);
-
 /// `spectrum:SESSION`, the name of a session's chart.
 [[nodiscard]] std::string spectrum_name(std::string_view session);
 
@@ -198,6 +168,23 @@ struct NamedPicture {
   std::string name;  ///< Empty: it does not know it.
   Picture picture;
 };
+
+/// Text of HTML, which Markdown leaves out.
+struct Markup {
+  std::string html;
+};
+
+/// What is shown beside each other, as far as there is room. Tables without rows and notes are
+/// left out.
+using Part = std::variant<Table, NamedPicture, Markup>;
+
+// The sections of a review report that are made of more than tables of `proofmass report`.
+[[nodiscard]] std::vector<Part> verification_parts(const Review& review);
+[[nodiscard]] std::vector<Part> error_parts(const Review& review);
+[[nodiscard]] std::vector<Part> budget_parts(const Review& review);
+[[nodiscard]] std::vector<Part> cause_parts(const Review& review);
+[[nodiscard]] std::vector<Part> spectrum_parts(const Review& review);
+[[nodiscard]] std::vector<Part> run_parts(const Review& review);
 
 /// All that have a name: two overviews, and those of the report in its order.
 [[nodiscard]] std::vector<NamedPicture> review_pictures(const Review& review);

@@ -9,6 +9,7 @@
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/statistics/distribution.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -289,19 +290,6 @@ Row line_cells(const ResultSchema& schema, const SessionSpectrum& spectrum,
           ratio ? Cell(ratio_text(*ratio), ratio->value) : Cell("–")};
 }
 
-}  // namespace
-
-std::vector<Chart> spectrum_charts(const Review& review) {
-  const RunSpectra& spectra = *review.spectra;
-  std::vector<Chart> charts;
-  for (const SessionSpectrum& spectrum : spectra.sessions) {
-    charts.push_back(spectrum_chart(review.schema, spectrum, spectra.run));
-  }
-  return charts;
-}
-
-std::string spectrum_name(std::string_view session) { return fmt::format("spectrum:{}", session); }
-
 Table spectrum_table(const Review& review) {
   const RunSpectra& spectra = *review.spectra;
   Table table{.id = "spectra",
@@ -320,6 +308,31 @@ Table spectrum_table(const Review& review) {
     }
   }
   return table;
+}
+
+}  // namespace
+
+std::string spectrum_name(std::string_view session) { return fmt::format("spectrum:{}", session); }
+
+std::vector<Part> spectrum_parts(const Review& review) {
+  std::vector<Part> parts;
+  if (!review.spectra) return parts;
+  const RunSpectra& spectra = *review.spectra;
+  for (const std::string& reason : spectra.reasons) {
+    parts.emplace_back(Markup{fmt::format("<p>{}</p>\n", wire::markup_text(reason))});
+  }
+  if (spectra.sessions.empty()) return parts;
+  parts.emplace_back(Markup{fmt::format(
+      "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
+      "bit for bit. Without the fitted lines, noise is left, if there is any, and lines that the "
+      "session does not fit. {}</p>\n",
+      spectra.run.value, wire::markup_text(spectra.sessions.front().noise_meaning))});
+  for (const SessionSpectrum& spectrum : spectra.sessions) {
+    parts.emplace_back(NamedPicture{spectrum_name(spectrum.session),
+                                    spectrum_chart(review.schema, spectrum, spectra.run)});
+  }
+  parts.emplace_back(spectrum_table(review));
+  return parts;
 }
 
 }  // namespace proofmass::coordinator

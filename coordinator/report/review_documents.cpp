@@ -51,15 +51,6 @@ figure{zoom:.62}
 }
 )";
 
-/// Text of HTML, which Markdown leaves out.
-struct Markup {
-  std::string html;
-};
-
-/// What is shown beside each other, as far as there is room. Tables without rows and notes are
-/// left out.
-using Part = std::variant<Table, NamedPicture, Markup>;
-
 struct Section {
   std::string id;
   std::string title;
@@ -72,100 +63,12 @@ std::vector<Part> parts_of(std::vector<Table> tables) {
   return {std::move_iterator(tables.begin()), std::move_iterator(tables.end())};
 }
 
-std::vector<Part> verification_parts(const Review& review) {
-  std::vector<Part> parts{matrix_table(review)};
-  // Without requirements there is one chart: that of the default tolerance.
-  std::string name = "characteristic";
-  for (Chart& chart : characteristic_charts(review)) {
-    parts.emplace_back(NamedPicture{std::exchange(name, ""), std::move(chart)});
-  }
-  if (parts.size() > 1) {
-    parts.emplace_back(Markup{fmt::format(
-        "<p class=\"note\">How probable it is that a campaign of as many draws meets a "
-        "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
-        "good instruments from bad ones; more draws make it steeper.</p>\n",
-        name_of(review.interpretation))});
-  }
-  return parts;
-}
-
 std::vector<Part> standard_error_parts(const Review& review) {
   const StandardErrorStatistics& statistics = review.results.standard_errors;
   std::vector<Part> parts = parts_of(standard_error_tables(review.schema, statistics));
   if (auto pulls = pull_overview(review.schema, statistics)) {
     parts.emplace_back(NamedPicture{"pulls", *std::move(pulls)});
   }
-  return parts;
-}
-
-std::vector<Part> error_parts(const Review& review) {
-  std::vector<Part> parts;
-  const std::vector<Quantity>& quantities = review.schema.quantities;
-  for (std::size_t i = 0; i < quantities.size(); ++i) {
-    const std::string& name = quantities[i].name;
-    parts.emplace_back(Markup{fmt::format("<h3>{}</h3>\n", markup_text(quantities[i].symbol))});
-    parts.emplace_back(NamedPicture{"histogram:" + name, magnitude_chart(review, i)});
-    parts.emplace_back(NamedPicture{"error:" + name, error_chart(review, i)});
-    parts.emplace_back(NamedPicture{"convergence:" + name, convergence_chart(review, i)});
-  }
-  return parts;
-}
-
-std::vector<Part> budget_parts(const Review& review) {
-  std::vector<Part> parts{review_budget_table(review)};
-  if (auto chart = budget_chart(review)) {
-    parts.emplace_back(NamedPicture{"budget", *std::move(chart)});
-  }
-  return parts;
-}
-
-std::vector<Part> cause_parts(const Review& review) {
-  std::vector<Part> parts;
-  if (auto map = cause_map(review)) {
-    parts.emplace_back(Markup{
-        "<p>Rows are drawn quantities, true parameters and products of two of them, less means "
-        "that are not 0; columns are "
-        "the errors with their signs. Cells below four standard errors are empty.</p>\n"});
-    parts.emplace_back(NamedPicture{"causes", *std::move(map)});
-  }
-  parts.emplace_back(cause_table(review));
-  return parts;
-}
-
-std::vector<Part> spectrum_parts(const Review& review) {
-  std::vector<Part> parts;
-  if (!review.spectra) return parts;
-  const RunSpectra& spectra = *review.spectra;
-  for (const std::string& reason : spectra.reasons) {
-    parts.emplace_back(Markup{fmt::format("<p>{}</p>\n", markup_text(reason))});
-  }
-  if (spectra.sessions.empty()) return parts;
-  parts.emplace_back(Markup{fmt::format(
-      "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
-      "bit for bit. Without the fitted lines, noise is left, if there is any, and lines that the "
-      "session does not fit. {}</p>\n",
-      spectra.run.value, markup_text(spectra.sessions.front().noise_meaning))});
-  std::vector<Chart> charts = spectrum_charts(review);
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    parts.emplace_back(
-        NamedPicture{spectrum_name(spectra.sessions[i].session), std::move(charts[i])});
-  }
-  parts.emplace_back(spectrum_table(review));
-  return parts;
-}
-
-std::vector<Part> run_parts(const Review& review) {
-  std::vector<Part> parts{identity_table(review)};
-  // The runs of an import were computed elsewhere.
-  if (!review.is_imported) {
-    parts.emplace_back(execution_table(review));
-    parts.emplace_back(host_table(review));
-  }
-  std::string html = "<h3>How to reproduce it</h3>\n<ul>\n";
-  for (const auto& [command, effect] : reproducing_commands(review)) {
-    html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
-  }
-  parts.emplace_back(Markup{html + "</ul>\n"});
   return parts;
 }
 

@@ -8,6 +8,7 @@
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/table/table.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -38,30 +39,6 @@ std::string with_powers_of_ten(const std::string& text) {
     result += found.prefix().str() + figure_text(std::stod(found.str()));
   }
   return result + std::string(begin, text.end());
-}
-
-}  // namespace
-
-std::string quantity_text(double value, const Quantity& quantity) {
-  const std::string figure = figure_text(value / quantity.display_scale);
-  if (quantity.display_unit == "1") return figure;
-  const std::string unit = unit_text(quantity.display_unit);
-  if (!unit.starts_with("10")) return figure + " " + unit;
-  const bool has_power = figure.find("×10") != std::string::npos || figure.starts_with("10⁻");
-  return has_power ? figure_text(value) + unit.substr(std::min(unit.find(' '), unit.size()))
-                   : figure + "×" + unit;
-}
-
-std::string name_in_symbols(const ResultSchema& schema, std::string_view name) {
-  const std::vector<Quantity>& quantities = schema.quantities;
-  const auto found = std::ranges::find(quantities, name, &Quantity::name);
-  return std::string(found == quantities.end() ? name : found->symbol);
-}
-
-Table review_budget_table(const Review& review) {
-  Table table = budget_table(review);
-  for (std::string& note : table.notes) note = with_powers_of_ten(note);
-  return table;
 }
 
 Table cause_table(const Review& review) {
@@ -163,33 +140,6 @@ Table host_table(const Review& review) {
   return table;
 }
 
-std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
-  const std::string database = wire::shell_word(review.database);
-  if (review.is_imported) {
-    return {{fmt::format("proofmass verify {}", database), "checks the database"},
-            {fmt::format("proofmass report {}{} --html report.html", database, review.options),
-             "makes this report anew"}};
-  }
-  const char* const program = review.is_of_program ? " --model-program PROGRAM" : "";
-  std::vector<std::pair<std::string, std::string>> commands{
-      {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),
-       "checks the database, simulates a tenth of the runs again and compares all bits"},
-      {fmt::format("proofmass report {}{} --html report.html", database, review.options),
-       "makes this report anew"}};
-  if (const std::optional<RunIndex> worst = worst_run_of(review)) {
-    const std::string replay = fmt::format("proofmass replay {} --run {}", database, worst->value);
-    if (review.is_of_program) {
-      commands.emplace_back(replay + program, "simulates the worst run again");
-    } else {
-      commands.emplace_back(fmt::format("{} --output run{}.h5", replay, worst->value),
-                            "writes the time series of the worst run");
-    }
-  }
-  return commands;
-}
-
-namespace {
-
 Cell count_cell(std::uint64_t count) { return {std::to_string(count), static_cast<double>(count)}; }
 
 /// `|error| of a_c12`, or the budget or a term of it.
@@ -289,12 +239,6 @@ std::vector<std::string> matrix_notes(const Review& review) {
   return notes;
 }
 
-}  // namespace
-
-std::string requirement_name(const RequirementAnswer& row) {
-  return row.stated.is_default && !row.is_joint() ? std::string(row.subject.symbol) : row.stated.id;
-}
-
 Table matrix_table(const Review& review) {
   Table table{.id = "matrix",
               .caption = fmt::format("Verification matrix (statistical interpretation: {})",
@@ -318,6 +262,109 @@ Table matrix_table(const Review& review) {
   }
   for (const RequirementAnswer& row : review.matrix) table.rows.push_back(matrix_cells(row));
   return table;
+}
+
+}  // namespace
+
+std::string quantity_text(double value, const Quantity& quantity) {
+  const std::string figure = figure_text(value / quantity.display_scale);
+  if (quantity.display_unit == "1") return figure;
+  const std::string unit = unit_text(quantity.display_unit);
+  if (!unit.starts_with("10")) return figure + " " + unit;
+  const bool has_power = figure.find("×10") != std::string::npos || figure.starts_with("10⁻");
+  return has_power ? figure_text(value) + unit.substr(std::min(unit.find(' '), unit.size()))
+                   : figure + "×" + unit;
+}
+
+std::string name_in_symbols(const ResultSchema& schema, std::string_view name) {
+  const std::vector<Quantity>& quantities = schema.quantities;
+  const auto found = std::ranges::find(quantities, name, &Quantity::name);
+  return std::string(found == quantities.end() ? name : found->symbol);
+}
+
+std::string requirement_name(const RequirementAnswer& row) {
+  return row.stated.is_default && !row.is_joint() ? std::string(row.subject.symbol) : row.stated.id;
+}
+
+std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
+  const std::string database = wire::shell_word(review.database);
+  if (review.is_imported) {
+    return {{fmt::format("proofmass verify {}", database), "checks the database"},
+            {fmt::format("proofmass report {}{} --html report.html", database, review.options),
+             "makes this report anew"}};
+  }
+  const char* const program = review.is_of_program ? " --model-program PROGRAM" : "";
+  std::vector<std::pair<std::string, std::string>> commands{
+      {fmt::format("proofmass verify {} --fraction 0.1{}", database, program),
+       "checks the database, simulates a tenth of the runs again and compares all bits"},
+      {fmt::format("proofmass report {}{} --html report.html", database, review.options),
+       "makes this report anew"}};
+  if (const std::optional<RunIndex> worst = worst_run_of(review)) {
+    const std::string replay = fmt::format("proofmass replay {} --run {}", database, worst->value);
+    if (review.is_of_program) {
+      commands.emplace_back(replay + program, "simulates the worst run again");
+    } else {
+      commands.emplace_back(fmt::format("{} --output run{}.h5", replay, worst->value),
+                            "writes the time series of the worst run");
+    }
+  }
+  return commands;
+}
+
+std::vector<Part> verification_parts(const Review& review) {
+  std::vector<Part> parts{matrix_table(review)};
+  // Without requirements there is one chart: that of the default tolerance.
+  std::string name = "characteristic";
+  for (Chart& chart : characteristic_charts(review)) {
+    parts.emplace_back(NamedPicture{std::exchange(name, ""), std::move(chart)});
+  }
+  if (parts.size() > 1) {
+    parts.emplace_back(Markup{fmt::format(
+        "<p class=\"note\">How probable it is that a campaign of as many draws meets a "
+        "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
+        "good instruments from bad ones; more draws make it steeper.</p>\n",
+        name_of(review.interpretation))});
+  }
+  return parts;
+}
+
+std::vector<Part> budget_parts(const Review& review) {
+  Table table = budget_table(review);
+  for (std::string& note : table.notes) note = with_powers_of_ten(note);
+  std::vector<Part> parts{std::move(table)};
+  if (auto chart = budget_chart(review)) {
+    parts.emplace_back(NamedPicture{"budget", *std::move(chart)});
+  }
+  return parts;
+}
+
+std::vector<Part> cause_parts(const Review& review) {
+  std::vector<Part> parts;
+  if (auto map = cause_map(review)) {
+    parts.emplace_back(Markup{
+        "<p>Rows are drawn quantities, true parameters and products of two of them, less means "
+        "that are not 0; columns are "
+        "the errors with their signs. Cells below four standard errors are empty.</p>\n"});
+    parts.emplace_back(NamedPicture{"causes", *std::move(map)});
+  }
+  parts.emplace_back(cause_table(review));
+  return parts;
+}
+
+std::vector<Part> run_parts(const Review& review) {
+  std::vector<Part> parts{identity_table(review)};
+  // The runs of an import were computed elsewhere.
+  if (!review.is_imported) {
+    parts.emplace_back(execution_table(review));
+    parts.emplace_back(host_table(review));
+  }
+  std::string html = "<h3>How to reproduce it</h3>\n<ul>\n";
+  for (const auto& [command, effect] : reproducing_commands(review)) {
+    html += fmt::format("<li><code>{}</code> {}</li>\n", wire::markup_text(command),
+                        wire::markup_text(effect));
+  }
+  parts.emplace_back(Markup{html + "</ul>\n"});
+  return parts;
 }
 
 }  // namespace proofmass::coordinator

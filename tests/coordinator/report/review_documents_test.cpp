@@ -132,11 +132,12 @@ TEST_F(ReviewHtml, NamesIntervalsThatAreDrawn) {
   Review review = review_of(store, 20);
   const auto names_of = [&] {
     std::string names;
-    for (const Layer& layer : error_chart(review, 0).layers) {
-      if (const auto* const line = std::get_if<LimitLine>(&layer)) names += line->label + ";";
-    }
-    for (const Layer& layer : convergence_chart(review, 0).layers) {
-      if (const auto* const band = std::get_if<Band>(&layer)) names += band->name + ";";
+    for (const auto& [name, picture] : review_pictures(review)) {
+      if (!name.ends_with(":" + review.schema.quantities[0].name)) continue;
+      for (const Layer& layer : std::get<Chart>(picture).layers) {
+        if (const auto* const line = std::get_if<LimitLine>(&layer)) names += line->label + ";";
+        if (const auto* const band = std::get_if<Band>(&layer)) names += band->name + ";";
+      }
     }
     return names;
   };
