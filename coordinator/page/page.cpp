@@ -133,17 +133,6 @@ HttpAnswer html_answer(const PageRequest& request, const PageContent& content) {
   return {.body = request.has("fragment") ? content.live : whole_page(content)};
 }
 
-std::optional<HttpAnswer> file_answer(const std::string& name) {
-  if (name == "style.css") {
-    return HttpAnswer{.content_type = "text/css; charset=utf-8", .body = page_style()};
-  }
-  if (name == "script.js") {
-    return HttpAnswer{.content_type = "text/javascript; charset=utf-8",
-                      .body = std::string(page_script())};
-  }
-  return std::nullopt;
-}
-
 HttpAnswer health(Duration since_turn) {
   if (since_turn < turn_interval_max) return plain_answer(200, "ok");
   return plain_answer(

@@ -442,8 +442,13 @@ constexpr std::string_view script = R"js('use strict';
 
 }  // namespace
 
-std::string page_style() { return review_style() + std::string(style); }
-
-std::string_view page_script() { return script; }
+std::optional<HttpAnswer> file_answer(std::string_view name) {
+  if (name == "style.css") {
+    return HttpAnswer{.content_type = "text/css; charset=utf-8",
+                      .body = review_style() + std::string(style)};
+  }
+  if (name != "script.js") return std::nullopt;
+  return HttpAnswer{.content_type = "text/javascript; charset=utf-8", .body = std::string(script)};
+}
 
 }  // namespace proofmass::coordinator

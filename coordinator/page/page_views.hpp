@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "coordinator/charts/chart.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/page/campaign_details.hpp"
+#include "coordinator/page/http_server.hpp"
 #include "coordinator/page/page_access.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/table/table.hpp"
@@ -55,8 +57,8 @@ struct PageOfList {
 [[nodiscard]] std::string notes_list(const std::vector<Remark>& notes);
 
 /// The style sheet and the script of all pages.
-[[nodiscard]] std::string page_style();
-[[nodiscard]] std::string_view page_script();
+/// The style sheet and the script of all pages; nothing of another name.
+[[nodiscard]] std::optional<HttpAnswer> file_answer(std::string_view name);
 
 /// By what the workers are sorted.
 enum class WorkerOrder : std::uint8_t { name, state, throughput };
