@@ -37,7 +37,6 @@ struct Point {
   double y = 0.0;
 };
 
-/// A histogram.
 struct Bars {
   std::string name = {};             ///< In the legend; if empty, it is not listed there.
   std::vector<double> edges = {};    ///< Ascending; one more than there are heights.
@@ -77,7 +76,6 @@ struct LimitLine {
 
 using Layer = std::variant<Bars, Curve, Band, LimitLine>;
 
-/// What every chart has.
 struct ChartText {
   /// Unique in a page: elements of the picture are named after it. 1 to 200 of A-Z a-z 0-9 _ and -,
   /// a letter first.

@@ -21,7 +21,6 @@ struct TextStyle {
   double rotation = 0.0;  ///< Degrees, clockwise, about the place of the text.
 };
 
-/// The height of all texts.
 inline constexpr double text_size = 13.0;
 
 /// Width of a text by the mean width of letters, about 5 % too large for most.
@@ -37,7 +36,6 @@ struct Box {
   [[nodiscard]] double bottom() const { return top + height; }
 };
 
-/// How an outline is drawn.
 struct Stroke {
   std::string colour;
   double width = 1.0;

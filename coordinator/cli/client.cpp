@@ -33,7 +33,6 @@ namespace {
 constexpr double timeout_s_min = 0.01;
 constexpr double timeout_s_max = 86400.0;
 
-/// Declares --keys and --insecure-plain.
 void add_key_options(CLI::App& command, ClientConnectionConfig& connection) {
   add_path(command, wire::directory_type, "--keys", connection.keys,
            "Directory with client.key and coordinator.pub")

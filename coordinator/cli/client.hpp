@@ -24,7 +24,6 @@ struct ClientOptions {
 };
 
 /// Declares --connect, --keys, --insecure-plain, --timeout and --json.
-/// @param options  Lives as long as the command.
 void add_client_options(CLI::App& command, ClientOptions& options);
 
 /// Warns on standard error if what is said goes unprotected beyond this machine.
@@ -58,7 +57,6 @@ using Ask = std::function<proto::ReplyEnvelope(const proto::RequestEnvelope&)>;
 /// Declares --connect, --keys and --insecure-plain for a command that reads a database by itself
 /// unless --connect names a coordinator. That option has no environment variable, since it changes
 /// what the command's first argument means.
-/// @param connection  Lives as long as the command.
 void add_optional_connection(CLI::App& command, ClientConnectionConfig& connection);
 
 /// Whether a coordinator is to be asked about a campaign of this name.
@@ -101,7 +99,6 @@ void read_answer(const Ask& ask, const proto::AnswerReply& answer,
 /// `mine active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
 [[nodiscard]] std::string campaign_line(const proto::CampaignStatus& campaign);
 
-/// What a client asked for.
 struct ActionTaken {
   std::string_view name;    ///< `pause`, `submit`.
   std::string_view kind;    ///< Of its target: `campaign`, `host`.

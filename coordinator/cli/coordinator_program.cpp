@@ -136,7 +136,6 @@ constexpr std::size_t workers_max_max = 65'536;
 constexpr std::size_t campaigns_per_key_max = 1'000'000;
 constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
 
-/// Arguments of `proofmass-coordinator`.
 struct ServeOptions {
   std::filesystem::path directory;      ///< Of the campaign databases.
   ServiceConfig service;                ///< As far as options set it; see config_of().

@@ -32,7 +32,6 @@ struct HttpAnswer {
 /// A line of plain text.
 [[nodiscard]] HttpAnswer plain_answer(unsigned status, std::string_view text);
 
-/// Bounds of a server.
 struct HttpConfig {
   std::string host = "127.0.0.1";  ///< Address of an interface, IPv4 or IPv6.
   std::uint16_t port = 0;          ///< 0: the system chooses one.
@@ -46,7 +45,6 @@ struct HttpConfig {
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< Of every answer.
 };
 
-/// What a server has done so far.
 struct HttpCounts {
   std::uint64_t num_connections = 0;  ///< Open now.
   std::uint64_t num_requests = 0;

@@ -226,7 +226,6 @@ Duration SnapshotBoard::since_turn(TimePoint now) const {
 
 namespace {
 
-/// Writes metrics one after the other.
 class MetricWriter {
  public:
   /// Begins a metric, whose samples follow: a counter if its name ends in `_total`.

@@ -76,7 +76,6 @@ inline constexpr std::size_t campaigns_with_metrics_max = 200;
 /// A label's value with backslash, quote and end of line escaped, and what is not UTF-8 visible.
 [[nodiscard]] std::string label_value(std::string_view text);
 
-/// Settings of a live page.
 struct PageConfig {
   /// Of parse_page_address(); `true`: page_address_by_default; empty or `false`: there is no page.
   /// These are the words of the command line for a flag.

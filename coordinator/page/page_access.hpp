@@ -16,7 +16,6 @@ namespace proofmass::coordinator {
 /// Where a live page is served if no address is given.
 inline constexpr std::string_view page_address_by_default = "127.0.0.1:5557";
 
-/// Where a live page is served.
 struct PageAddress {
   std::string host = "127.0.0.1";  ///< Address of an interface, IPv4 or IPv6 (without brackets).
   std::uint16_t port = 5557;       ///< 0: the system chooses one.
@@ -31,7 +30,6 @@ struct PageAddress {
 /// `http://127.0.0.1:5557/`
 [[nodiscard]] std::string url_of(const PageAddress& address);
 
-/// Who may see a page.
 class PageAccess {
  public:
   /// Without a token, the page is for this machine alone: the header Host must name loopback. Else

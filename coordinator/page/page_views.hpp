@@ -25,7 +25,6 @@ struct PageContent {
   std::string live = {};     ///< Markup that the script exchanges every two seconds.
 };
 
-/// A whole page.
 [[nodiscard]] std::string whole_page(const PageContent& content);
 
 /// Part of a list that is shown: pages count from 1.
@@ -56,21 +55,17 @@ struct PageOfList {
 /// A list of notes; nothing if there are none.
 [[nodiscard]] std::string notes_list(const std::vector<Remark>& notes);
 
-/// The style sheet and the script of all pages.
 /// The style sheet and the script of all pages; nothing of another name.
 [[nodiscard]] std::optional<HttpAnswer> file_answer(std::string_view name);
 
-/// By what the workers are sorted.
 enum class WorkerOrder : std::uint8_t { name, state, throughput };
 
-/// Which workers are shown, and how.
 struct WorkerChoice {
   WorkerOrder order = WorkerOrder::name;
   std::string filter = {};  ///< A part of the name or host of those that are shown; empty: all.
   std::size_t page = 1;
 };
 
-/// The workers of one page.
 struct ChosenWorkers {
   PageOfList list;
   std::vector<const RegisteredWorker*> workers = {};  ///< Of the snapshot.

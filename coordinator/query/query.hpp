@@ -29,7 +29,6 @@ struct AttachedFile {
 /// Most files that one query attaches; SQLite has no room for more.
 inline constexpr std::size_t attached_files_max = 10;
 
-/// What a query may read.
 struct QueryFiles {
   QueryFiles(std::filesystem::path main_file, std::vector<AttachedFile> attached_files = {})
       : main(std::move(main_file)), attached(std::move(attached_files)) {}
@@ -74,7 +73,6 @@ inline constexpr std::size_t sql_size_max = 1'000'000;
 [[nodiscard]] QueryEnd run_query(const QueryFiles& files, const std::string& sql,
                                  const QueryLimits& limits, RowWriter& writer);
 
-/// Where the answer to a query goes.
 struct QueryOutput {
   RowFormat format = RowFormat::table;
   TableLimits table;

@@ -62,7 +62,6 @@ namespace proofmass::coordinator {
 /// A number in the display unit, and in SI units for programs; a dash if there is none.
 [[nodiscard]] Cell figure_cell(const std::optional<double>& value, double scale = 1.0);
 [[nodiscard]] Cell no_figure();
-/// The scale of a share that is shown in percent.
 inline constexpr double percent_scale = 0.01;
 /// Adds a column with its cell in each row of the table, which are there already.
 void add_column(Table& table, Column column,
@@ -82,7 +81,6 @@ void add_ends(Table& table, Column from, Column to,
 /// Student's law. False also where nothing tells: of one run, of draws that are not independent,
 /// and of errors that are too skewed for that law.
 [[nodiscard]] bool is_biased(const Review& review, std::size_t quantity);
-/// The unit in which a table shows a quantity.
 [[nodiscard]] Cell unit_cell(const Quantity& quantity);
 
 /// Accuracy of each parameter beside the published one, and whose that is; always with rows.

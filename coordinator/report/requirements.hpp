@@ -123,7 +123,6 @@ struct RequirementAnswer {
 [[nodiscard]] std::string requirement_text(const RequirementAnswer& answer,
                                            Paint paint = Paint::no);
 
-/// What a verdict is painted for.
 [[nodiscard]] Tone tone_of(RequirementVerdict verdict);
 
 /// What is asked where nobody says what a requirement demands: each objective in 95 % of all draws,

@@ -51,7 +51,6 @@ struct DrawnRuns {
 /// The texts say so where a campaign has more.
 inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 
-/// The terms that explain a quantity's error.
 [[nodiscard]] std::vector<ExplanatoryTerm> terms_of(const DrawnRuns& drawn, std::size_t quantity);
 
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`

@@ -31,7 +31,6 @@ struct CampaignCounter {
 /// `and 3 more workers`; empty if all of `count` are shown.
 [[nodiscard]] std::string further_note(std::uint64_t count, int num_shown, std::string_view thing);
 
-/// Of the campaign's runs.
 [[nodiscard]] std::uint64_t percent_done(const proto::CampaignStatus& campaign);
 
 /// True if it is finished or cancelled.
@@ -50,7 +49,6 @@ struct CampaignCounter {
 [[nodiscard]] std::string service_line(const proto::StatusReply& status,
                                        std::set<std::string> versions);
 
-/// About a campaign.
 [[nodiscard]] std::vector<Remark> notes_about(const proto::CampaignStatus& campaign);
 
 /// About the coordinator itself: files that are not served, refused workers, hosts in quarantine,

@@ -43,30 +43,26 @@ struct ScreenSize {
 /// painted unless NO_COLOR is set and not empty (https://no-color.org).
 [[nodiscard]] TerminalStyle style_of(std::FILE* stream);
 
-/// How a command prints what it found.
 enum class OutputFormat : std::uint8_t { text, json };
 
 /// Says what a model program is asked for that may take long: Model::reference_digest().
 void say_reference_runs(const Model& model);
 
-/// Says that a file was written.
 void print_written(const std::filesystem::path& file, OutputFormat format);
 
+// What is printed. Each throws Error `standard output: No space left on device`.
+
 /// Prints lines, which may hold text of a file from elsewhere, as wire::visible_lines().
-/// @throws Error `standard output: No space left on device`.
 void print_lines(std::string_view text);
 
 /// Prints an object as JSON; bytes that are no UTF-8 become U+FFFD.
-/// @throws Error as print_lines().
 void print_json(const nlohmann::ordered_json& json);
 
 /// Writes bytes as they are: answers for programs, and text that is visible already, as that of
 /// terminal_text().
-/// @throws Error as print_lines().
 void write_standard_output(std::string_view text);
 
 /// Writes what is still buffered; without it a full disk goes unnoticed.
-/// @throws Error as print_lines().
 void flush_standard_output();
 
 // Files.
@@ -128,15 +124,15 @@ Declared<Options> add_stoppable_command(CLI::App& app, Command& chosen, const st
   return declared;
 }
 
+// The targets of the functions that declare options and arguments live as long as the command.
+
 /// Declares --json.
-/// @param format  Lives as long as the command.
 inline void add_json_flag(CLI::App& command, OutputFormat& format) {
   command.add_flag_callback(
       "--json", [&format] { format = OutputFormat::json; }, "Print JSON");
 }
 
 /// Declares --force.
-/// @param if_there  Lives as long as the command.
 inline void add_force_flag(CLI::App& command, wire::IfThere& if_there) {
   command.add_flag_callback(
       "--force", [&if_there] { if_there = wire::IfThere::replace; }, "Replace an existing file");
@@ -147,8 +143,7 @@ inline constexpr const char* database_type = "FILE.db";
 inline constexpr const char* campaign_file_type = "FILE.toml";
 
 /// Declares an option or argument that names one file or several.
-/// @param type   One of these types, or of wire.
-/// @param paths  Lives as long as the command, as the targets of the functions below do.
+/// @param type  One of these types, or of wire.
 template <typename Paths>
 CLI::Option* add_path(CLI::App& command, const char* type, const std::string& name, Paths& paths,
                       const std::string& description) {
@@ -232,7 +227,6 @@ void add_fetch(CLI::App& app, Command& chosen);
 // Options that several commands have.
 
 /// Declares --runs, --seed and --set.
-/// @param overrides  Lives as long as the command.
 void add_override_options(CLI::App& command, Overrides& overrides);
 
 /// Why a campaign with --failures was cancelled, for standard error.
@@ -244,11 +238,9 @@ void add_override_options(CLI::App& command, Overrides& overrides);
 [[nodiscard]] std::string example_requirement();
 
 /// Declares --until and --failures.
-/// @param options  Lives as long as the command.
 void add_stop_options(CLI::App& command, StopPlan& options);
 
 /// Declares --audit.
-/// @param audit_fraction  Lives as long as the command.
 void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction);
 
 /// Declares `--page` and `--page-token-file`. The flag takes an address only behind a `=`, so that

@@ -111,7 +111,6 @@ std::string losses_text(const PlanBound& bound, std::size_t num_probed) {
                      num_lost == 1 ? "is" : "are");
 }
 
-/// What loses runs, and what follows from it.
 void add_losses(const Planned& plan, Table& table) {
   const std::vector<PlanLoss>& losses = plan.bound.losses;
   if (losses.empty()) {

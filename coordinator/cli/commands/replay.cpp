@@ -63,7 +63,6 @@ class OutputDirectory {
   bool is_made_ = false;
 };
 
-/// The files that a replay of a run writes.
 std::vector<std::filesystem::path> files_of(const ReplayOptions& options, RunIndex run,
                                             const SignalSelection& selection) {
   if (options.output.empty()) return {};

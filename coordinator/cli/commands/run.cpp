@@ -61,7 +61,6 @@ std::uint64_t num_missing(const Store& store, const RunOptions& options) {
   return part.count - num_finished(store, part);
 }
 
-/// The runs beside a part.
 std::vector<RunRange> runs_beside(RunRange part, std::uint64_t num_runs) {
   RunSet runs(RunRange{{0}, num_runs});
   runs.remove(part);
@@ -182,7 +181,6 @@ void make_active(Store& store, const RunOptions& options) {
   (void)store.write({&control, 1});
 }
 
-/// What came of a campaign.
 struct Outcome {
   Store store;
   bool is_done = false;  ///< Every run is stored or given up, and the stop rule is decided.

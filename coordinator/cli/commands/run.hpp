@@ -16,7 +16,6 @@
 
 namespace proofmass::coordinator {
 
-/// How a campaign is run on this machine.
 struct RunOptions {
   std::filesystem::path campaign_file;
   std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
@@ -34,7 +33,6 @@ struct RunOptions {
 
 /// Declares the options of `run` that say which campaign is run and how, but for FILE, --db,
 /// --range and those of the page.
-/// @param options  Lives as long as the command.
 void add_run_options(CLI::App& command, RunOptions& options);
 
 /// What a database may be asked for by `run` and its options.
@@ -47,7 +45,6 @@ void add_run_options(CLI::App& command, RunOptions& options);
 /// @throws Error if the campaign file, the database or the workers cannot be used.
 [[nodiscard]] int run_campaign(const RunOptions& options);
 
-/// Most campaigns of one sweep.
 inline constexpr std::size_t num_swept_max = 1000;
 
 /// A key of a campaign file and the values that it gets, one after the other.
@@ -90,7 +87,6 @@ struct FirstBatch {
   std::vector<RunResult> results;  ///< Empty if half a second was not enough for all steps.
 };
 
-/// @param plan  The campaign's.
 [[nodiscard]] FirstBatch try_first_batch(const Campaign& campaign, const Plan& plan);
 
 /// What it costs to run campaigns on this machine.

@@ -33,7 +33,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// Arguments of `proofmass submit`.
 struct SubmitOptions {
   ClientOptions client;
   std::filesystem::path campaign_file;
@@ -45,7 +44,6 @@ struct SubmitOptions {
   bool waits = false;
 };
 
-/// The campaign that the arguments name.
 std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
   check_until(*campaign, options.stop.stop_rule);

@@ -204,7 +204,6 @@ std::string count_text(const MergedPart& part) {
   return fmt::format("{}, and {} equal to those of parts before it", num_new, part.num_again);
 }
 
-/// Runs without a result.
 RunSet runs_missing_in(const Store& store) {
   RunSet missing(RunRange{{0}, store.num_runs()});
   missing.remove(RunSet(store.finished_runs()));
