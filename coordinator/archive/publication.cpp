@@ -1,7 +1,9 @@
 #include <fmt/format.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -16,6 +18,7 @@
 #include "core/math/instruction_set.hpp"
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -28,7 +31,10 @@ constexpr const char* database_name = "campaign.db";
 /// A directory for files that last no longer than the object.
 struct WorkDirectory {
   WorkDirectory() {
-    std::string name = std::filesystem::temp_directory_path() / "proofmass-archive-XXXXXX";
+    std::error_code error;
+    const path parent = std::filesystem::temp_directory_path(error);
+    if (error) throw Error(fmt::format("TMPDIR = {} (must be a directory)", std::getenv("TMPDIR")));
+    std::string name = parent / "proofmass-archive-XXXXXX";
     if (mkdtemp(name.data()) == nullptr) {
       throw Error(fmt::format("temporary directory = {} ({})", name, std::strerror(errno)));
     }
@@ -55,15 +61,17 @@ void write_file(const path& file, std::string_view text, wire::IfThere if_there)
 /// Runs a script of a shell.
 /// @param arguments  `$1` and so on.
 /// @return The first line of what it writes to standard error; empty if all went well.
-std::string complaint_of(const WorkDirectory& work, const char* script,
-                         std::initializer_list<std::string> arguments, const HeedStop& heed_stop) {
-  const path complaints = work.place / "complaints";
-  std::vector<std::string> words{
-      "/bin/sh", "-c", fmt::format("export LC_ALL=C\nexec 2>\"$0\"\n{}", script), complaints};
+std::string complaint_of(const char* script, std::initializer_list<std::string> arguments,
+                         const HeedStop& heed_stop) {
+  // In memory: a disk that is full would take the files' complaints that it is full.
+  const wire::Descriptor complaints(memfd_create("complaints", MFD_CLOEXEC));
+  if (complaints.number() < 0) throw Error(fmt::format("memory ({})", std::strerror(errno)));
+  std::vector<std::string> words{"/bin/sh", "-c", fmt::format("export LC_ALL=C\n{}", script), "sh"};
   words.insert(words.end(), arguments);
-  const int status = wire::wait_for_end(wire::start_program({.arguments = words}));
+  const int status = wire::wait_for_end(
+      wire::start_program({.arguments = words, .descriptors = {0, 1, complaints.number()}}));
   heed_stop();
-  const std::string text = text_of(complaints);
+  const std::string text = text_of(fmt::format("/proc/self/fd/{}", complaints.number()));
   const std::size_t begin = text.find_first_not_of('\n');  // gzip begins with an empty line.
   if (begin == std::string::npos) return status == 0 ? "" : wire::end_text(status);
   return wire::visible_text(text.substr(begin, text.find('\n', begin) - begin));
@@ -242,7 +250,7 @@ cd "$1/$2" && sha256sum -- * >../sums && mv ../sums SHA256SUMS && cd .. &&
 constexpr const char* unpack_script = R"sh(
 cd "$3" || exit
 gzip --decompress --stdout <"$1" | head --bytes="$2" |
-  tar --extract --no-same-owner --no-same-permissions
+  tar --extract --no-same-owner --no-same-permissions || exit
 chmod -R u+rwX .
 other=$(find . -mindepth 1 \( -path './*/*' \( ! -type f -o -links +1 -o -path './*/*/*' \) \
   -o ! -path './*/*' ! -type d \) -print -quit)
@@ -252,7 +260,7 @@ other=$(find . -mindepth 1 \( -path './*/*' \( ! -type f -o -links +1 -o -path '
 
 constexpr const char* sums_script = R"sh(
 cd "$1" || exit
-sha256sum --check --quiet --strict SHA256SUMS >&2
+sha256sum --check --quiet --strict SHA256SUMS >&2 || exit
 [ "$(ls -A | wc -l)" = $(($(wc -l <SHA256SUMS) + 1)) ] || echo "a file has no checksum" >&2)sh";
 
 /// Unpacks an archive. @return Its folder.
@@ -267,11 +275,14 @@ path unpacked(const path& archive, const WorkDirectory& work, const HeedStop& he
   const path place = work.place / "files";
   std::filesystem::create_directory(place);
   const std::string complaint =
-      complaint_of(work, unpack_script,
+      complaint_of(unpack_script,
                    {std::filesystem::absolute(archive),
                     fmt::to_string(std::max(unpacked_size_max, 64 * size)), place},
                    heed_stop);
-  if (!complaint.empty()) refuse("cannot be unpacked: " + complaint);
+  if (!complaint.empty()) {
+    const path parent = work.place.parent_path();
+    refuse(fmt::format("cannot be unpacked in {}: {}", parent.string(), complaint));
+  }
   return *std::filesystem::directory_iterator(place);
 }
 
@@ -316,7 +327,7 @@ void publish(const path& database, const path& archive, wire::IfThere if_there,
   write_texts(place, authors, heed_stop);
   wire::DraftFile draft("output", archive);
   const std::string complaint = complaint_of(
-      work, pack_script, {work.place, folder, std::filesystem::absolute(draft.draft())}, heed_stop);
+      pack_script, {work.place, folder, std::filesystem::absolute(draft.draft())}, heed_stop);
   if (!complaint.empty()) {
     throw Error(fmt::format("output = {} (cannot be written: {})", archive.string(), complaint));
   }
@@ -327,7 +338,7 @@ void check_publication(const path& archive, const VerifyOptions& options,
                        const std::function<void(const Check&)>& report, const HeedStop& heed_stop) {
   const WorkDirectory work;
   const path folder = unpacked(archive, work, heed_stop);
-  const std::string complaint = complaint_of(work, sums_script, {folder}, heed_stop);
+  const std::string complaint = complaint_of(sums_script, {folder}, heed_stop);
   Check sums = complaint.empty() ? Check::holds("of every file") : Check::fails(complaint);
   Check campaign;
   try {
