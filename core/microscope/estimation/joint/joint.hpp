@@ -71,8 +71,8 @@ void check_joint_records(const std::vector<Session>& sessions, double orbit_peri
 /// Largest amplitude of a push, m/s², where what the model leaves out moves a_d11' by a fiftieth of
 /// its objective if K2 is as large as it is drawn (root mean square). README.md derives both.
 struct PushLimits {
-  double alone_along_x;  ///< Of a push along X if nothing else pushes or shakes X.
-  double beside_others;  ///< Of a push along X beside another push or motion along X.
+  double alone_along_x;  ///< Of a push along X if nothing else pushes or moves.
+  double beside_others;  ///< Of a push along X beside another push or motion.
 };
 [[nodiscard]] PushLimits push_limits(const DrawnMoments& laws, double a_d11_objective);
 

@@ -161,10 +161,11 @@ std::string allowed_text(double limit) {
   return text;
 }
 
-/// Whether at most one excitation shakes the masses along X.
-bool shakes_x_once(const Session& session) {
+/// Whether at most one excitation pushes the satellite or moves masses. Along Y and Z they shake X
+/// as well, by misalignment and gradient.
+bool shakes_once(const Session& session) {
   return std::ranges::count_if(session.excitations, [](const Excitation& excitation) {
-           return excitation.kind == ExcitationKind::drag_free || tells_of_squares(excitation);
+           return excitation.kind != ExcitationKind::attitude;
          }) <= 1;
 }
 
@@ -173,7 +174,7 @@ double amplitude_max(const Session& session, const Excitation& excitation,
                      const PushLimits& limits) {
   if (excitation.kind == ExcitationKind::test_mass) return joint_motion_max_m;
   if (!pushes_along_x(excitation)) return std::numeric_limits<double>::infinity();
-  return shakes_x_once(session) ? limits.alone_along_x : limits.beside_others;
+  return shakes_once(session) ? limits.alone_along_x : limits.beside_others;
 }
 
 }  // namespace
@@ -273,7 +274,7 @@ void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& 
           fmt::format("must be <= {} for estimation.method = \"joint\"{}: beyond, what K2 makes "
                       "of it and the model leaves out may move a_d11' by 1/50 of its objective",
                       allowed_text(limit_m_s2),
-                      shakes_x_once(sessions[i]) ? "" : " beside the session's other excitations"));
+                      shakes_once(sessions[i]) ? "" : " beside the session's other excitations"));
     }
   }
 }
