@@ -221,10 +221,17 @@ class Campaign:
         self.quantities = self._read_quantities()
 
     def _check_that_log_is_there(self):
-        log = self.file.with_name(self.file.name + "-wal")
+        file = self.file.resolve()
+        log = file.with_name(file.name + "-wal")
+
+        def is_log_there():
+            try:
+                return log.stat().st_size > 0  # SQLite makes an empty one where it finds none.
+            except FileNotFoundError:
+                return False
 
         def lacks_log():
-            return self._row("SELECT is_log_needed FROM campaign")[0] and not log.exists()
+            return self._row("SELECT is_log_needed FROM campaign")[0] and not is_log_there()
 
         # The log comes and goes while a coordinator works.
         if lacks_log() and lacks_log():

@@ -166,11 +166,12 @@ def check_replay(machine, proofmass, numpy):
 
 
 def check_refusals(machine, proofmass):
-    def refusal(change):
+    def refusal(*changes):
         copy = machine.path("copy.db")
         shutil.copy(machine.path("a.db"), copy)
         with sqlite3.connect(copy) as database:
-            database.execute(change)
+            for change in changes:
+                database.execute(change)
         database.close()
         try:
             proofmass.open(copy)
@@ -182,8 +183,11 @@ def check_refusals(machine, proofmass):
         file + "(is not a Proofmass campaign: its application_id is 5, not "), "application_id"
     newer = refusal("PRAGMA user_version = 99")
     assert newer.startswith(file + "(is newer than this reader: its user_version is 99"), newer
-    lacking = refusal("UPDATE campaign SET is_log_needed = 1")
-    assert lacking.startswith(file + "(lacks its log copy.db-wal: results may be missing"), lacking
+    for mode in ("DELETE", "WAL"):  # With the latter, SQLite makes a new log.
+        lacking = refusal(f"PRAGMA journal_mode = {mode}",
+                          "UPDATE campaign SET is_log_needed = 1")
+        assert lacking.startswith(file + "(lacks its log copy.db-wal: results may be missing"), (
+            mode, lacking)
     for name, content in (("absent.db", None), ("text.db", b"no database" * 100)):
         if content:
             machine.path(name).write_bytes(content)
