@@ -45,6 +45,8 @@ template <typename T>
 struct TestSums {
   using Averaged = std::array<T, num_averaged_signals>;
 
+  /// Samples of the open block that are not in the sums yet: a sum is read and written once for all.
+  std::array<Averaged, 4> pending{};
   Averaged plain{};  ///< Of the open block.
   /// Of `plain` after each sample of the open block: in it the sample k of n counts n − k times.
   Averaged of_plain{};
@@ -60,16 +62,27 @@ struct TestSums {
 
   /// Adds the sample `k` of a block.
   PROOFMASS_INLINE void add(const Averaged& values, std::size_t k, const TestSetup& setup) {
-    // One loop more than the compiler unrolls by itself, and the values would go through memory.
+    Averaged& kept = pending[k % pending.size()];
+    // One loop more than the compiler unrolls by itself, and the values would be written twice.
 #pragma GCC unroll 32
-    for (std::size_t s = 0; s < num_averaged_signals; ++s) {
-      plain[s] = plain[s] + values[s];
-      of_plain[s] = of_plain[s] + plain[s];
-    }
+    for (std::size_t s = 0; s < num_averaged_signals; ++s) kept[s] = values[s];
+    if ((k + 1) % pending.size() == 0) add_pending();
     if (k + 1 == test_block_size) end_block(setup);
   }
 
  private:
+  PROOFMASS_INLINE void add_pending() {
+    for (std::size_t s = 0; s < num_averaged_signals; ++s) {
+      T sum = plain[s], sum_of_sums = of_plain[s];
+      for (const Averaged& values : pending) {
+        sum = sum + values[s];
+        sum_of_sums = sum_of_sums + sum;
+      }
+      plain[s] = sum;
+      of_plain[s] = sum_of_sums;
+    }
+  }
+
   PROOFMASS_INLINE void end_block(const TestSetup& setup) {
     Averaged falling;
     for (std::size_t s = 0; s < num_averaged_signals; ++s) {
