@@ -30,6 +30,7 @@ struct ChartAxis {
   /// are not finite, or not above 0 on a logarithmic axis, are ignored.
   std::optional<double> from = {};
   std::optional<double> to = {};
+  bool is_count = false;  ///< Ticks are whole numbers. Of a linear axis.
 };
 
 struct Point {
@@ -192,7 +193,8 @@ struct ThemeColour {
 /// A number as people write it: at most three significant digits, or all of a whole number, U+2212
 /// as its minus sign, and powers of ten in superscripts outside of 0.001 to 99,999: `−0.25`,
 /// `1244`, `2.5×10⁻⁹`, `10⁶`.
-[[nodiscard]] std::string figure_text(double value);
+/// @param num_digits  At most, if not three; up to 15.
+[[nodiscard]] std::string figure_text(double value, int num_digits = 3);
 
 /// A unit in the same spelling: `10⁻⁴ rad` for `1e-4 rad`.
 [[nodiscard]] std::string unit_text(std::string_view unit);

@@ -315,15 +315,15 @@ void add_ticks(AxisRange& range, int decade, std::span<const double> of_decade) 
 
 }  // namespace
 
-std::string figure_text(double value) {
+std::string figure_text(double value, int num_digits) {
   if (value == 0.0) return "0";
   if (!std::isfinite(value)) return fmt::format("{}", value);
-  const std::string scientific = fmt::format("{:.2e}", value);
+  const std::string scientific = fmt::format("{:.{}e}", value, num_digits - 1);
   const int exponent = std::stoi(scientific.substr(scientific.find('e') + 1));
   if (exponent < -3 || exponent > 4) return from_scientific(scientific);
-  if (exponent >= 3) return with_minus(fmt::format("{:.0f}", value));
-  // Rounded to three digits first, and then written without an exponent.
-  return with_minus(fmt::format("{:.10g}", std::stod(scientific)));
+  if (exponent >= num_digits) return with_minus(fmt::format("{:.0f}", value));
+  // Rounded to these digits first, and then written without an exponent.
+  return with_minus(fmt::format("{:.15g}", std::stod(scientific)));
 }
 
 std::string unit_text(std::string_view unit) {
@@ -342,7 +342,8 @@ AxisRange linear_range(const ChartAxis& axis, double from, double to, std::size_
   if (!(range.to - range.from > least)) {
     range.to = range.from + (range.from == 0.0 ? 1.0 : std::abs(range.from));
   }
-  const Step step = step_for(range.from, range.to, num_ticks_max);
+  Step step = step_for(range.from, range.to, num_ticks_max);
+  if (axis.is_count && step.size() < 1.0) step = {};
   const double size = step.size();
   if (!has_from) range.from = step.times(std::floor(range.from / size + tolerance));
   if (!has_to) range.to = step.times(std::ceil(range.to / size - tolerance));

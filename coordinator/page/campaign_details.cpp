@@ -156,11 +156,11 @@ std::string ResultsReading::html() const {
   Review review = review_;
   review.results.statistics = statistics();
   review.figures = ErrorFigures(figures_).figures();
-  std::string html = "<h3>Accuracy so far</h3>\n" + html_table(accuracy_table(review));
+  std::string html = "<h3>Accuracy</h3>\n" + html_table(accuracy_table(review));
   for (const Table& table : standard_error_tables(review.schema, standard_errors_.statistics())) {
     html += table_or_nothing(table);
   }
-  return html + "<h3>Errors so far</h3>\n<figure>\n" +
+  return html + "<h3>Errors</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }
 

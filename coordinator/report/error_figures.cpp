@@ -207,7 +207,7 @@ std::string objective_sentence(const Review& review, std::size_t index) {
   const std::uint64_t beyond = review.results.statistics.accuracy[index].num_beyond_objective;
   return fmt::format("{} {} the objective of {}.", beyond,
                      beyond == 1 ? "run exceeds" : "runs exceed",
-                     quantity_text(objective, quantity));
+                     quantity_text(objective, quantity, 6));
 }
 
 std::string worst_sentence(const Review& review, std::size_t index) {
@@ -222,10 +222,9 @@ std::string worst_sentence(const Review& review, std::size_t index) {
   return text + ".";
 }
 
-std::string below_sentence(const Histogram& histogram) {
-  if (histogram.num_below == 0) return "";
-  return fmt::format(" {} smaller {} not shown.", histogram.num_below,
-                     histogram.num_below == 1 ? "error is" : "errors are");
+/// Says on an axis what it does not show.
+std::string below_text(const Histogram& histogram) {
+  return histogram.num_below == 0 ? "" : fmt::format("; {} smaller not shown", histogram.num_below);
 }
 
 /// Marks on the axis.
@@ -271,6 +270,7 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
                         figure_text(std::max(last.mean_interval->lower, 0.0) / scale),
                         figure_text(last.mean_interval->upper / scale));
   }
+  if (last.num_runs < 2) return text + ".";
   return text + fmt::format(", and the standard deviation {}.",
                             quantity_text(last.standard_deviation, quantity_at(review, index)));
 }
@@ -294,18 +294,18 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
   const Histogram& histogram = review.figures[index].magnitudes;
   Chart chart{.text = {.id = fmt::format("histogram-{}", quantity.name),
                        .title = fmt::format("|error| of {}", quantity.symbol),
-                       .description =
-                           fmt::format("Histogram of {}. {} {}{}",
-                                       counted(review.results.statistics.num_estimated, "run"),
-                                       objective_sentence(review, index),
-                                       worst_sentence(review, index), below_sentence(histogram))},
-              .x = {.label = axis_label("|error|", quantity), .scale = Scale::logarithmic},
-              .y = {.label = "runs"}};
+                       .description = fmt::format(
+                           "Histogram of {}. {} {}",
+                           counted(review.results.statistics.num_estimated, "run"),
+                           objective_sentence(review, index), worst_sentence(review, index))},
+              .x = {.label = axis_label("|error|", quantity) + below_text(histogram),
+                    .scale = Scale::logarithmic},
+              .y = {.label = "runs", .is_count = true}};
   const double objective = review.objectives[index] / quantity.display_scale;
   chart.layers.emplace_back(bars_of(histogram, quantity.display_scale));
   if (std::isfinite(objective)) {
     chart.layers.emplace_back(LimitLine{
-        .label = fmt::format("objective {}", figure_text(objective)), .value = objective});
+        .label = fmt::format("objective {}", figure_text(objective, 6)), .value = objective});
   }
   chart.layers.emplace_back(worst_markers(review, index, quantity.display_scale));
   return chart;
@@ -317,7 +317,7 @@ Chart error_chart(const Review& review, std::size_t index) {
   Chart chart{.text = {.id = fmt::format("error-{}", quantity.name),
                        .title = fmt::format("Error of {}", quantity.symbol)},
               .x = {.label = axis_label("estimate − truth", quantity)},
-              .y = {.label = "runs"},
+              .y = {.label = "runs", .is_count = true},
               .layers = {bars_of(review.figures[index].errors, quantity.display_scale)}};
   if (statistics.num_estimated == 0) {
     chart.text.description = "No run has an estimate.";
@@ -330,13 +330,15 @@ Chart error_chart(const Review& review, std::size_t index) {
                            error.bias_interval ? " with 95 % interval" : ""),
                chart);
   chart.text.description = fmt::format(
-      "Histogram of the errors with their signs. The bias is {}{}, the standard deviation {}.",
+      "Histogram of the errors with their signs. The bias is {}{}{}.",
       figure_text(error.bias / scale),
       error.bias_interval
           ? fmt::format(" (95 %: {} to {})", figure_text(error.bias_interval->lower / scale),
                         figure_text(error.bias_interval->upper / scale))
           : "",
-      quantity_text(error.standard_deviation, quantity));
+      statistics.num_estimated < 2
+          ? ""
+          : ", the standard deviation " + quantity_text(error.standard_deviation, quantity));
   return chart;
 }
 
@@ -404,7 +406,7 @@ ChartGrid magnitude_overview(const Review& review) {
                       .scale = Scale::logarithmic,
                       .from = 1e-4,
                       .to = end},
-                .y = {.label = "runs"},
+                .y = {.label = "runs", .is_count = true},
                 .layers = {bars_of(review.figures[i].magnitudes, overview_scale(review, i))},
                 .plot_height = 70.0};
     if (std::isfinite(objective)) chart.layers.emplace_back(LimitLine{.value = 1.0});

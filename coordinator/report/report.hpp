@@ -112,7 +112,8 @@ void add_ends(Table& table, Column from, Column to,
                                                    std::string_view told);
 
 /// A value of a quantity in its display unit, as a report spells it: `32.4 nm`, `11.6×10⁻⁴ rad`.
-[[nodiscard]] std::string quantity_text(double value, const Quantity& quantity);
+/// @param num_digits  Of figure_text().
+[[nodiscard]] std::string quantity_text(double value, const Quantity& quantity, int num_digits = 3);
 
 /// A name, or the symbol of the quantity that has it: sessions are called after what they are for.
 [[nodiscard]] std::string name_in_symbols(const ResultSchema& schema, std::string_view name);

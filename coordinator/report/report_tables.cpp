@@ -28,6 +28,7 @@ constexpr const char* theirs = "the paper";
 Cell given_cell(double value, double scale) {
   Cell cell = figure_cell(value, scale);
   cell.text = given_figure(value / scale);
+  cell.document = figure_text(value / scale, 6);
   return cell;
 }
 

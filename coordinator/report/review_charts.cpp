@@ -75,9 +75,7 @@ Chart characteristic_chart(const Review& review, const RequirementAnswer& first,
                    "requirement is called met with a probability of {} %, the consumer's risk; "
                    "where fewer do, what lacks to 100 % is the producer's risk.",
                    counted(check.num_runs, "draw"),
-                   check.bound_order == 0
-                       ? "So few draws never meet it."
-                       : fmt::format("At most {} of them may exceed it.", check.bound_order - 1),
+                   fmt::format("At most {} of them may exceed it.", check.bound_order - 1),
                    given_percent(allowed),
                    figure_text(100.0 * probability_to_meet(check, allowed)))},
       .x = {.label = "draws that exceed the limit, % of all draws", .from = 0.0, .to = 100.0 * end},
@@ -114,7 +112,7 @@ std::vector<Chart> characteristic_charts(const Review& review) {
   for (const RequirementAnswer& row : review.matrix) {
     const bool is_shown = std::ranges::any_of(
         shown, [&](const RequirementAnswer* one) { return have_same_curve(*one, row); });
-    if (is_shown || row.check.num_runs == 0) continue;
+    if (is_shown || row.check.bound_order == 0) continue;  // So few draws never meet it.
     shown.push_back(&row);
     charts.push_back(characteristic_chart(review, row, charts.size() + 1));
   }

@@ -90,7 +90,7 @@ Table execution_table(const Review& review) {
   const CampaignExecution& execution = review.execution;
   Table table = facts(
       "execution", "How it was computed",
-      {{"time of processor cores", duration_text(execution.compute_s)},
+      {{"time of all runs, added up", duration_text(execution.compute_s)},
        {"first and last result",
         execution.first_result_utc.empty()
             ? "none to none"
@@ -123,7 +123,7 @@ Table host_table(const Review& review) {
       .id = "machines",
       .caption = "Machines",
       .columns = {
-          {"machine", true}, {"cards", true}, {"workers"}, {"results"}, {"runs/s"}, {"core time"}}};
+          {"machine", true}, {"cards", true}, {"workers"}, {"results"}, {"runs/s"}, {"run time"}}};
   for (const HostShare& host : review.execution.hosts) {
     table.rows.push_back({host.host, host.cards.empty() ? "none" : host.cards,
                           std::to_string(host.num_workers), std::to_string(host.num_results),
@@ -149,12 +149,39 @@ std::string subject_of(const RequirementAnswer& row) {
   return row.is_of_error ? "|error| of " + symbol : symbol;
 }
 
+/// Three digits, or as many as show on which side of a limit a value lies.
+int num_digits_beside(double value, double limit) {
+  int num_digits = 3;
+  for (; num_digits < 15; ++num_digits) {
+    const double shown = std::stod(fmt::format("{:.{}e}", value, num_digits - 1));
+    if ((shown < limit) == (value < limit) && (shown > limit) == (value > limit)) break;
+  }
+  return num_digits;
+}
+
 /// In the unit of the tables; a ratio to the objectives without one.
 Cell value_cell(const RequirementAnswer& row, const std::optional<double>& value) {
   if (!value) return "none";
-  return {
-      row.is_joint() ? figure_text(*value) + " × objective" : quantity_text(*value, row.subject),
-      *value};
+  const double scale = row.is_joint() ? 1.0 : row.subject.display_scale;
+  const int num_digits = num_digits_beside(*value / scale, row.limit() / scale);
+  return {row.is_joint() ? figure_text(*value, num_digits) + " × objective"
+                         : quantity_text(*value, row.subject, num_digits),
+          *value};
+}
+
+/// With the digits that somebody gave it.
+Cell limit_cell(const RequirementAnswer& row) {
+  if (row.is_joint()) return value_cell(row, row.limit());
+  return {fmt::format("{} {}", row.requirement.admits_limit ? "≤" : "<",
+                      quantity_text(row.limit(), row.subject, 10)),
+          row.limit()};
+}
+
+/// Of so few draws none can meet the requirement: those which do with as many exceedances.
+Cell allowed_cell(const RequirementCheck& check) {
+  if (check.bound_order > 0) return count_cell(check.bound_order - 1);
+  if (!check.num_runs_at_best) return "too few draws";
+  return fmt::format("{} of {}", check.num_exceedances, *check.num_runs_at_best);
 }
 
 Cell margin_cell(const RequirementAnswer& row) {
@@ -179,11 +206,11 @@ Row matrix_cells(const RequirementAnswer& row) {
   return {requirement_name(row),
           statement_of(row),
           {name_of(check.verdict), row.is_opposed() ? Tone::open : tone_of(check.verdict)},
-          value_cell(row, row.limit()),
+          limit_cell(row),
           count_cell(check.num_runs),
           count_cell(check.num_without_estimate),
           count_cell(check.num_exceedances),
-          check.bound_order > 0 ? count_cell(check.bound_order - 1) : Cell("none"),
+          allowed_cell(check),
           value_cell(row, row.bound),
           margin_cell(row),
           value_cell(row, row.worst ? std::optional(row.worst->value) : std::nullopt),
@@ -212,7 +239,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
           "The producer's risk, that one that holds is not called met, is the smaller the better "
           "it holds and the more draws there are.",
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
-      "so many draws meet the requirement.",
+      "so many draws meet the requirement; 0 of 59: too few draws, 59 without an exceedance do.",
       "Bound: with the confidence of the row, the stated part of all draws does not exceed it "
       "(order statistics, any law). Margin: (limit − bound) / limit."};
   for (const RequirementAnswer& row : review.matrix) {
@@ -266,14 +293,15 @@ Table matrix_table(const Review& review) {
 
 }  // namespace
 
-std::string quantity_text(double value, const Quantity& quantity) {
-  const std::string figure = figure_text(value / quantity.display_scale);
+std::string quantity_text(double value, const Quantity& quantity, int num_digits) {
+  const std::string figure = figure_text(value / quantity.display_scale, num_digits);
   if (quantity.display_unit == "1") return figure;
   const std::string unit = unit_text(quantity.display_unit);
   if (!unit.starts_with("10")) return figure + " " + unit;
   const bool has_power = figure.find("×10") != std::string::npos || figure.starts_with("10⁻");
-  return has_power ? figure_text(value) + unit.substr(std::min(unit.find(' '), unit.size()))
-                   : figure + "×" + unit;
+  return has_power
+             ? figure_text(value, num_digits) + unit.substr(std::min(unit.find(' '), unit.size()))
+             : figure + "×" + unit;
 }
 
 std::string name_in_symbols(const ResultSchema& schema, std::string_view name) {

@@ -33,7 +33,7 @@ Chart pull_chart(const Quantity& quantity, const StandardErrorStatistic& statist
   return {
       .text = {.id = fmt::format("pull-{}", quantity.name), .title = std::string(quantity.symbol)},
       .x = {.label = "error / standard error"},
-      .y = {.label = "runs"},
+      .y = {.label = "runs", .is_count = true},
       .layers = {std::move(bars), std::move(law),
                  LimitLine{.value = -normal_95, .ink = Ink::text, .dash = Dash::dotted},
                  LimitLine{.value = normal_95, .ink = Ink::text, .dash = Dash::dotted}},
@@ -235,8 +235,8 @@ Table fit_table(const ResultSchema& schema, const std::vector<FitStatistic>& fit
   });
   table.notes.push_back("±: standard error of the ratio, from its scatter over the runs");
   table.notes.push_back(fmt::format(
-      "p: chance that one of {} ratios is so far from 1 although the noise is what the method "
-      "takes it for, to {:.2g} %",
+      "p: chance that one of {} ratios is so far from 1, by the law of χ², although the noise is "
+      "what the method takes it for, to {:.2g} %",
       fit.size(), 100.0 * schema.fit_tolerance));
   return table;
 }

@@ -187,10 +187,7 @@ std::string signed_figure(double value) {
   return fmt::format("{}{}", value < 0.0 ? "-" : "", measured_figure(std::abs(value)));
 }
 
-std::string given_figure(double value) {
-  std::string figure = measured_figure(value);
-  return figure.find('e') == std::string::npos ? without_end_zeros(std::move(figure)) : figure;
-}
+std::string given_figure(double value) { return fmt::format("{:.6g}", value); }
 
 std::string without_end_zeros(std::string figure) {
   if (figure.find('.') == std::string::npos) return figure;

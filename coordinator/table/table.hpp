@@ -86,7 +86,7 @@ struct Table {
 /// Any number in the spelling of measured_figure(), with a minus sign if it is below 0.
 [[nodiscard]] std::string signed_figure(double value);
 
-/// A number ≥ 0 that somebody gave, without zeros that say nothing: `7.3`, `2000`.
+/// A number ≥ 0 that somebody gave, with up to six digits: `7.3`, `2000`, `196.74`.
 [[nodiscard]] std::string given_figure(double value);
 
 /// A decimal fraction without zeros at its end, and without a point that would be last.

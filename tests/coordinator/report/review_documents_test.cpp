@@ -79,6 +79,15 @@ TEST_F(ReviewHtml, DrawsTheOperatingCharacteristic) {
   }
 }
 
+// None of 20 draws can show 95 % with 95 % confidence: there is no curve to draw, and 0.95^59 <
+// 0.05 says how many would do.
+TEST_F(ReviewHtml, SaysHowManyDrawsDoWhereTheyAreTooFew) {
+  const Store store = store_with(20);
+  const Review review = review_of(store, 20);
+  EXPECT_THAT(characteristic_charts(review), IsEmpty());
+  EXPECT_THAT(review_html(review), HasSubstr(">0 of 59</td>"));
+}
+
 /// Spectra of a session with a line of amplitude 3e-9 m/s².
 RunSpectra some_spectra() {
   SessionSpectrum spectrum{.session = "a_c13",
