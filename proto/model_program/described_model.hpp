@@ -146,7 +146,7 @@ class DescribedCampaign final : public Campaign {
   [[nodiscard]] LawSet law_set() const;
 
  private:
-  [[nodiscard]] std::vector<detail::Entry> entries() const;
+  [[nodiscard]] std::vector<proofmass::detail::Entry> entries() const;
 
   const DescribedModel* model_;
   std::vector<double> objectives_;
