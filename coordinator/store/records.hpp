@@ -219,16 +219,6 @@ struct MergedPart {
   bool operator==(const MergedPart&) const = default;
 };
 
-/// What became of the deliveries of one commit.
-struct CommitSummary {
-  std::uint64_t num_new = 0;
-  std::uint64_t num_duplicate = 0;  ///< Runs that were there already; nothing was changed.
-  /// Duplicates whose result is not the stored one: some worker computes wrongly.
-  std::uint64_t num_contradicting = 0;
-  /// Of each duplicate and of each SecondDelivery, in order.
-  std::vector<Comparison> comparisons;
-};
-
 /// A line of the campaign's log, as it was stored.
 struct StoredEvent {
   std::uint64_t id = 0;       ///< Ascending in time; from 1.

@@ -188,20 +188,20 @@ std::string Store::computed_table_digest() const {
   return detail::compute_table_digest(impl_->database, model());
 }
 
-CommitSummary Store::write(std::span<const Entry> entries) {
+std::vector<Comparison> Store::write(std::span<const Entry> entries) {
   check_deliveries(entries, schema(), num_runs());
-  CommitSummary summary;
+  std::vector<Comparison> comparisons;
   try {
     impl_->commit([&](Database& database) {
       if (!impl_->rows) impl_->rows.emplace(database, schema());
-      summary = impl_->rows->write(entries);
+      comparisons = impl_->rows->write(entries);
       wire::kill_point(wire::KillPoint::before_commit);
     });
   } catch (...) {
     impl_->rows.reset();  // It knows of rows that are rolled back.
     throw;
   }
-  return summary;
+  return comparisons;
 }
 
 std::optional<std::string> Store::rest() {
@@ -216,7 +216,7 @@ bool Store::is_abandoned() const {
   return is_lost && (impl_->place->is_truncated() || !impl_->copy.empty());
 }
 
-CommitSummary Store::commit(std::span<const Delivery> deliveries) {
+std::vector<Comparison> Store::commit(std::span<const Delivery> deliveries) {
   return write(std::vector<Entry>(deliveries.begin(), deliveries.end()));
 }
 

@@ -217,9 +217,10 @@ class Store {
 
   /// Writes all entries in order, or, if it throws, none. A run is stored once: a second delivery
   /// is only compared.
+  /// @return What came of each delivery of a run that was there, and of each SecondDelivery.
   /// @throws StoreError if a delivery's run is not one of the campaign's or a number that matters
   /// is not finite.
-  CommitSummary write(std::span<const Entry> entries);
+  std::vector<Comparison> write(std::span<const Entry> entries);
 
   /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
   /// whole without it until the next change. Waits for nobody.
@@ -242,8 +243,7 @@ class Store {
   /// Whether nothing can be stored any more, as check_place() said, and nothing is left to try.
   [[nodiscard]] bool is_abandoned() const;
 
-  /// Stores results like write().
-  CommitSummary commit(std::span<const Delivery> deliveries);
+  std::vector<Comparison> commit(std::span<const Delivery> deliveries);
 
   /// Calls visit(result) for each finished run, in strictly ascending order. Zeros have no sign.
   /// @throws StoreError as ResultReader::next() does.

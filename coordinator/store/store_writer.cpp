@@ -62,7 +62,7 @@ StoreWriter::Attempted StoreWriter::try_to_write(OpenFile& file) {
     if (file.writing.empty()) {
       file.store.check_place();
     } else {
-      attempted.summary = file.store.write(file.writing);
+      attempted.comparisons = file.store.write(file.writing);
     }
   } catch (const std::exception& error) {
     attempted.failure = error.what();
@@ -268,7 +268,7 @@ void StoreWriter::finish_write(wire::CampaignId campaign, OpenFile& open_file,
   if (!runs.empty()) {
     completions_.emplace_back(Committed{.campaign = campaign, .runs = std::move(runs)});
   }
-  for (const Comparison& comparison : attempted.summary.comparisons) {
+  for (const Comparison& comparison : attempted.comparisons) {
     completions_.emplace_back(Compared{.campaign = campaign, .comparison = comparison});
   }
   if (has_failed_before) completions_.emplace_back(StoreRecovered{.campaign = campaign});

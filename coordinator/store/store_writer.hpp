@@ -157,7 +157,7 @@ class StoreWriter {
 
   /// What came of one attempt to write.
   struct Attempted {
-    CommitSummary summary;
+    std::vector<Comparison> comparisons;
     std::optional<std::string> failure;
     std::uint64_t log_size = 0;  // Afterwards.
   };

@@ -153,7 +153,7 @@ EntryRows::EntryRows(const Database& database, const ResultSchema& results)
       trim_events_(
           database.prepare("DELETE FROM event WHERE event_id <= last_insert_rowid() - ?")) {}
 
-CommitSummary EntryRows::write(std::span<const Entry> entries) {
+std::vector<Comparison> EntryRows::write(std::span<const Entry> entries) {
   now_unix_s_ = static_cast<std::int64_t>(std::time(nullptr));
   has_failures_ = database_.integer("SELECT EXISTS (SELECT 1 FROM run_failure)") != 0;
   for (const Entry& entry : entries) {
@@ -165,12 +165,11 @@ CommitSummary EntryRows::write(std::span<const Entry> entries) {
                                            {{"rows", std::uint64_t{num_workers_max}},
                                             Field::remark("(further workers share one row)")})));
   }
-  return std::exchange(summary_, {});
+  return std::exchange(comparisons_, {});
 }
 
 void EntryRows::write_entry(const Delivery& delivery) {
   if (!results_.insert(delivery.result)) {
-    ++summary_.num_duplicate;
     require_delivery(delivery.result.run);
     compare(delivery);
     return;
@@ -183,7 +182,6 @@ void EntryRows::write_entry(const Delivery& delivery) {
   }
   largest_errors_.add(delivery.result);
   workers_.count_result(worker, delivery.compute_s);
-  ++summary_.num_new;
 }
 
 void EntryRows::write_entry(const SecondDelivery& second) { compare(second.delivery); }
@@ -205,8 +203,13 @@ void EntryRows::compare(const Delivery& delivery) {
     insert_audit_.run(run.value, worker, std::int64_t{is_equal}, hexadecimal(digest(stored)),
                       hexadecimal(digest(delivery.result)), now_unix_s_);
   }
-  summary_.comparisons.push_back({.run = run, .worker = delivery.worker, .is_equal = is_equal});
-  if (!is_equal) report_contradiction(delivery);
+  comparisons_.push_back({.run = run, .worker = delivery.worker, .is_equal = is_equal});
+  if (is_equal) return;
+  write_entry(entry_of(
+      wire::Event::info("contradicting_result", {{"run", run.value},
+                                                 {"worker", workers_.name_of(delivery.worker)},
+                                                 {"session", hexadecimal(delivery.worker.value)},
+                                                 {"attempt", delivery.attempt.value}})));
 }
 
 bool EntryRows::has_room_for_audit(RunIndex run, std::int64_t worker, bool is_equal) {
@@ -229,15 +232,6 @@ bool EntryRows::has_room_for_audit(RunIndex run, std::int64_t worker, bool is_eq
                            Field::remark("(further second results are compared and not kept)")})));
   }
   return false;
-}
-
-void EntryRows::report_contradiction(const Delivery& delivery) {
-  ++summary_.num_contradicting;
-  write_entry(entry_of(
-      wire::Event::info("contradicting_result", {{"run", delivery.result.run.value},
-                                                 {"worker", workers_.name_of(delivery.worker)},
-                                                 {"session", hexadecimal(delivery.worker.value)},
-                                                 {"attempt", delivery.attempt.value}})));
 }
 
 void EntryRows::write_entry(const ReturnedRuns& lost) {

@@ -213,7 +213,8 @@ class EntryRows {
   EntryRows(const Database& database, const ResultSchema& results);
 
   /// @pre Inside a transaction.
-  CommitSummary write(std::span<const Entry> entries);
+  /// @return As Store::write().
+  std::vector<Comparison> write(std::span<const Entry> entries);
 
  private:
   void write_entry(const Delivery& delivery);
@@ -231,7 +232,6 @@ class EntryRows {
   void require_delivery(RunIndex run) const;
   /// Whether a comparison may get a row; says so once if not.
   [[nodiscard]] bool has_room_for_audit(RunIndex run, std::int64_t worker, bool is_equal);
-  void report_contradiction(const Delivery& delivery);
 
   const Database& database_;
   ResultRows results_;
@@ -247,7 +247,7 @@ class EntryRows {
   bool has_failures_ = false;                ///< Of runs that are given up, which is rare.
   std::optional<std::uint64_t> num_audits_;  ///< Rows; counted when the first is written.
   bool is_audit_full_ = false;               ///< `audit_history_full` was written.
-  CommitSummary summary_;
+  std::vector<Comparison> comparisons_;
 };
 
 /// SHA-256 of what defines a campaign, 64 hexadecimal digits: of the row of `campaign`, as text

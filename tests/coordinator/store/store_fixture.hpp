@@ -5,6 +5,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
@@ -136,9 +138,14 @@ inline std::vector<RunResult> results_in(const coordinator::Store& store) {
   return results;
 }
 
-inline coordinator::CommitSummary write(coordinator::Store& store,
-                                        const std::vector<coordinator::Entry>& entries) {
+inline std::vector<coordinator::Comparison> write(coordinator::Store& store,
+                                                  const std::vector<coordinator::Entry>& entries) {
   return store.write(entries);
+}
+
+/// Second results that were not the stored ones.
+inline auto num_contradicting(const std::vector<coordinator::Comparison>& comparisons) {
+  return std::ranges::count(comparisons, false, &coordinator::Comparison::is_equal);
 }
 
 /// Text of the StoreError that `action` throws; empty if it throws none.
