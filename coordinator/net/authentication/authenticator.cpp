@@ -48,6 +48,17 @@ std::string z85(const std::string& key) {
   return text.data();
 }
 
+/// A question of ZeroMQ, by the order of its frames [RFC 27]; nothing if they are none.
+std::optional<Handshake> handshake_in(const std::vector<std::string>& frames) {
+  constexpr std::size_t num_fixed_frames = 6;
+  if (frames.size() < num_fixed_frames || frames[0] != zap_version) return std::nullopt;
+  const bool has_key = frames[5] == "CURVE" && frames.size() == num_fixed_frames + 1;
+  return Handshake{.id = frames[1],
+                   .domain = frames[2],
+                   .address = frames[3],
+                   .public_key = has_key ? z85(frames[num_fixed_frames]) : std::string()};
+}
+
 constexpr std::chrono::minutes period(1);
 constexpr std::size_t lines_per_period_max = 20;
 
@@ -78,13 +89,13 @@ std::string_view protocol_reason(std::uint32_t error) {
 
 RefusalLog::RefusalLog(Log log) : log_(std::move(log)) {}
 
-void RefusalLog::refused(const Refusal& refusal, TimePoint now) {
+void RefusalLog::refused(const Handshake& peer, std::string_view reason, TimePoint now) {
   if (lines_.empty() || now - began_at_ >= period) begin_minute(now);
   Event event =
-      Event::warning("peer_refused", {{"domain", or_else(refusal.domain, "none")},
-                                      {"address", or_else(plain(refusal.address), "unknown")},
-                                      {"key", or_else(refusal.public_key, "none")},
-                                      Field::reason(refusal.reason)});
+      Event::warning("peer_refused", {{"domain", or_else(peer.domain, "none")},
+                                      {"address", or_else(plain(peer.address), "unknown")},
+                                      {"key", or_else(peer.public_key, "none")},
+                                      Field::reason(reason)});
   std::string line = to_text(event);
   if (lines_.contains(line)) return;
   if (lines_.size() >= lines_per_period_max) {
@@ -116,28 +127,6 @@ std::string_view reason_of(const wire::SocketEvent& event) {
                                : "leaves during the handshake: it ended, or has no key";
 }
 
-/// A question of ZeroMQ, by the order of its frames [RFC 27].
-struct Authenticator::Handshake {
-  std::string id;
-  std::string domain;
-  std::string address;
-  std::string public_key;  ///< Z85; empty if the peer has none.
-
-  /// Nothing if the frames are no such question.
-  [[nodiscard]] static std::optional<Handshake> from(const std::vector<std::string>& frames);
-};
-
-std::optional<Authenticator::Handshake> Authenticator::Handshake::from(
-    const std::vector<std::string>& frames) {
-  constexpr std::size_t num_fixed_frames = 6;
-  if (frames.size() < num_fixed_frames || frames[0] != zap_version) return std::nullopt;
-  const bool has_key = frames[5] == "CURVE" && frames.size() == num_fixed_frames + 1;
-  return Handshake{.id = frames[1],
-                   .domain = frames[2],
-                   .address = frames[3],
-                   .public_key = has_key ? z85(frames[num_fixed_frames]) : std::string()};
-}
-
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
                              Log log)
     : refusals_(log),
@@ -157,9 +146,7 @@ void* Authenticator::handle() const { return socket_->handle(); }
 
 void Authenticator::on_event(KeyRole role, const wire::SocketEvent& event, TimePoint now) {
   if ((event.kind & failed_handshakes) == 0) return;
-  refusals_.refused(
-      {.domain = domain_of(role), .address = {}, .public_key = {}, .reason = reason_of(event)},
-      now);
+  refusals_.refused({.domain = domain_of(role)}, reason_of(event), now);
 }
 
 void Authenticator::serve(TimePoint now) {
@@ -167,7 +154,7 @@ void Authenticator::serve(TimePoint now) {
   for (int i = 0; i < requests_per_turn_max; ++i) {
     const std::vector<std::string> frames = receive_frames(*socket_);
     if (frames.empty()) return;
-    if (const auto handshake = Handshake::from(frames)) {
+    if (const auto handshake = handshake_in(frames)) {
       answer(*handshake, now);
     } else {
       reply(frames.size() > 1 ? frames[1] : "", "500", "malformed", "");
@@ -182,8 +169,7 @@ bool Authenticator::is_allowed(KeyRole role, std::string_view public_key, TimePo
 
 std::optional<Asker> Authenticator::client(std::string_view public_key, TimePoint now) {
   if (!is_allowed(KeyRole::client, public_key, now)) return std::nullopt;
-  const AllowedKey& owner = *clients_.owner_of(public_key);
-  return Asker{.name = owner.name, .rights = owner.rights};
+  return *clients_.owner_of(public_key);
 }
 
 AllowList& Authenticator::list_of(KeyRole role) {
@@ -193,11 +179,7 @@ AllowList& Authenticator::list_of(KeyRole role) {
 void Authenticator::answer(const Handshake& handshake, TimePoint now) {
   const std::string_view reason = refusal(handshake, now);
   if (reason.empty()) return reply(handshake.id, "200", "OK", handshake.public_key);
-  refusals_.refused({.domain = handshake.domain,
-                     .address = handshake.address,
-                     .public_key = handshake.public_key,
-                     .reason = reason},
-                    now);
+  refusals_.refused(handshake, reason, now);
   reply(handshake.id, "400", "key not authorized", "");
 }
 

@@ -22,12 +22,12 @@ class socket_t;
 
 namespace proofmass::coordinator {
 
-/// A peer that was refused.
-struct Refusal {
-  std::string_view domain;
-  std::string_view address;     ///< Of the peer; empty if it is not known.
-  std::string_view public_key;  ///< Empty if it has shown none.
-  std::string_view reason;
+/// A peer that asks ZeroMQ to be let in.
+struct Handshake {
+  std::string id = {};  ///< Of the question.
+  std::string domain;
+  std::string address = {};     ///< Of the peer; empty if it is not known.
+  std::string public_key = {};  ///< Z85; empty if it has shown none.
 };
 
 /// Logs refusals, but not a flood of them: a peer is logged once a minute for the same reason, and
@@ -38,7 +38,7 @@ class RefusalLog {
 
   explicit RefusalLog(Log log);
 
-  void refused(const Refusal& refusal, TimePoint now);
+  void refused(const Handshake& peer, std::string_view reason, TimePoint now);
 
  private:
   void begin_minute(TimePoint now);
@@ -96,8 +96,6 @@ class Authenticator {
   [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now);
 
  private:
-  struct Handshake;
-
   [[nodiscard]] AllowList& list_of(wire::KeyRole role);
   void answer(const Handshake& handshake, TimePoint now);
   /// Why the peer is refused; empty if it is admitted.

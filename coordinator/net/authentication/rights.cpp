@@ -62,7 +62,7 @@ std::string_view read_line(std::string_view line, wire::KeyRole role, AllowedKey
     return "must be KEY NAME";
   }
   if (!take_word(line).empty()) return "must be KEY NAME RIGHTS";
-  const AllowedKey owner{.name = std::string(name), .rights = rights.value_or(Rights())};
+  const Asker owner{.name = std::string(name), .rights = rights.value_or(Rights())};
   if (!keys.emplace(key, owner).second) return "names a key a second time";
   if (keys.size() > allowed_keys_max) return "is one key too many";
   return {};
@@ -171,7 +171,7 @@ void AllowList::refresh_if_due(TimePoint now) {
   refresh(now);
 }
 
-const AllowedKey* AllowList::owner_of(std::string_view public_key) const {
+const Asker* AllowList::owner_of(std::string_view public_key) const {
   const auto found = keys_.find(public_key);
   return found == keys_.end() ? nullptr : &found->second;
 }

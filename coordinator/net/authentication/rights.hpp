@@ -30,10 +30,12 @@ inline const Rights usual_rights{Right::observe, Right::submit};
 /// The rights that a comma list grants, such as `observe,submit`; nothing if it is not such a list.
 [[nodiscard]] std::optional<Rights> parse_rights(std::string_view text);
 
-/// The client that asks for something.
+/// The owner of a key, as one that asks for something.
 struct Asker {
-  std::string name;  ///< Of its key, as in the list; empty without keys.
-  Rights rights = all_rights;
+  std::string name;            ///< Of its key, as in the list; empty without keys.
+  Rights rights = all_rights;  ///< Of a client; a worker has none.
+
+  bool operator==(const Asker&) const = default;
 };
 
 /// @throws Error reading `key = NAME (must have the right ...)` if the asker does not have it.
@@ -54,16 +56,8 @@ struct SubmissionLimits {
 
 inline constexpr std::size_t allowed_keys_max = 65536;
 
-/// The owner of a key.
-struct AllowedKey {
-  std::string name;
-  Rights rights;  ///< Of a client; a worker has none.
-
-  bool operator==(const AllowedKey&) const = default;
-};
-
 /// Owners by public key.
-using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
+using AllowedKeys = std::map<std::string, Asker, std::less<>>;
 
 /// The keys in the text of an allow-list. Each has a line `KEY NAME`, or `KEY NAME RIGHTS` for a
 /// client. Empty lines and lines that begin with `#` are ignored.
@@ -96,7 +90,7 @@ class AllowList {
   void refresh_if_due(TimePoint now);
 
   /// The key's owner; null if the key is not on the list.
-  [[nodiscard]] const AllowedKey* owner_of(std::string_view public_key) const;
+  [[nodiscard]] const Asker* owner_of(std::string_view public_key) const;
 
  private:
   /// What tells one state of the file from another.

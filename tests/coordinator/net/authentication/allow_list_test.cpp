@@ -223,9 +223,8 @@ TEST_F(AllowListFile, ThatCannotBeTrustedIsRefused) {
 class RefusalLogTest : public ::testing::Test {
  protected:
   void refuse(const std::string& key, std::chrono::seconds at, const std::string& address = "") {
-    log_.refused(
-        {.domain = "workers", .address = address, .public_key = key, .reason = "unknown key"},
-        RefusalLog::TimePoint{} + at);
+    log_.refused({.domain = "workers", .address = address, .public_key = key}, "unknown key",
+                 RefusalLog::TimePoint{} + at);
   }
 
   std::vector<Event> events_;
