@@ -32,7 +32,6 @@
 #include "proto/wire/messages.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/gpu/cuda_device.hpp"
-#include "worker/net/serve.hpp"
 #include "worker/supervision/supervisor.hpp"
 
 namespace proofmass::worker {
@@ -63,7 +62,7 @@ CLI::Option* add_duration(CLI::App& app, const std::string& name, Target& target
 }
 
 void add_connection(CLI::App& app, Options& options) {
-  app.add_option("--connect", options.endpoint,
+  app.add_option("--connect", options.serving.endpoint,
                  "Where the coordinator listens, ipc://PATH or\ntcp://HOST:PORT")
       ->envname("PROOFMASS_CONNECT")
       ->required();
@@ -93,7 +92,7 @@ void add_work(CLI::App& app, Options& options) {
                  "Part of a card's runs that a processor computes\nagain; 0.001 by default")
       ->envname("PROOFMASS_GPU_CHECK")
       ->check(wire::in_range(0.0, 1.0));
-  app.add_option("--spool", options.spool,
+  app.add_option("--spool", options.serving.spool,
                  "File for results that are not acknowledged\nwhen the worker ends")
       ->type_name(wire::file_type)
       ->envname("PROOFMASS_SPOOL");
@@ -104,10 +103,10 @@ void add_work(CLI::App& app, Options& options) {
                  "When the worker must have ended, in seconds\nsince 1970 (UTC), as Slurm sets it")
       ->envname("SLURM_JOB_END_TIME")
       ->check(wire::in_range(std::int64_t{0}, end_time_unix_s_max));
-  add_duration(app, "idle-timeout", options.idle_timeout,
+  add_duration(app, "idle-timeout", options.serving.conversation.idle_timeout,
                "Leave after this time without a run; by default\nthe worker waits for work")
       ->envname("PROOFMASS_IDLE_TIMEOUT");
-  add_duration(app, "drain-time", options.drain_time,
+  add_duration(app, "drain-time", options.serving.conversation.drain_time,
                "Time to finish and deliver after SIGTERM; 100s\nby default")
       ->envname("PROOFMASS_DRAIN_TIME");
 }
@@ -262,13 +261,13 @@ SignalSource signal_source(const Options& options) {
 }
 
 wire::ClientSecurity security_for(const Options& options, const wire::Log& log) {
-  wire::check_endpoint("connect", options.endpoint, wire::EndpointUse::connect,
+  wire::check_endpoint("connect", options.serving.endpoint, wire::EndpointUse::connect,
                        wire::protection_by(options.keys, options.is_plain_waived));
   if (options.keys) return wire::read_client_security(*options.keys, wire::KeyRole::worker);
-  if (!wire::is_local(options.endpoint)) {
+  if (!wire::is_local(options.serving.endpoint)) {
     log(wire::Event::warning(
         "insecure_plain",
-        {{"connect", options.endpoint},
+        {{"connect", options.serving.endpoint},
          Field::remark("(anybody on the network can read and change messages)")}));
   }
   return {};
@@ -298,17 +297,13 @@ std::optional<TimePoint> walltime_end(const Options& options, TimePoint program_
 }
 
 ServeConfig serve_config(const Options& options, TimePoint program_start, const wire::Log& log) {
-  ServeConfig config;
+  ServeConfig config = options.serving;
   config.log = log;
-  config.endpoint = options.endpoint;
   config.security = security_for(options, log);
   config.signals = signal_source(options);
-  config.spool = options.spool;
   ConversationConfig& conversation = config.conversation;
-  conversation.drain_time = options.drain_time;
   if (options.parent) conversation.give_up_after = give_up_with_parent;
   if (options.give_up_after) conversation.give_up_after = *options.give_up_after;
-  conversation.idle_timeout = options.idle_timeout;
   conversation.walltime_end = walltime_end(options, program_start);
   return config;
 }

@@ -12,6 +12,7 @@
 #include "proto/link/log.hpp"
 #include "worker/execution/execution.hpp"
 #include "worker/execution/executor.hpp"
+#include "worker/net/serve.hpp"
 
 namespace CLI {
 class App;
@@ -21,7 +22,7 @@ namespace proofmass::worker {
 
 /// What a worker is told when it starts.
 struct Options {
-  std::string endpoint;
+  ServeConfig serving;  ///< Endpoint, spool, drain time and idle timeout; the rest at the start.
   std::optional<std::filesystem::path> keys;  ///< Directory; nothing: without keys.
   bool is_plain_waived = false;               ///< Without keys beyond this machine.
   std::string name;                           ///< Empty: HOST-PID.
@@ -30,10 +31,7 @@ struct Options {
   double gpu_check = 1e-3;                    ///< Part of a card's runs that are computed again.
   std::optional<Duration> walltime_max;
   std::optional<std::int64_t> end_time_unix_s;  ///< When the job ends that the worker is part of.
-  std::optional<Duration> idle_timeout;         ///< Nothing: the worker waits for work.
-  std::optional<std::filesystem::path> spool;
-  Duration drain_time = std::chrono::seconds(100);
-  std::optional<Duration> give_up_after;  ///< Nothing: 60 s with a parent, else an hour.
+  std::optional<Duration> give_up_after;        ///< Nothing: 60 s with a parent, else an hour.
   wire::LogFormat log_format = wire::LogFormat::text;
   std::optional<pid_t> parent;  ///< Campaign that started this worker, for itself alone.
   bool is_supervised = true;

@@ -38,8 +38,8 @@ std::string error_of(const std::vector<std::string>& arguments) {
 
 TEST(WorkerOptions, HaveDefaults) {
   const Options options = parsed({"--connect", "ipc:///tmp/a"});
-  EXPECT_EQ(options.endpoint, "ipc:///tmp/a");
-  EXPECT_EQ(options.drain_time, 100s);
+  EXPECT_EQ(options.serving.endpoint, "ipc:///tmp/a");
+  EXPECT_EQ(options.serving.conversation.drain_time, 100s);
   EXPECT_FALSE(options.walltime_max.has_value());
   EXPECT_FALSE(options.give_up_after.has_value());
   EXPECT_FALSE(options.keys.has_value());
@@ -60,8 +60,8 @@ TEST(WorkerOptions, ComeFromArguments) {
   EXPECT_EQ(options.name, "n");
   EXPECT_EQ(options.num_threads, 3U);
   EXPECT_EQ(options.walltime_max, 90min);
-  EXPECT_EQ(options.spool, "s");
-  EXPECT_EQ(options.drain_time, 30s);
+  EXPECT_EQ(options.serving.spool, "s");
+  EXPECT_EQ(options.serving.conversation.drain_time, 30s);
   EXPECT_EQ(options.give_up_after, 2h);
   EXPECT_EQ(options.log_format, wire::LogFormat::json);
   EXPECT_FALSE(options.is_supervised);
@@ -79,9 +79,9 @@ TEST(WorkerOptions, ComeFromTheEnvironment) {
   unsetenv("PROOFMASS_MAX_WALLTIME");
   unsetenv("PROOFMASS_SPOOL");
   unsetenv("SLURM_JOB_END_TIME");
-  EXPECT_EQ(options.endpoint, "ipc:///tmp/b");
+  EXPECT_EQ(options.serving.endpoint, "ipc:///tmp/b");
   EXPECT_EQ(options.walltime_max, 24h);
-  EXPECT_EQ(options.spool, "/s");
+  EXPECT_EQ(options.serving.spool, "/s");
   EXPECT_EQ(options.end_time_unix_s, 1'800'000'000);
 }
 
