@@ -12,13 +12,10 @@ enum class Certainty : std::uint8_t { ambiguous, certain };
 /// The runs that the worker computed by its last heartbeat, as far as they are still on its leases.
 /// If no heartbeat named any, the runs that it begins with.
 RunsByCampaign computed_runs(const State& state, const Worker& worker) {
-  const RunsByCampaign leased = leased_runs(state, worker);
   RunsByCampaign computed;
   for (const Progress& progress : worker.computing) {
-    const auto found = leased.find(progress.campaign);
-    if (found == leased.end()) continue;
-    RunSet runs = found->second.overlap(progress.runs);
-    if (!runs.empty()) computed[found->first].add(runs);
+    const RunSet runs = leased_runs(state, worker, progress.campaign).overlap(progress.runs);
+    if (!runs.empty()) computed[progress.campaign].add(runs);
   }
   if (!computed.empty()) return computed;
   std::uint64_t num_left = worker.num_slots;
@@ -167,19 +164,16 @@ RunsByCampaign blame_crash(State& state, WorkerId id, Outbox& outbox) {
 }
 
 RunsByCampaign blame_batch(State& state, WorkerId id, const Progress& batch, Outbox& outbox) {
-  const RunsByCampaign leased = leased_runs(state, state.workers.at(id));
-  const auto found = leased.find(batch.campaign);
+  RunSet runs = leased_runs(state, state.workers.at(id), batch.campaign).overlap(batch.runs);
   RunsByCampaign accused;
-  if (found != leased.end()) accused[batch.campaign] = found->second.overlap(batch.runs);
+  if (!runs.empty()) accused[batch.campaign] = std::move(runs);
   return blame(state, id, accused, certainty_of(batch.runs), outbox);
 }
 
 RunsByCampaign blame_simulation(State& state, WorkerId id, CampaignId campaign, const RunSet& runs,
                                 Outbox& outbox) {
   const Worker& worker = state.workers.at(id);
-  const RunsByCampaign leased = leased_runs(state, worker);
-  const auto found = leased.find(campaign);
-  const RunSet accused = found == leased.end() ? RunSet() : found->second.overlap(runs);
+  const RunSet accused = leased_runs(state, worker, campaign).overlap(runs);
   if (accused.empty() || state.quarantined.contains(worker.host)) return {};
   ++state.campaigns.at(campaign).outside_crashes[worker.session].num_in_a_row;
   return blame_all(state, worker.host, {{campaign, accused}}, certainty_of(runs), outbox);

@@ -67,6 +67,8 @@ bool close_run(State& state, CampaignId id, RunIndex run, WorkerId by, RunsByWor
 
 /// All runs on the worker's leases.
 [[nodiscard]] RunsByCampaign leased_runs(const State& state, const Worker& worker);
+/// Those of one campaign.
+[[nodiscard]] RunSet leased_runs(const State& state, const Worker& worker, CampaignId campaign);
 
 /// Asks the worker to give back those of the runs that it has not begun.
 void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outbox& outbox);

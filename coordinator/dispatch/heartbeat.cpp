@@ -115,7 +115,7 @@ void settle_surplus(State& state, WorkerId id, CampaignId campaign_id, const Hel
                     TimePoint now, Outbox& outbox) {
   Worker& worker = state.workers.at(id);
   const CampaignState& campaign = state.campaigns.at(campaign_id);
-  const RunSet leased = leased_runs(state, worker)[campaign_id];
+  const RunSet leased = leased_runs(state, worker, campaign_id);
   const Adoption adoption{state, id, campaign_id, now};
   for (const auto& [attempt, runs] : held) {
     RunSet surplus = runs;
@@ -123,7 +123,7 @@ void settle_surplus(State& state, WorkerId id, CampaignId campaign_id, const Hel
     if (!surplus.empty()) adoption.adopt(attempt, surplus);
   }
   RunSet rest = all_of(held);
-  rest.remove(leased_runs(state, worker)[campaign_id]);
+  rest.remove(leased_runs(state, worker, campaign_id));
   rest = without_delivered(campaign, std::move(rest));
   RunSet open = rest;
   open.remove(campaign.committed);

@@ -300,6 +300,10 @@ RunsByCampaign leased_runs(const State& state, const Worker& worker) {
   return runs;
 }
 
+RunSet leased_runs(const State& state, const Worker& worker, CampaignId campaign) {
+  return leased_runs(state, worker)[campaign];
+}
+
 void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outbox& outbox) {
   const std::vector<RunRange> ranges = runs.ranges();
   for (std::size_t first = 0; first < ranges.size(); first += wire::ranges_per_message_max) {
