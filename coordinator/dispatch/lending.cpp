@@ -14,6 +14,17 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
+/// Runs that a worker lacks, and the slots that they are for.
+struct Share {
+  std::uint64_t num_runs = 0;
+  std::uint64_t num_slots = 0;
+
+  /// Of the slots, for so many of the runs.
+  [[nodiscard]] std::uint64_t slots_for(std::uint64_t count) const {
+    return ratio_rounded_up(count * num_slots, num_runs);
+  }
+};
+
 std::uint64_t num_waiting(const CampaignState& campaign) {
   std::uint64_t count = campaign.pending_suspects.size() + campaign.num_to_audit;
   for (const auto& [attempt, runs] : campaign.pending) count += runs.size();
@@ -159,8 +170,7 @@ double part_of_cards(const State& state, CampaignId id, const CampaignState& cam
   return are_known ? card_rate(worker, id) / rate : worker.num_card_slots / num_slots;
 }
 
-}  // namespace
-
+/// What a worker's processors are to be lent of a campaign; nothing if they have enough.
 Share share_of_processors(State& state, CampaignId id, const CampaignState& campaign,
                           const Worker& worker, TimePoint now) {
   const std::uint64_t room = room_of(state, id, campaign, worker);
@@ -176,6 +186,10 @@ Share share_of_processors(State& state, CampaignId id, const CampaignState& camp
   return {.num_runs = num_missing, .num_slots = num_missing * slots_per_run(worker, campaign)};
 }
 
+/// What a worker's cards are to be lent of a campaign. They hold their part of all that is not
+/// finished, so that everybody finishes together: a round until their speed is known, and then two
+/// at most. A few runs take a card as long as many, so that what idle processors have room for is
+/// left to them.
 Share share_of_cards(const State& state, CampaignId id, const CampaignState& campaign,
                      const Worker& worker) {
   const auto work = worker.card_work.find(id);
@@ -193,8 +207,6 @@ Share share_of_cards(const State& state, CampaignId id, const CampaignState& cam
       std::min(wanted - worker.num_lent_to_cards, room_of(state, id, campaign, worker));
   return {.num_runs = num_missing, .num_slots = num_missing};
 }
-
-namespace {
 
 void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& lease) {
   if (campaign.table_columns.empty()) return;
