@@ -296,7 +296,6 @@ void lend_audits(const Borrower& borrower) {
     if (next->second.empty()) to_audit.erase(next);
     Lease lease = borrower.lease_of(std::move(runs), key.attempt);
     lease.kind = LeaseKind::audit;
-    lease.audited = key.first_worker;
     borrower.open(std::move(lease));
   }
 }

@@ -195,7 +195,6 @@ struct Lease {
   std::uint64_t num_slots = 0;
   RunSet remaining;
   TimePoint lent_at;
-  WorkerId audited = {};  ///< Of an audit: whose results are compared; 0 if not known.
 };
 
 /// Slots that the remaining runs of a lease take.
