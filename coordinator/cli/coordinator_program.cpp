@@ -196,7 +196,8 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   if (!config.clients_endpoint) {
     config.clients_endpoint =
         "ipc://" + (std::filesystem::absolute(options.directory) / "clients").string();
-    wire::check_endpoint("--bind-clients, by default in --directory,", *config.clients_endpoint);
+    wire::check_endpoint("--bind-clients, by default in --directory,", *config.clients_endpoint,
+                         wire::EndpointUse::bind, wire::Protection::none);
   }
   config.drain_max =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));

@@ -116,10 +116,6 @@ void check_endpoint(std::string_view option, const std::string& endpoint, Endpoi
   refuse(option, endpoint, "must be ipc://PATH or tcp://HOST:PORT");
 }
 
-void check_endpoint(std::string_view option, const std::string& endpoint) {
-  check_endpoint(option, endpoint, EndpointUse::bind, Protection::none);
-}
-
 bool is_local(const std::string& endpoint) {
   if (endpoint.starts_with(ipc_prefix)) return true;
   const auto host = host_of(endpoint);

@@ -28,9 +28,6 @@ enum class Protection : std::uint8_t {
 void check_endpoint(std::string_view option, const std::string& endpoint, EndpointUse use,
                     Protection protection);
 
-/// To bind, without keys.
-void check_endpoint(std::string_view option, const std::string& endpoint);
-
 /// True if no other machine can reach the address.
 ///
 /// @param endpoint  check_endpoint() holds.

@@ -118,7 +118,8 @@ TEST_F(RouterSocketTest, TellsOfFailedHandshakesAlsoWhenItWasBoundAgain) {
 
 TEST(PrivateEndpoint, LiesInADirectoryThatOnlyThisUserCanEnter) {
   const PrivateEndpoint endpoint;
-  EXPECT_NO_THROW(wire::check_endpoint("bind", endpoint.address()));
+  EXPECT_NO_THROW(wire::check_endpoint("bind", endpoint.address(), wire::EndpointUse::bind,
+                                       wire::Protection::none));
   const std::filesystem::path socket = endpoint.address().substr(6);
   const auto permissions = std::filesystem::status(socket.parent_path()).permissions();
   EXPECT_EQ(permissions, std::filesystem::perms::owner_all);
