@@ -78,10 +78,8 @@ std::string_view model_in(std::string_view content) {
 Spool::Spool(std::filesystem::path path, std::string_view model, std::uint64_t size_max)
     : path_(std::move(path)),
       header_(fmt::format("{}{}\n", header_begin, model)),
-      size_max_(size_max),
-      file_(wire::open_own_file("spool", path_, wire::IfAbsent::make)) {
-  lock();
-  read();
+      size_max_(size_max) {
+  open();
 }
 
 Spool::~Spool() {
@@ -92,9 +90,10 @@ std::string Spool::message(std::string_view reason) const {
   return fmt::format("spool = {} ({})", path_.string(), reason);
 }
 
-void Spool::lock() const {
+void Spool::open() {
+  file_ = wire::Descriptor(wire::open_own_file("spool", path_, wire::IfAbsent::make));
   const wire::Locked locked = wire::lock_file(file_.number());
-  if (locked == wire::Locked::yes) return;
+  if (locked == wire::Locked::yes) return read();
   throw Error(message(locked == wire::Locked::by_another ? "used by another worker"
                                                          : wire::no_locks_remedy));
 }
@@ -130,9 +129,7 @@ void Spool::set_aside(std::string_view model) {
     throw Error(message(fmt::format("of the model {}; cannot become {}: {}", model,
                                     former_spool_.string(), std::strerror(error_number))));
   }
-  file_ = wire::Descriptor(wire::open_own_file("spool", path_, wire::IfAbsent::make));
-  lock();
-  read();
+  open();
 }
 
 void Spool::read_records(std::string_view content) {
@@ -156,18 +153,11 @@ std::optional<std::string> Spool::write(std::string_view bytes) {
   if (size_ + bytes.size() > size_max_) {
     return message(fmt::format("full: must be at most {} bytes", size_max_));
   }
-  std::size_t num_written = 0;
-  while (num_written < bytes.size()) {
-    const ssize_t count =
-        pwrite(file_.number(), bytes.data() + num_written, bytes.size() - num_written,
-               static_cast<off_t>(size_ + num_written));
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) break;
-    num_written += static_cast<std::size_t>(count);
-  }
-  if (num_written < bytes.size() || fdatasync(file_.number()) != 0) {
+  const auto end = static_cast<off_t>(size_);
+  if (lseek(file_.number(), end, SEEK_SET) != end || !wire::write_all(file_.number(), bytes) ||
+      fdatasync(file_.number()) != 0) {
     std::string reason = message(std::strerror(errno));
-    [[maybe_unused]] const int cut = ftruncate(file_.number(), static_cast<off_t>(size_));
+    [[maybe_unused]] const int cut = ftruncate(file_.number(), end);
     return reason;
   }
   size_ += bytes.size();

@@ -7,11 +7,11 @@
 #include <set>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "proto/link/whole_file.hpp"
 #include "worker/execution/execution.hpp"
+#include "worker/net/held_runs.hpp"
 
 namespace proofmass::worker {
 
@@ -66,10 +66,8 @@ class Spool {
   [[nodiscard]] bool is_empty() const { return size_ <= header_.size(); }
 
  private:
-  using RunKey = std::pair<wire::CampaignId, RunIndex>;
-
   [[nodiscard]] std::string message(std::string_view reason) const;
-  void lock() const;
+  void open();
   void read();
   void set_aside(std::string_view model);
   void read_records(std::string_view content);
