@@ -167,7 +167,7 @@ void World::spool(Process& process) {
   if (agenda_.now() - process.spooled_at < 5s) return;
   process.spooled_at = agenda_.now();
   auto& spool = machines_.at(process.machine).spool;
-  const std::vector<wire::LeasedResult> results = process.conversation->unacknowledged();
+  const std::vector<wire::LeasedResult> results = process.conversation->unacknowledged().all();
   if (results.empty()) spool.clear();
   std::set<RunKey> seen;
   for (const wire::LeasedResult& result : results) {

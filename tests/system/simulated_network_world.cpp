@@ -212,9 +212,9 @@ void World::receive(Process& process, const proto::Envelope& message) {
   worker::Conversation& conversation = *process.conversation;
   const proto::Forget& forget = message.forget();
   const auto num_kept = [&] {
-    if (!message.has_forget()) return conversation.num_unacknowledged();
+    if (!message.has_forget()) return conversation.unacknowledged().size();
     std::size_t count = 0;
-    for (const wire::LeasedResult& result : conversation.unacknowledged()) {
+    for (const wire::LeasedResult& result : conversation.unacknowledged().all()) {
       const bool is_forgotten = result.campaign.value == forget.campaign() &&
                                 result.computed.result.run.value < forget.num_runs();
       if (!is_forgotten) ++count;
@@ -357,7 +357,7 @@ void World::end_if_over(wire::SessionId session) {
   if (!ending) return;
   EXPECT_EQ(ending->kind, worker::Ending::Kind::done) << ending->reason;
   if (weather_.has_spools) {
-    for (const wire::LeasedResult& result : process.conversation->unacknowledged()) {
+    for (const wire::LeasedResult& result : process.conversation->unacknowledged().all()) {
       machines_.at(process.machine).spool[{result.campaign, result.computed.result.run}] = result;
     }
   }

@@ -110,13 +110,7 @@ class Conversation {
   [[nodiscard]] Duration silence(TimePoint now) const { return now - heard_at_; }
   [[nodiscard]] bool is_registered() const { return is_registered_; }
   [[nodiscard]] bool is_leaving() const { return leaving_.has_value(); }
-  [[nodiscard]] std::size_t num_unacknowledged() const { return unacknowledged_.size(); }
-  /// Those among them that the coordinator could not take: it does not serve their campaigns.
-  [[nodiscard]] std::size_t num_set_aside() const { return unacknowledged_.num_set_aside(); }
-  /// Results without an acknowledgement, in order of campaign and run.
-  [[nodiscard]] std::vector<wire::LeasedResult> unacknowledged() const {
-    return unacknowledged_.all();
-  }
+  [[nodiscard]] const UnacknowledgedResults& unacknowledged() const { return unacknowledged_; }
   /// Runs that wait or are being computed.
   [[nodiscard]] std::size_t num_unfinished() const { return unfinished_.size(); }
 

@@ -67,6 +67,7 @@ class UnacknowledgedResults {
   [[nodiscard]] bool contains(const RunKey& run) const { return results_.contains(run); }
   [[nodiscard]] bool empty() const { return results_.empty(); }
   [[nodiscard]] std::size_t size() const { return results_.size(); }
+  /// Those that the coordinator could not take: it does not serve their campaigns.
   [[nodiscard]] std::size_t num_set_aside() const { return num_set_aside_; }
 
   /// In order of campaign and run.

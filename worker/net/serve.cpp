@@ -168,8 +168,8 @@ bool take_turn(TimePoint& due_at, TimePoint now, Duration interval) {
 std::string status_of(const Conversation& conversation) {
   return fmt::format("{}, {} runs at hand, {} results not acknowledged, {} of them not served now",
                      conversation.is_registered() ? "registered" : "not registered",
-                     conversation.num_unfinished(), conversation.num_unacknowledged(),
-                     conversation.num_set_aside());
+                     conversation.num_unfinished(), conversation.unacknowledged().size(),
+                     conversation.unacknowledged().num_set_aside());
 }
 
 class Service {
@@ -230,9 +230,9 @@ class Service {
 
   /// All that will not stay in memory, at the end.
   Ending keep_results(Ending ending) {
-    if (spool_) note_spool(spool_->finish(conversation_.unacknowledged()));
-    const std::size_t num_lost = spool_ ? spool_->num_missing(conversation_.unacknowledged())
-                                        : conversation_.num_unacknowledged();
+    const std::vector<wire::LeasedResult> kept = conversation_.unacknowledged().all();
+    if (spool_) note_spool(spool_->finish(kept));
+    const std::size_t num_lost = spool_ ? spool_->num_missing(kept) : kept.size();
     if (num_lost == 0) return ending;
     log_(wire::Event::warning(
         "results_lost",
@@ -318,7 +318,7 @@ class Service {
     warn_of_silence(conversation_.silence(now));
     if (conversation_.take_reconnection()) link_.reconnect();
     if (spool_ && take_turn(spool_due_at_, now, spool_interval)) {
-      note_spool(spool_->look(conversation_.unacknowledged()));
+      note_spool(spool_->look(conversation_.unacknowledged().all()));
     }
     if (conversation_.is_registered()) notices_.ready();
     if (conversation_.is_leaving()) notices_.stopping();

@@ -173,8 +173,8 @@ TEST_F(NotServedTest, ResultsAreKeptAndSentAgainEverMoreSeldom) {
   register_with_campaign();
   (void)compute(lease(10, 2));
   receive(test::make_not_served(campaign_1));
-  EXPECT_EQ(conversation->num_unacknowledged(), 2U);
-  EXPECT_EQ(conversation->num_set_aside(), 2U);
+  EXPECT_EQ(conversation->unacknowledged().size(), 2U);
+  EXPECT_EQ(conversation->unacknowledged().num_set_aside(), 2U);
   EXPECT_EQ(events(), std::vector<std::string>{"results_set_aside campaign=0000000000000001 "
                                                "results=2 (not served now)"});
   std::vector<int> sent_at_s;
@@ -189,8 +189,8 @@ TEST_F(NotServedTest, ResultsAreKeptAndSentAgainEverMoreSeldom) {
   EXPECT_EQ(sent_at_s, (std::vector<int>{5, 15, 35, 75, 135, 195, 255}));
   EXPECT_TRUE(events().empty()) << "once";
   acknowledge({{10}, {11}});
-  EXPECT_EQ(conversation->num_unacknowledged(), 0U);
-  EXPECT_EQ(conversation->num_set_aside(), 0U);
+  EXPECT_EQ(conversation->unacknowledged().size(), 0U);
+  EXPECT_EQ(conversation->unacknowledged().num_set_aside(), 0U);
 }
 
 TEST_F(NotServedTest, WhatWaitsIsGivenBackAndWhatIsComputedIsFinished) {
@@ -213,7 +213,7 @@ TEST_F(NotServedTest, OnlyTheRunsThatAreNamedAreSetAside) {
   register_with_campaign();
   (void)compute(lease(8, 4));
   receive(test::make_not_served(campaign_1, {{{10}, 2}, {{20}, 5}}));
-  EXPECT_EQ(conversation->num_set_aside(), 2U);
+  EXPECT_EQ(conversation->unacknowledged().num_set_aside(), 2U);
   const proto::Heartbeat heartbeat = next_heartbeat();
   EXPECT_EQ(test::vector_of(heartbeat.held()), held(8, 2));
   EXPECT_EQ(test::vector_of(heartbeat.set_aside()), held(10, 2));

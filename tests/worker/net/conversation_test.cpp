@@ -215,7 +215,7 @@ TEST_F(ConversationTest, IgnoresAnAcknowledgementOfAnotherCampaign) {
   register_with_campaign();
   (void)compute(lease(10, 1));
   receive(test::make_ack(campaign_2, {{10}}));
-  EXPECT_EQ(conversation->num_unacknowledged(), 1U);
+  EXPECT_EQ(conversation->unacknowledged().size(), 1U);
 }
 
 TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
@@ -228,7 +228,7 @@ TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
   const std::vector expected{test::make_held(campaign_2, {3}, {{{9}, 1}})};
   EXPECT_EQ(test::vector_of(take_sent<proto::Heartbeat>().held()), expected);
   EXPECT_EQ(take_sent<proto::ResultBatch>().attempt(), 3U);
-  EXPECT_EQ(conversation->unacknowledged().at(0).computed.result.run, RunIndex{9});
+  EXPECT_EQ(conversation->unacknowledged().all().at(0).computed.result.run, RunIndex{9});
 }
 
 // A message has room for 4096 results.
