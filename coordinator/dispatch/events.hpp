@@ -33,6 +33,7 @@ void on_control(State& state, CampaignId id, int priority, double audit_fraction
 void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox);
 /// Lends no more runs of the campaign until on_resume(). Runs that have not begun are asked back.
 void on_pause(State& state, CampaignId id, Outbox& outbox);
+/// Goes on with a campaign that is paused or cancelled.
 void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox);
 /// Drops the open runs of the campaign, also at the workers. Stored results stay, and on_resume()
 /// goes on with the campaign.

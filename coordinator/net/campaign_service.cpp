@@ -132,7 +132,7 @@ void CampaignService::change(CampaignId id, std::shared_ptr<const Campaign> defi
   const CampaignState& campaign = state_.campaigns.at(id);
   on_control(state_, id, wishes.has_priority() ? wishes.priority() : campaign.priority,
              wishes.has_audit_fraction() ? wishes.audit_fraction() : campaign.audit_fraction);
-  resume(id);
+  on_resume(state_, id, context_.now(), outbox_);
   review();
 }
 
@@ -140,12 +140,6 @@ void CampaignService::extend(CampaignId id, std::shared_ptr<const Campaign> defi
   if (definition->num_runs <= state_.campaigns.at(id).definition->num_runs) return;
   served_.at(id).is_decided = false;
   on_extended(state_, id, std::move(definition), context_.now(), outbox_);
-}
-
-void CampaignService::resume(CampaignId id) {
-  const Phase phase = state_.campaigns.at(id).phase;
-  if (phase != Phase::paused && phase != Phase::cancelled) return;
-  on_resume(state_, id, context_.now(), outbox_);
 }
 
 CampaignControl CampaignService::control_now(CampaignId id) const {
@@ -177,7 +171,7 @@ void CampaignService::control(CampaignId id, proto::ControlAction action,
       on_pause(state_, id, outbox_);
       break;
     case proto::CONTROL_ACTION_RESUME:
-      resume(id);
+      on_resume(state_, id, context_.now(), outbox_);
       break;
     case proto::CONTROL_ACTION_CANCEL:
       on_cancel(state_, id, outbox_);

@@ -252,7 +252,6 @@ class CampaignService {
   /// As shown and stored: a campaign that is undecided, or has runs elsewhere, is not finished.
   [[nodiscard]] Phase phase_of(CampaignId id) const;
   void extend(CampaignId id, std::shared_ptr<const Campaign> definition);
-  void resume(CampaignId id);
   /// Runs without an estimate, those that were given up among them.
   [[nodiscard]] static std::uint64_t num_failures_of(const CampaignState& campaign,
                                                      const Served& served);
