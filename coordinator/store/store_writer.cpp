@@ -45,16 +45,6 @@ std::optional<std::string> try_to_rest(Store& store) {
 
 }  // namespace
 
-bool StoreWriter::OpenFile::is_concerned_by(const Entry& entry) const {
-  const auto* const ended = std::get_if<WorkerEnded>(&entry);
-  return ended != nullptr ? known.contains(ended->session) : !is_rest_wanted;
-}
-
-void StoreWriter::OpenFile::note_worker(const Entry& entry) {
-  if (const auto* joined = std::get_if<WorkerJoined>(&entry)) known.insert(joined->session);
-  if (const auto* ended = std::get_if<WorkerEnded>(&entry)) known.erase(ended->session);
-}
-
 /// Tries to write what `writing` holds, to a file that has its name before and afterwards.
 StoreWriter::Attempted StoreWriter::try_to_write(OpenFile& file) {
   Attempted attempted;
@@ -81,7 +71,8 @@ StoreWriter::OpenFile& StoreWriter::file(wire::CampaignId campaign) {
 /// soon; the rest is history, which shares the next commit. @pre The lock is held.
 bool StoreWriter::add(OpenFile& file, Entry entry) {
   const std::optional<TimePoint> due_before = file.due;
-  file.note_worker(entry);
+  if (const auto* joined = std::get_if<WorkerJoined>(&entry)) file.known.insert(joined->session);
+  if (const auto* ended = std::get_if<WorkerEnded>(&entry)) file.known.erase(ended->session);
   if (is_result(entry)) file.is_rest_wanted = false;
   file.is_fold_due = file.is_rest_wanted;
   if (is_record(entry) && file.num_records >= config_.num_records_max) {
@@ -347,8 +338,11 @@ void StoreWriter::write(wire::CampaignId campaign, Entry entry) {
     if (campaign != wire::CampaignId{}) {
       is_sooner = add(file(campaign), std::move(entry));
     } else {
+      const auto* const ended = std::get_if<WorkerEnded>(&entry);
       for (auto& [id, open_file] : files_) {
-        if (open_file.is_concerned_by(entry)) is_sooner = add(open_file, entry) || is_sooner;
+        const bool is_concerned =
+            ended != nullptr ? open_file.known.contains(ended->session) : !open_file.is_rest_wanted;
+        if (is_concerned) is_sooner = add(open_file, entry) || is_sooner;
       }
     }
   }

@@ -140,10 +140,6 @@ class StoreWriter {
     bool is_log_kept = false;         // A reader keeps the log from that, as was last said.
 
     [[nodiscard]] bool is_written_out() const { return writing.empty() && waiting.empty(); }
-    /// Whether an entry that is for no single campaign is for this file.
-    [[nodiscard]] bool is_concerned_by(const Entry& entry) const;
-    /// Keeps in mind which workers the file has without an end.
-    void note_worker(const Entry& entry);
     /// Sets `due`, unless something sooner is.
     void be_due(TimePoint at) { due = std::min(at, due.value_or(at)); }
   };

@@ -57,11 +57,6 @@ const CLI::App* command_of(const CLI::App& app, const std::string& name) {
   return nullptr;
 }
 
-std::string refusal_of_command(const CLI::App& app, const std::string& name) {
-  return fmt::format("command = {} ({})", name,
-                     with_nearest("must be one that --help lists", name, command_names(app)));
-}
-
 const CLI::App& chosen_command(const CLI::App& app) {
   const std::vector<CLI::App*> chosen = app.get_subcommands();
   return chosen.empty() ? app : *chosen.front();
@@ -200,7 +195,9 @@ std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
   if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr) return with_equals_sign(text);
   const bool needs_command = app.get_require_subcommand_min() > 0;
   if (needs_command && app.get_subcommands().empty() && app.remaining_size() > 0) {
-    return refusal_of_command(app, app.remaining().front());
+    const std::string name = app.remaining().front();
+    return fmt::format("command = {} ({})", name,
+                       with_nearest("must be one that --help lists", name, command_names(app)));
   }
   const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
   if (is_missing && needs_command && app.get_subcommands().empty()) {

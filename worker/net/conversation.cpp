@@ -183,7 +183,12 @@ void Conversation::on_refused(const std::string& reason) { refusal_ = reason; }
 void Conversation::on_progress(TimePoint now) {
   if (ending_) return;
   const std::vector<RunKey> runs = keep_finished(now);
-  for (const CrashedBatch& batch : execution_.take_crashed()) give_back_crashed(batch);
+  for (const CrashedBatch& batch : execution_.take_crashed()) {
+    note(wire::Event::error("simulation_crashed", {{"first_run", batch.runs.front().value},
+                                                   {"runs", batch.runs.size()},
+                                                   wire::Field::reason(batch.reason)}));
+    give_back(wire::LossReason::crashed, batch.campaign, batch.runs);
+  }
   if (const auto failure = execution_.failure()) {
     say_bye(wire::LossReason::failed);
     return end(Ending::Kind::failed, *failure);
@@ -429,13 +434,6 @@ void Conversation::send_results(std::vector<proto::ResultBatch> batches) {
 void Conversation::send_all_results(TimePoint now) {
   unacknowledged_.make_due(now);
   send_results(unacknowledged_.take_due(now));
-}
-
-void Conversation::give_back_crashed(const CrashedBatch& batch) {
-  note(wire::Event::error("simulation_crashed", {{"first_run", batch.runs.front().value},
-                                                 {"runs", batch.runs.size()},
-                                                 wire::Field::reason(batch.reason)}));
-  give_back(wire::LossReason::crashed, batch.campaign, batch.runs);
 }
 
 void Conversation::give_back(wire::LossReason reason, wire::CampaignId campaign,

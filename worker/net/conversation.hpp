@@ -158,7 +158,6 @@ class Conversation {
   void begin_to_leave(const Leaving& leaving, TimePoint now);
   void give_back_waiting();
   void give_back_late_batches(TimePoint now);
-  void give_back_crashed(const CrashedBatch& batch);
   void give_back(wire::LossReason reason, wire::CampaignId campaign,
                  std::span<const RunIndex> runs);
   void leave_if_done();

@@ -30,10 +30,6 @@ constexpr std::chrono::seconds look_interval(1);
 /// The clock of a file system is coarse: a file may change twice with the same time.
 constexpr std::chrono::nanoseconds settled_after = std::chrono::milliseconds(100);
 
-[[noreturn]] void refuse(const std::filesystem::path& file, std::string_view rule) {
-  throw Error(fmt::format("allow-list = {} ({})", file.string(), rule));
-}
-
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 std::string_view take_word(std::string_view& line) {
@@ -150,7 +146,9 @@ void AllowList::refresh(TimePoint now) {
   if (stamp == stamp_) return;
   stamp_ = is_settled(stamp) ? std::optional(stamp) : std::nullopt;
   try {
-    if (stamp.error == 0 && stamp.size == 0) refuse(file_, "is empty");
+    if (stamp.error == 0 && stamp.size == 0) {
+      throw Error(fmt::format("allow-list = {} (is empty)", file_.string()));
+    }
     const AllowedKeys former = keys_;
     take(read_allow_list(file_, role_), now);
     const bool was_unreadable = !std::exchange(reported_, {}).empty();

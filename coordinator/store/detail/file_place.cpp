@@ -77,10 +77,6 @@ std::filesystem::path beside(std::filesystem::path canonical, std::string_view e
   return canonical.concat(ending);
 }
 
-std::string this_process() {
-  return fmt::format("process {} on {}", ::getpid(), wire::host_name());
-}
-
 std::string holder(const std::filesystem::path& path) {
   std::string line;
   std::getline(std::ifstream(path), line);
@@ -284,7 +280,8 @@ StoreLock::StoreLock(const std::filesystem::path& campaign_file, IfNoLocks if_no
       descriptor_(acquire(path_, if_no_locks)) {
   // For people only: the lock holds even if this cannot be written.
   if (::ftruncate(descriptor_.number(), 0) != 0) return;
-  (void)wire::write_all(descriptor_.number(), this_process() + '\n');
+  (void)wire::write_all(descriptor_.number(),
+                        fmt::format("process {} on {}\n", ::getpid(), wire::host_name()));
 }
 
 // Somebody may have removed the file, and another process may have made one.
