@@ -54,8 +54,6 @@ class Background {
   /// @param wake  Called in the background thread when some work is done. Must not throw.
   explicit Background(std::function<void()> wake);
   ~Background();  ///< Waits for what is under way; what has not begun is dropped.
-  Background(const Background&) = delete;
-  Background& operator=(const Background&) = delete;
 
   /// False if too much work is pending.
   [[nodiscard]] bool post(Work work);

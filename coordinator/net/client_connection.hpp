@@ -27,8 +27,6 @@ class ClientConnection {
   /// @throws InvalidArgument reading `connect = endpoint (rule)`; Error if keys cannot be read.
   explicit ClientConnection(const ClientConnectionConfig& config);
   ~ClientConnection();
-  ClientConnection(const ClientConnection&) = delete;
-  ClientConnection& operator=(const ClientConnection&) = delete;
 
   /// Sends a request with a number of its own, a large one in parts, and waits for its reply, as
   /// long as the coordinator says that it is at work. The request is sent again when the connection

@@ -17,8 +17,6 @@ class PrivateEndpoint {
  public:
   PrivateEndpoint();  ///< @throws Error if the directory cannot be made.
   ~PrivateEndpoint();
-  PrivateEndpoint(const PrivateEndpoint&) = delete;
-  PrivateEndpoint& operator=(const PrivateEndpoint&) = delete;
 
   [[nodiscard]] std::string address() const;
 

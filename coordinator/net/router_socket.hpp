@@ -50,8 +50,6 @@ class RouterSocket {
   RouterSocket(zmq::context_t& context, std::string_view option, const std::string& endpoint,
                const wire::ServerSecurity& security, std::optional<int> listener = std::nullopt);
   ~RouterSocket();
-  RouterSocket(const RouterSocket&) = delete;
-  RouterSocket& operator=(const RouterSocket&) = delete;
 
   /// Keeps the socket from being closed while it is polled.
   [[nodiscard]] std::unique_lock<std::mutex> hold() { return std::unique_lock(mutex_); }

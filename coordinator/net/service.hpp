@@ -115,8 +115,6 @@ class Service {
   ///         cannot be read, or two campaigns that are handed over have one name; StoreError.
   Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log);
   ~Service();
-  Service(const Service&) = delete;
-  Service& operator=(const Service&) = delete;
 
   /// The addresses to connect to, with the ports that were chosen.
   [[nodiscard]] std::string workers_endpoint() const;

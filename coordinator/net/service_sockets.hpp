@@ -117,8 +117,6 @@ class MemoryGuard {
 
   MemoryGuard(std::size_t size_max, Actions actions);
   ~MemoryGuard();  ///< Waits for the thread.
-  MemoryGuard(const MemoryGuard&) = delete;
-  MemoryGuard& operator=(const MemoryGuard&) = delete;
 
  private:
   void watch();
@@ -156,8 +154,6 @@ class ServiceSockets {
   ///         cannot be read.
   ServiceSockets(const ServiceConfig& config, Log log);
   ~ServiceSockets();
-  ServiceSockets(const ServiceSockets&) = delete;
-  ServiceSockets& operator=(const ServiceSockets&) = delete;
 
   [[nodiscard]] RouterSocket& workers() { return *workers_; }
   [[nodiscard]] RouterSocket* clients() { return clients_.get(); }  ///< Null if there are none.

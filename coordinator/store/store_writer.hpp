@@ -86,8 +86,6 @@ class StoreWriter {
   /// Writes what can be written at once, and closes all files. What cannot is lost; nobody was told
   /// that it is durable.
   ~StoreWriter();
-  StoreWriter(const StoreWriter&) = delete;
-  StoreWriter& operator=(const StoreWriter&) = delete;
 
   /// Takes over a file.
   /// @pre No campaign has this id.

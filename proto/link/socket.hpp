@@ -80,8 +80,6 @@ class SocketEvents {
   /// @throws Error if the socket cannot be watched.
   SocketEvents(zmq::context_t& context, void* socket, int kinds);
   ~SocketEvents();
-  SocketEvents(const SocketEvents&) = delete;
-  SocketEvents& operator=(const SocketEvents&) = delete;
 
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t.
   [[nodiscard]] void* handle() const;
@@ -107,8 +105,6 @@ class ConnectionMonitor {
   /// @throws Error reading `connect = endpoint (reason)` if that can never be connected.
   ConnectionMonitor(zmq::context_t& context, zmq::socket_t& dealer, std::string endpoint,
                     const ClientSecurity& security, TimePoint now);
-  ConnectionMonitor(const ConnectionMonitor&) = delete;
-  ConnectionMonitor& operator=(const ConnectionMonitor&) = delete;
 
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t.
   [[nodiscard]] void* handle() const { return events_.handle(); }

@@ -146,8 +146,6 @@ class ProgramPlan final : public Plan {
     FreshProcesses::instance().keep(program_.path, {.process = std::move(idle_.back()),
                                                     .prepared = prepare_question(campaign_)});
   }
-  ProgramPlan(const ProgramPlan&) = delete;
-  ProgramPlan& operator=(const ProgramPlan&) = delete;
 
   [[nodiscard]] std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet,

@@ -25,8 +25,6 @@ class ProgramProcess {
   ProgramProcess(const std::filesystem::path& program, const ProgramLimits& limits);
   /// Kills it, and what it has started.
   ~ProgramProcess();
-  ProgramProcess(const ProgramProcess&) = delete;
-  ProgramProcess& operator=(const ProgramProcess&) = delete;
 
   /// Asks all questions and passes each answer on, without its end of line. Questions and answers
   /// pass one another, so that neither side waits for the other with more than one of them.

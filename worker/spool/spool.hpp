@@ -37,8 +37,6 @@ class Spool {
   Spool(std::filesystem::path path, std::string_view model,
         std::uint64_t size_max = default_size_max);
   ~Spool();  ///< Removes the file if it holds nothing.
-  Spool(const Spool&) = delete;
-  Spool& operator=(const Spool&) = delete;
 
   /// The results that it held when it was opened.
   [[nodiscard]] const std::vector<wire::LeasedResult>& former_results() const {

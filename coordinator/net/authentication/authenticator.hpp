@@ -72,8 +72,6 @@ class Authenticator {
   /// @throws Error if a list cannot be read, or if the context has an authenticator.
   Authenticator(zmq::context_t& context, const std::filesystem::path& directory, Log log);
   ~Authenticator();
-  Authenticator(const Authenticator&) = delete;
-  Authenticator& operator=(const Authenticator&) = delete;
 
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t; then call serve().
   [[nodiscard]] void* handle() const;

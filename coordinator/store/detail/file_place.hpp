@@ -69,8 +69,6 @@ class StoreLock {
   explicit StoreLock(const std::filesystem::path& campaign_file,
                      IfNoLocks if_no_locks = IfNoLocks::refuse);
   ~StoreLock();  ///< Removes the lock file.
-  StoreLock(const StoreLock&) = delete;
-  StoreLock& operator=(const StoreLock&) = delete;
 
  private:
   std::filesystem::path path_;

@@ -39,8 +39,6 @@ struct Store::Impl {
   /// Opens a file for its coordinator.
   Impl(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock);
   ~Impl();
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   /// Stores what `action` changes, durable in a file that has its name when it returns. If it
   /// throws, nothing is stored, or only in a file that has lost its name.
