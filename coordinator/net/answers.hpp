@@ -9,7 +9,6 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"

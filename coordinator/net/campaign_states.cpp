@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <exception>
-#include <memory>
 #include <ranges>
 #include <set>
 #include <utility>

@@ -9,7 +9,6 @@
 #include <string_view>
 #include <utility>
 
-#include "coordinator/dispatch/events.hpp"
 #include "coordinator/net/service_sockets.hpp"
 #include "coordinator/store/campaign_record.hpp"
 #include "coordinator/store/records.hpp"

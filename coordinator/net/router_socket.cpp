@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
-#include <utility>
 #include <vector>
 #include <zmq.hpp>
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <exception>
 #include <functional>
 #include <optional>
 #include <utility>

@@ -5,10 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <optional>
 #include <span>
-#include <string>
-#include <utility>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/rows.hpp"

@@ -1,15 +1,11 @@
 #include "coordinator/store/store_writer.hpp"
 
 #include <algorithm>
-#include <condition_variable>
-#include <deque>
 #include <exception>
 #include <future>
 #include <iterator>
-#include <map>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 #include <variant>
 

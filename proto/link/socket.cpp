@@ -14,7 +14,6 @@
 #include <cstdint>
 #include <cstring>
 #include <iterator>
-#include <set>
 #include <string>
 #include <utility>
 #include <zmq.hpp>

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <set>
-#include <utility>
 
 #include "core/campaign/expression.hpp"
 #include "core/campaign/name.hpp"

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {

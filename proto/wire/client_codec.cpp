@@ -1,7 +1,6 @@
 #include "proto/wire/client_codec.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "core/error.hpp"

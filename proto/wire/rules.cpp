@@ -4,7 +4,6 @@
 #include <google/protobuf/reflection.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>

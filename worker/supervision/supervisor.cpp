@@ -14,7 +14,6 @@
 #include <cstdio>
 #include <cstring>
 #include <new>
-#include <string>
 #include <utility>
 
 #include "core/error.hpp"

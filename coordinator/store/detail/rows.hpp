@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -18,7 +17,6 @@
 #include "core/campaign/result_columns.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
-#include "core/statistics/stop_rule.hpp"
 
 // What the tables of a campaign database hold, as values. Each table is written by the source of
 // its name.

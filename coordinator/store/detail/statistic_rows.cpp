@@ -12,7 +12,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/rows.hpp"
