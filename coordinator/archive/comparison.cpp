@@ -167,7 +167,6 @@ ChangePValues smaller_of(const ChangePValues& a, const ChangePValues& b) {
           .tail = smaller(a.tail, b.tail)};
 }
 
-/// Compares parameter i of both sides.
 void compare_parameter(const CampaignComparison& comparison, const SideErrors& of_first,
                        const SideErrors& of_second, std::size_t i, ParameterComparison& parameter) {
   const std::vector<double>& first = of_first.of(i);

@@ -34,7 +34,6 @@ struct ComparedAccuracy {
   std::size_t num_in_tail = 0;  ///< Runs with |estimate − truth| > ParameterComparison::tail_limit.
 };
 
-/// One parameter in two campaigns.
 struct ParameterComparison {
   Quantity quantity;  ///< As the first campaign has it.
   ComparedAccuracy first;

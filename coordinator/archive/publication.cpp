@@ -79,7 +79,6 @@ std::string complaint_of(const char* script, std::initializer_list<std::string> 
 
 // What is written.
 
-/// Writes comma-separated text.
 template <typename Headings, typename Value>
 void write_csv(const path& file, const Headings& headings, std::size_t num_rows,
                const Value& value_at) {

@@ -28,7 +28,6 @@ inline constexpr double fraction_by_default = 0.01;
 /// Details that a Check names of many.
 inline constexpr std::size_t details_named_max = 10;
 
-/// One thing that a campaign database was checked for.
 struct Check {
   std::string_view name = {};  ///< `integrity`, `digest` ...
   CheckOutcome verdict = CheckOutcome::holds;

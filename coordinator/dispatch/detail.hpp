@@ -162,13 +162,11 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 /// what they hold. Nothing is lent meanwhile.
 [[nodiscard]] bool is_reattaching(const State& state, TimePoint now);
 
-/// True if runs of the campaign are lent.
 [[nodiscard]] bool is_lent(const CampaignState& campaign);
 
 /// True if so many results wait for the store that no more runs are lent for now.
 [[nodiscard]] bool is_backed_up(const State& state, const CampaignState& campaign);
 
-/// Tells the worker of a new lease.
 void send_lease(State& state, LeaseId lease, Outbox& outbox);
 
 /// To be called whenever the phase or the priority of a campaign has changed.
@@ -184,7 +182,6 @@ void send_not_served(const State& state, CampaignId campaign, Outbox& outbox);
 void send_not_served(WorkerId worker, CampaignId campaign, std::span<const RunRange> runs,
                      Outbox& outbox);
 
-/// Ends the campaign if it is finished.
 void finish_if_done(State& state, CampaignId id, Outbox& outbox);
 
 /// To be called after runs were lost or given up: ends campaigns that are finished now, and lends

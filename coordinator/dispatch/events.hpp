@@ -23,7 +23,6 @@ namespace proofmass::coordinator {
 /// @pre No campaign has this id; definition->validate() passed.
 void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, TimePoint now,
                  Outbox& outbox);
-/// The campaign has more runs than before.
 void on_extended(State& state, CampaignId id, std::shared_ptr<const Campaign> definition,
                  TimePoint now, Outbox& outbox);
 /// Changes how early the runs of the campaign are lent, and which fraction of the results that come
@@ -63,7 +62,6 @@ void on_results(State& state, WorkerId id, CampaignId campaign, Attempt attempt,
 /// @pre Each run had a Delivery and is named here for the first time.
 void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, TimePoint now,
                   Outbox& outbox);
-/// A result was compared with the stored one.
 void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, bool is_equal,
                  TimePoint now, Outbox& outbox);
 /// Nothing can be stored for now: lends no more of the campaign. Results stay with the store, which

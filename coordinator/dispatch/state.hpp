@@ -49,7 +49,6 @@ struct HostId {
   auto operator<=>(const HostId&) const = default;
 };
 
-/// Settings of the dispatch.
 struct DispatchConfig {
   Duration heartbeat_interval = std::chrono::seconds(5);  ///< Asked of every worker.
   Duration suspect_after = std::chrono::seconds(15);  ///< Of silence; then nothing more is lent.
@@ -121,7 +120,6 @@ struct CardWork {
   bool can_compute = true;  ///< Until processors compute what was lent to cards.
 };
 
-/// A registered worker.
 struct Worker {
   SessionId session;
   std::string name;
@@ -165,7 +163,6 @@ struct Worker {
   std::map<CampaignId, CardWork> card_work;
 };
 
-/// Slots of a worker's processors.
 [[nodiscard]] constexpr std::uint32_t num_processor_slots(const Worker& worker) {
   return worker.num_slots - worker.num_card_slots;
 }
@@ -392,7 +389,6 @@ struct State {
 /// True if who has the model computes runs of the campaign, or others that it tolerates.
 [[nodiscard]] bool is_accepted(const ModelIdentity& model, const CampaignState& campaign);
 
-/// True if the worker has the campaign's model.
 [[nodiscard]] bool has_model(const Worker& worker, const CampaignState& campaign);
 
 /// True if the worker may be lent runs of the campaign: it has the model, and what simulates does

@@ -108,7 +108,6 @@ void on_submission_failed(FactoryState& state, const std::string& reason, Factor
 [[nodiscard]] proto::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
                                              const FactoryView& view, FactoryTime now);
 
-/// A program to be started.
 struct BatchCommand {
   std::vector<std::string> arguments;  ///< With the program, which is looked for in PATH.
   std::string input = {};              ///< On its standard input.

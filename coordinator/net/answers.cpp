@@ -184,7 +184,6 @@ int exit_code_of(const std::optional<int>& status, const Order& order) {
   return WEXITSTATUS(*status);
 }
 
-/// SHA-256 of the first bytes of a file.
 std::string sha256_of(const wire::UnnamedFile& file, std::uint64_t size) {
   Sha256 hash;
   for (std::uint64_t offset = 0; offset < size;) {

@@ -10,7 +10,6 @@
 
 namespace proofmass::coordinator {
 
-/// Settings of a ClientConnection.
 struct ClientConnectionConfig {
   std::string endpoint;                       ///< Where the coordinator serves clients.
   std::optional<std::filesystem::path> keys;  ///< With client.key and coordinator.pub.

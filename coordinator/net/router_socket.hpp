@@ -30,7 +30,6 @@ struct Address {
   std::string host;
 };
 
-/// A message as it comes out of a socket.
 struct Incoming {
   Address from;
   std::vector<std::string_view> frames;  ///< Valid while the message is handled.

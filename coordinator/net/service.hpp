@@ -49,7 +49,6 @@ struct CampaignNotice {
   std::string failure = {};
 };
 
-/// Settings of a service.
 struct ServiceConfig {
   std::string workers_endpoint;  ///< Where workers connect; the port may be `*`.
   /// A socket that listens there already, for workers that are started before the service. The

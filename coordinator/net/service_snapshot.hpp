@@ -50,7 +50,6 @@ inline constexpr std::array worker_activities{WorkerActivity::computing, WorkerA
 
 [[nodiscard]] std::string_view name_of(WorkerActivity activity);  ///< `computing`, `idle`, ...
 
-/// A registered worker.
 struct RegisteredWorker {
   proto::WorkerStatus status = {};
   WorkerActivity activity = WorkerActivity::idle;
@@ -71,7 +70,6 @@ struct ServiceSnapshot {
   std::uint64_t num_messages_unsent = 0;  ///< To workers; dropped because they found no room.
 };
 
-/// The worker as it stands.
 [[nodiscard]] RegisteredWorker record_of(const State& state, WorkerId id, const Worker& worker,
                                          TimePoint now);
 

@@ -210,7 +210,6 @@ class Store {
   /// Workers that joined and have not ended, as far as the file knows: those that may come back
   /// after the coordinator before this one was killed.
   [[nodiscard]] std::vector<wire::SessionId> attached_sessions() const;
-  /// Writes down that a coordinator serves the campaign.
   void begin_coordinator(const CoordinatorStart& start);
   /// Writes down that this coordinator ended in order.
   void end_coordinator(wire::Epoch epoch);

@@ -23,7 +23,6 @@
 
 namespace proofmass::coordinator {
 
-/// Settings of a StoreWriter.
 struct WriterConfig {
   std::size_t commit_runs_max = 256;  ///< Results for which a commit waits if more may come ...
   std::chrono::steady_clock::duration commit_after = std::chrono::milliseconds(50);  ///< ... or so.

@@ -64,7 +64,6 @@ class LinkFaults {
 /// Null if messages shall pass as they are.
 [[nodiscard]] std::unique_ptr<LinkFaults> link_faults(LinkFaults::Direction direction);
 
-/// Declares the option that says what shall go wrong.
 void add_fault_option(CLI::App& app);
 
 }  // namespace proofmass::wire

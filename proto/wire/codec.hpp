@@ -26,7 +26,6 @@ enum class DecodeFault : std::uint8_t {
   invalid,        ///< A message with a value that the rules forbid.
 };
 
-/// Why bytes are not a message.
 struct DecodeError {
   DecodeFault fault = DecodeFault::unparsable;
   std::string text;  ///< `field = value (rule)`, for logs and for the peer.

@@ -35,7 +35,6 @@ class Hdf5Handle {
   }
 
   operator hid_t() const { return id_; }  // NOLINT: the library's functions take it everywhere.
-  /// Gives up what it holds.
   [[nodiscard]] hid_t release() { return std::exchange(id_, -1); }
   void reset() {
     if (id_ >= 0) close_(release());

@@ -16,7 +16,6 @@
 
 namespace proofmass::coordinator {
 
-/// What a client may do.
 enum class Right : std::uint8_t {
   observe,  ///< See campaigns, workers and factories; report how a factory stands.
   submit,   ///< Submit campaigns, and control those that the same name submitted.

@@ -118,7 +118,6 @@ bool offer(std::vector<RankedRun>& worst, const RankedRun& offered);
 /// The worst runs of each parameter, by its index.
 using WorstRunTable = std::vector<std::vector<RankedRun>>;
 
-/// The rows of `worst_run`.
 [[nodiscard]] WorstRunTable read_worst_runs(const Database& database, const ResultSchema& results);
 
 /// Largest acceptable |error| of each parameter, SI; infinite if there is none.

@@ -32,7 +32,6 @@ StoredKind prepare_reader(Database& database, const std::filesystem::path& file)
 
 }  // namespace detail
 
-/// What a Store consists of.
 struct Store::Impl {
   /// Opens a file for reading.
   explicit Impl(const std::filesystem::path& file);
