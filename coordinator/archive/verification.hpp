@@ -46,7 +46,8 @@ struct Check {
 
 /// How much is checked, and against what.
 struct VerifyOptions {
-  double fraction = 0.01;       ///< Of the finished runs, simulated again; in [0, 1], one at least.
+  /// Of the finished runs, simulated again; in [0, 1], one at least.
+  double fraction = fraction_by_default;
   std::size_t num_threads = 1;  ///< That draw and simulate; at least 1.
   std::string_view model_version = {};  ///< The model that simulates; empty: Store::model().
 };
