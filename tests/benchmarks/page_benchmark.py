@@ -21,7 +21,6 @@ import threading
 import time
 import urllib.request
 
-from dispatch_benchmark import Program
 from scale_benchmark import Fleet, free_port, say, wait_until
 
 PATHS = ["", "workers", "workers?sort=throughput&page=100", "campaigns/scale",
@@ -36,13 +35,8 @@ class PageFleet(Fleet):
 
     def start_coordinator(self):
         self.page_port = free_port()
-        coordinator = Program(
-            [self.binaries / "proofmass-coordinator", "--directory", self.directory / "served",
-             "--bind", f"tcp://127.0.0.1:{self.port}", "--bind-clients", self.clients,
-             "--log-format", "json", f"--page=127.0.0.1:{self.page_port}",
-             "--workers-max", str(self.options.agents), *self.keys], "stderr")
-        coordinator.wait_for(lambda line: line["event"] == "coordinator_started")
-        return coordinator
+        return super().start_coordinator(f"--page=127.0.0.1:{self.page_port}", "--workers-max",
+                                         str(self.options.agents))
 
     def fetch(self, path):
         """Seconds and bytes of an answer."""

@@ -66,11 +66,11 @@ class Fleet:
     def ask(self, *command):
         return self.proofmass(*command, "--connect", self.clients, *self.keys, "--timeout", 60)
 
-    def start_coordinator(self):
+    def start_coordinator(self, *further):
         coordinator = Program(
             [self.binaries / "proofmass-coordinator", "--directory", self.directory / "served",
              "--bind", f"tcp://127.0.0.1:{self.port}", "--bind-clients", self.clients,
-             "--log-format", "json", *self.keys], "stderr")
+             "--log-format", "json", *self.keys, *further], "stderr")
         coordinator.wait_for(lambda line: line["event"] == "coordinator_started")
         return coordinator
 
@@ -106,9 +106,11 @@ class Fleet:
         self.num_runs += num_more
         (self.directory / "scale.toml").write_text(
             f'[campaign]\nname = "scale"\nseed = 1\nruns = {self.num_runs}\n')
-        done = self.ask("submit", "scale.toml")
-        if done.returncode != 0:
-            raise RuntimeError("submit: " + done.stderr)
+        for _ in range(5):  # A connection may be cut just then.
+            done = self.ask("submit", "scale.toml")
+            if done.returncode == 0:
+                return
+        raise RuntimeError("submit: " + done.stderr)
 
     def wait_for_end(self, num_before=0):
         self.coordinator.wait_for(lambda line: line["event"] == "campaign_finished",
@@ -128,9 +130,13 @@ class Fleet:
     def descriptors(self):
         return len(os.listdir(f"/proc/{self.coordinator.process.pid}/fd"))
 
-    def memory_mb_max(self):
+    def memory_mib(self, what):
+        """VmRSS: now; VmHWM: at most."""
         status = pathlib.Path(f"/proc/{self.coordinator.process.pid}/status").read_text()
-        return int(re.search(r"VmHWM:\s+(\d+)", status).group(1)) * 1024 / 1e6
+        return int(re.search(rf"{what}:\s+(\d+)", status)[1]) / 1024
+
+    def memory_mb_max(self):
+        return self.memory_mib("VmHWM") * 2**20 / 1e6
 
     def close(self):
         for program in [self.coordinator, *self.agents, *self.idle]:
@@ -243,6 +249,8 @@ def problems_of_file(fleet):
     """Ends the coordinator in order and checks the campaign database, but for what null results are
     not: simulated."""
     fleet.coordinator.end()
+    if fleet.coordinator.process.returncode != 0:
+        raise RuntimeError(f"exit code = {fleet.coordinator.process.returncode} (must be 0)")
     text = fleet.proofmass("verify", "served/scale.db", "--fraction", "0").stdout
     lines = text.split("\n")
     expected = {"integrity": "ok", "results": f"{fleet.num_runs} of {fleet.num_runs} runs",
