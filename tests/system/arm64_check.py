@@ -77,7 +77,7 @@ class Campaign:
         self.directory = directory
         self.endpoint = f"ipc://{directory}/workers"
         self.processes = {}
-        checking.write_short_campaign(programs, directory, NUM_RUNS, orbits=1)
+        checking.write_short_campaign(programs, directory, NUM_RUNS)
 
     def command(self, program, *words):
         return subprocess.run([self.programs / program, *words], cwd=self.directory, check=True,

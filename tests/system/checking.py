@@ -66,16 +66,16 @@ def output_of(*command, **more):
     return process.stdout
 
 
-def shortening(runs, orbits=2):
-    """For `sed -E`: the paper's campaign with so many runs of so many orbits, which take milliseconds."""
-    settings = {"orbits": orbits, "sample_period_s": 1, "runs": runs}
+def shortening(runs):
+    """For `sed -E`: the paper's campaign with so many runs of an orbit a session, which take milliseconds."""
+    settings = {"orbits": 1, "sample_period_s": 1, "settling_s": 1100, "runs": runs}
     return ";".join(f"s/^{key} = .*/{key} = {value}/" for key, value in settings.items())
 
 
-def write_short_campaign(programs, directory, runs, orbits=2):
+def write_short_campaign(programs, directory, runs):
     """paper.toml and, shortened, short.toml."""
     output_of(programs / "proofmass", "init", "paper.toml", cwd=directory)
-    text = output_of("sed", "-E", shortening(runs, orbits), directory / "paper.toml")
+    text = output_of("sed", "-E", shortening(runs), directory / "paper.toml")
     (directory / "short.toml").write_text(text)
 
 

@@ -73,7 +73,7 @@ class Campaign:
         self.environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
         self.processes = []
         self.command("proofmass", "keygen", "keys")
-        checking.write_short_campaign(programs, directory, NUM_RUNS, orbits=1)
+        checking.write_short_campaign(programs, directory, NUM_RUNS)
         self.start("coordinator", "proofmass-coordinator", "--directory", "served", "--keys", "keys",
                    "--bind", "tcp://127.0.0.1:*", "--bind-clients", "tcp://127.0.0.1:*")
         log = directory / "coordinator.log"

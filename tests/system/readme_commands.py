@@ -28,9 +28,9 @@ import time
 import checking
 
 SERVICES = ("proofmass-coordinator ", "proofmass-worker ")
-SHORT_CAMPAIGN = (
-    "sed -i -E 's/^orbits = .*/orbits = 2/; s/^sample_period_s = .*/sample_period_s = 1/' mine.toml"
-)
+# Plans need sessions of two orbits, and runs need not.
+SHORTENED_AFTER = "proofmass plan mine.toml"
+SHORT_CAMPAIGN = f"sed -i -E '{checking.shortening(runs=100)}' mine.toml"
 QUICK_START = "./deploy/quickstart.sh"
 WORDS_MAX = 1500
 
@@ -103,7 +103,7 @@ def run(machine, command, quick_start):
     if process.wait() != 0:
         raise Mismatch(f"{command}: exit code = {process.returncode} (must be 0)")
     print(f"  {time.monotonic() - began_at:.1f} s", flush=True)
-    if command == "proofmass init mine.toml":
+    if command == SHORTENED_AFTER:
         machine.start(SHORT_CAMPAIGN).wait()
 
 
