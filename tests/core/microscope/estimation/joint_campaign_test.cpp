@@ -73,7 +73,7 @@ TEST(JointCampaign, FindsTheTruthWithoutNoise) {
 // At 1e-6 m/s² the product of K2c and K2d makes 1.5 K2c K2d Γ² of a_d11', a hundred times its
 // standard error, and σ of K2d is a hundredth of that at 2e-8 m/s².
 TEST(JointCampaign, ErrsLessThanItsStandardErrorsUnderStrongPushesWithoutNoise) {
-  MicroscopeCampaign campaign;
+  MicroscopeCampaign campaign = test::coarse_campaign();
   campaign.seed = 46;
   campaign.scenario.noise.scale = 0.0;
   for (Session& session : campaign.scenario.sessions) {
@@ -171,7 +171,7 @@ Dispersion normal_law(Law law, double mean, double deviation) {
 // Mean squares keep within five of their own standard errors.
 TEST(JointCampaign, HasHonestStandardErrorsUnderEveryLaw) {
   constexpr std::uint64_t num_runs = 128;
-  MicroscopeCampaign campaign;
+  MicroscopeCampaign campaign = test::coarse_campaign();
   campaign.seed = 45;
   campaign.scenario.acceptance = {.a_d11_max = 0.1, .a_d1j_max_rad = 0.1, .a_c1j_max_rad = 0.1};
   test::law_of(campaign, "coupling_rad.sensor_1_z") = normal_law(Law::normal, 0.0, 3e-3);
