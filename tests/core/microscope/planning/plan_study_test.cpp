@@ -24,7 +24,7 @@ constexpr double turn_rad = 2.0 * std::numbers::pi;
 
 /// An instrument without errors, whose sensors have white noise.
 MicroscopeCampaign perfect_campaign() {
-  MicroscopeCampaign campaign;
+  MicroscopeCampaign campaign = test::coarse_campaign();
   campaign.dispersions = test::perfect_laws();
   campaign.scenario.noise.linear_x = {.white_asd = 1e-12};
   return campaign;
@@ -57,7 +57,8 @@ TEST(PlanStudy, IsTheClosedFormOfOneLineInWhiteNoise) {
 // Two objectives of three standard errors, 2Φ(−3), and all others far away.
 TEST(PlanStudy, TellsTheChanceOfTheObjectives) {
   MicroscopeCampaign campaign = perfect_campaign();
-  const PlanBound before = study_plan(campaign)->bound(study_plan(campaign)->scope().num_steps);
+  const auto nominal = study_plan(campaign);
+  const PlanBound before = nominal->bound(nominal->scope().num_steps);
   for (std::size_t i = 0; i < num_parameters; ++i) {
     campaign.scenario.objectives[i] = (i < 2 ? 3.0 : 9.0) * before.standard_errors[i];
   }
@@ -71,7 +72,7 @@ TEST(PlanStudy, TellsTheChanceOfTheObjectives) {
 
 /// Both motions of the masses at once, and what else tells all parameters, in 16 orbits.
 MicroscopeCampaign simultaneous_campaign() {
-  MicroscopeCampaign campaign;
+  MicroscopeCampaign campaign = test::coarse_campaign();
   const auto lasting_4 = [](const char* name, std::vector<Excitation> excitations,
                             DragFreeSource source) {
     Session session;
@@ -244,6 +245,7 @@ TEST(PlanStudy, SeesTheNoiseOfSquaresOfAllSessionsTogether) {
 TEST(PlanStudy, SeesTheNoiseOfSquaresThatAPeriodogramShows) {
   constexpr std::size_t square_noise = 4;
   MicroscopeCampaign campaign = simultaneous_campaign();
+  campaign.scenario.simulation.sample_period_s = 0.25;
   campaign.scenario.noise.scale = 10.0;
   const Session shaken = campaign.scenario.sessions.front();
   const std::size_t quiet = campaign.scenario.sessions.size();
@@ -400,6 +402,7 @@ TEST(PlanStudy, ProbesTestsToo) {
 // Ten times the noise: in its square the line of K2d² is as small as the noise is large.
 TEST(PlanStudy, HasTheWarningsOfItsProbedRuns) {
   MicroscopeCampaign campaign = simultaneous_campaign();
+  campaign.scenario.simulation.sample_period_s = 0.25;
   Session quiet;
   quiet.name = "quiet";
   quiet.target = SessionTarget::no_target;
@@ -419,7 +422,7 @@ TEST(PlanStudy, HasTheWarningsOfItsProbedRuns) {
 }
 
 TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
-  const auto study = study_plan(MicroscopeCampaign{});
+  const auto study = study_plan(test::coarse_campaign());
   const PlanBound bound = study->bound(std::vector<int>(study->scope().num_steps.size(), 0));
   for (const double error : bound.standard_errors) EXPECT_TRUE(std::isinf(error));
   EXPECT_NEAR(bound.misses_any, 1.0, 1e-12);
@@ -427,7 +430,7 @@ TEST(PlanStudy, IsInfiniteForWhatNoSessionDetermines) {
 
 // What is written is read again as the plan that it is of.
 TEST(PlanStudy, WritesTheCampaignThatItsBoundIsOf) {
-  MicroscopeCampaign campaign;
+  MicroscopeCampaign campaign = test::coarse_campaign();
   campaign.scenario.estimation.transient_s = 3000.0;
   const auto study = study_plan(campaign);
   std::vector<int> orbits = study->scope().num_steps;
