@@ -407,6 +407,7 @@ TEST(EstimateHardy2013, NeverConvergesOnNumbersThatAreNotFinite) {
 TEST(EstimateHardy2013, GivesItsErrorToTheStandardErrorOfATest) {
   constexpr std::uint64_t num_runs = 208;
   MicroscopeCampaign campaign = hardy2013_campaign();
+  campaign.scenario.simulation = test::coarse_campaign().scenario.simulation;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
   Session& test = campaign.scenario.sessions.emplace_back();
   test.name = "ep";
