@@ -13,19 +13,27 @@
 namespace proofmass::coordinator {
 namespace {
 
+/// Where read_series.py writes what is in a file.
+std::filesystem::path raw_folder(const std::filesystem::path& file) {
+  return file.string() + ".raw";
+}
+
 /// Values of a field of a dataset, `a_c13/measured` and `mass_1_K_x`, as h5py reads them: another
-/// program than the one that writes.
-std::vector<double> series_in(const std::filesystem::path& file, const std::string& dataset,
+/// program than the one that writes. The first call reads all of the file.
+std::vector<double> series_in(const std::filesystem::path& file, std::string dataset,
                               const std::string& field) {
-  const std::string raw = file.string() + ".raw";
-  const std::string command = std::string("/usr/bin/python3 '") + PROOFMASS_READ_SERIES + "' '" +
-                              file.string() + "' " + dataset + " " + field + " > '" + raw + "'";
-  EXPECT_EQ(std::system(command.c_str()), 0);
+  const std::filesystem::path folder = raw_folder(file);
+  if (std::filesystem::create_directory(folder)) {
+    const std::string command = std::string("/usr/bin/python3 '") + PROOFMASS_READ_SERIES + "' '" +
+                                file.string() + "' '" + folder.string() + "'";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+  }
+  std::ranges::replace(dataset, '/', '.');
+  const std::filesystem::path raw = folder / (dataset + "." + field);
   std::vector<double> values(std::filesystem::file_size(raw) / sizeof(double));
   std::ifstream(raw, std::ios::binary)
       .read(reinterpret_cast<char*>(values.data()),
             static_cast<std::streamsize>(values.size() * sizeof(double)));
-  std::filesystem::remove(raw);
   return values;
 }
 
@@ -46,6 +54,7 @@ class ReplayedSeries : public test::StoreTest {
     const RunResult stored = again.stored_result(RunIndex{0});
     const auto output = hdf5_series(series_, {store, stored, ""}, selection);
     ASSERT_TRUE(again.run(stored, output.get(), test::never_stopped).empty());
+    std::filesystem::remove_all(raw_folder(series_));
   }
 
   [[nodiscard]] Series series(const std::string& dataset, const std::string& field) const {
@@ -297,6 +306,7 @@ class ReplayedSpectra : public test::StoreTest {
     const RunResult stored = replay.stored_result(RunIndex{0});
     const auto output = hdf5_series(directory() / "run.h5", {store, stored, ""}, selection);
     EXPECT_THAT(replay.run(stored, output.get(), test::never_stopped), IsEmpty());
+    std::filesystem::remove_all(raw_folder(directory() / "run.h5"));
     return series_in(directory() / "run.h5", session + "/modes", "differential_x");
   }
 };
