@@ -5,16 +5,17 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-# Tests wait for their processes more than they compute; the long ones keep a core busy more often.
-selection=(--label-exclude '^long$' --parallel 4)
+# Tests wait for their processes about as long as they compute.
+selection=(--parallel 4)
 targets=(all)
 if [[ ${1:-} == --all ]]; then
-  selection=(--parallel 3)
   targets+=(
     unoptimised_recorded_bits_test proofmass_benchmarks proofmass_store_benchmark
     proofmass_fuzz_corpus
   )
   shift
+else
+  selection+=(--label-exclude '^long$')
 fi
 
 "$root/deploy/install-deps.sh"
