@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What coordinator, wire and durable store cost for each run, with runs that take no time.
+"""What coordinator, wire and durable store cost for each run, with runs that take no time; with
+thousands of workers, see scale_benchmark.py.
 
 Usage: dispatch_benchmark.py BIN_DIRECTORY [options]
 
@@ -20,7 +21,6 @@ import threading
 import time
 
 TIME_MAX_S = 600.0
-SETTLE_S = 1.0  # So that what registration costs is not counted as idle.
 
 
 class Program:
@@ -114,9 +114,6 @@ class Service:
     def wait_for_workers(self, count):
         return self.coordinator.wait_for(lambda line: line["event"] == "worker_registered", count)
 
-    def num_workers_lost(self):
-        return sum(line["event"] == "worker_gone" for _, line in self.coordinator.lines)
-
     def run_campaign(self, num_runs):
         """Wall time and the coordinator's processor time from submission to the last commit."""
         file = self.directory / "null.toml"
@@ -149,22 +146,6 @@ def measure_batches(service, num_runs):
     return figures
 
 
-def swarm_figures(swarm, start):
-    """What the swarm said after that time, altogether."""
-    lines = [line for when, line in swarm.lines if when > start]
-    return {
-        "num_leases": sum(line["num_leases"] for line in lines),
-        "num_result_messages": sum(line["num_result_messages"] for line in lines),
-        "acknowledgement_ms_median": 1e3 * max(line["acknowledgement_s_median"] for line in lines),
-        "acknowledgement_ms_max": 1e3 * max(line["acknowledgement_s_max"] for line in lines),
-        "num_heartbeats_answered": sum(line["num_heartbeats_answered"] for line in lines),
-        "heartbeat_answer_ms_max": 1e3 * max(max(line["heartbeat_answer_s_max"],
-                                                 line["heartbeat_unanswered_s_max"])
-                                             for line in lines),
-        "num_messages_unsent": sum(line["num_unsent"] for line in lines),
-    }
-
-
 def measure_one_by_one(service, num_runs, num_workers):
     """Each worker has one run at a time: a lease, a result and an acknowledgement for every run."""
     # A worker that says that its runs are long is lent no more than it asks for.
@@ -174,29 +155,8 @@ def measure_one_by_one(service, num_runs, num_workers):
     start = time.monotonic()
     figures = service.run_campaign(num_runs)
     service.close()
-    return {"num_workers": num_workers, **figures, **swarm_figures(swarm, start)}
-
-
-def measure_swarm(service, num_runs, num_workers, idle_s):
-    """A thousand workers: how they come, what they cost when idle, what they get through."""
-    begin = time.monotonic()
-    swarm = service.add("proofmass-swarm", "--workers", num_workers, stream="stdout")
-    registered = swarm.wait_for(lambda line: line["num_registered"] == num_workers)
-    figures = {"num_workers": num_workers, "registration_s": registered - begin}
-    time.sleep(SETTLE_S)
-    cpu_s, idle_from = service.coordinator.cpu_s(), time.monotonic()
-    time.sleep(idle_s)
-    figures["idle_cpu_percent"] = (100.0 * (service.coordinator.cpu_s() - cpu_s)
-                                   / (time.monotonic() - idle_from))
-    figures["idle_heartbeat_answer_ms_max"] = swarm_figures(swarm, idle_from)[
-        "heartbeat_answer_ms_max"]
-    start = time.monotonic()
-    figures.update(service.run_campaign(num_runs))
-    figures["num_workers_lost"] = service.num_workers_lost()
-    service.close()
-    figures.update(swarm_figures(swarm, start))
-    figures["coordinator_memory_mb"] = service.coordinator.memory_mb_max()
-    return figures
+    medians = [line["acknowledgement_s_median"] for when, line in swarm.lines if when > start]
+    return {"num_workers": num_workers, "acknowledgement_ms_median": 1e3 * max(medians), **figures}
 
 
 def row(name, value, unit, limit=None):
@@ -204,7 +164,7 @@ def row(name, value, unit, limit=None):
 
 
 def rows_of(figures):
-    batches, single, swarm = figures["batches"], figures["one_by_one"], figures["swarm"]
+    batches, single = figures["batches"], figures["one_by_one"]
     return [
         row(f"in batches, {batches['num_runs']} runs, 2 workers", batches["ms_per_run"], "ms/run",
             0.02),
@@ -216,14 +176,6 @@ def rows_of(figures):
             single["ms_per_run"], "ms/run", 0.1),
         row("  processor time of the coordinator", single["coordinator_cpu_ms_per_run"], "ms/run"),
         row("  acknowledged after, median", single["acknowledgement_ms_median"], "ms"),
-        row(f"{swarm['num_workers']} workers: all registered after", swarm["registration_s"], "s"),
-        row("  idle coordinator", swarm["idle_cpu_percent"], "% of a processor"),
-        row("  heartbeat answered, at most, idle", swarm["idle_heartbeat_answer_ms_max"], "ms"),
-        row(f"  {swarm['num_runs']} runs", swarm["ms_per_run"], "ms/run"),
-        row("  processor time of the coordinator", swarm["coordinator_cpu_ms_per_run"], "ms/run"),
-        row("  heartbeat answered, at most, busy", swarm["heartbeat_answer_ms_max"], "ms", 5000.0),
-        row("  workers lost", swarm["num_workers_lost"], "", 0),
-        row("  memory of the coordinator, at most", swarm["coordinator_memory_mb"], "MB", 300.0),
     ]
 
 
@@ -244,8 +196,6 @@ def read_options():
     parser.add_argument("--runs", type=int, default=200_000, help="in batches")
     parser.add_argument("--single-runs", type=int, default=50_000, help="one by one")
     parser.add_argument("--single-workers", type=int, default=64, help="one by one")
-    parser.add_argument("--swarm-workers", type=int, default=1000)
-    parser.add_argument("--idle-s", type=float, default=10.0, help="how long the swarm is idle")
     parser.add_argument("--directory", type=pathlib.Path, help="for campaign databases")
     parser.add_argument("--json", type=pathlib.Path, help="file for the figures")
     return parser.parse_args()
@@ -264,7 +214,6 @@ def main():
         "batches": with_service(measure_batches, options.runs),
         "one_by_one": with_service(measure_one_by_one, options.single_runs,
                                    options.single_workers),
-        "swarm": with_service(measure_swarm, options.runs, options.swarm_workers, options.idle_s),
     }
     figures["machine"]["load_after"] = os.getloadavg()[0]
     rows = rows_of(figures)

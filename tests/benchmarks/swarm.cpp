@@ -83,10 +83,6 @@ proto::Hello hello_of(int number, std::uint32_t num_slots) {
   return hello;
 }
 
-double largest(const std::vector<double>& values) {
-  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
-}
-
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -224,19 +220,11 @@ class Swarm {
                                 {"num_registered", num_registered()},
                                 {"num_idle_connected", idle_.num_connected()},
                                 {"num_idle_replaced", idle_.num_replaced()},
-                                {"num_leases", count_.num_leases},
-                                {"num_result_messages", count_.num_result_messages},
                                 {"num_results", count_.num_results},
-                                {"num_acknowledged", count_.num_acknowledged},
-                                {"num_rejects", count_.num_rejects},
-                                {"num_retracts", count_.num_retracts},
                                 {"num_unsent", count_.num_unsent},
-                                {"num_heartbeats_answered", count_.heartbeat_answers_s.size()},
                                 {"heartbeat_answers_by_ms", by_ms(count_.heartbeat_answers_s)},
-                                {"heartbeat_answer_s_max", largest(count_.heartbeat_answers_s)},
                                 {"heartbeat_unanswered_s_max", unanswered_s_max(now)},
-                                {"acknowledgement_s_median", median(count_.acknowledgements_s)},
-                                {"acknowledgement_s_max", largest(count_.acknowledgements_s)}}
+                                {"acknowledgement_s_median", median(count_.acknowledgements_s)}}
               << std::endl;
     count_ = {};
   }

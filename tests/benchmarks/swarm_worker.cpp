@@ -99,12 +99,7 @@ void SwarmWorker::receive(std::string_view bytes, TimePoint now) {
     throw std::runtime_error("the coordinator sent what cannot be read: " + error->text);
   }
   const auto& message = std::get<proto::Envelope>(decoded);
-  if (message.has_run_lease()) ++count_.num_leases;
-  if (message.has_retract()) ++count_.num_retracts;
-  if (message.has_reject()) {
-    ++count_.num_rejects;
-    heartbeats_.clear();  // The answer to one of them.
-  }
+  if (message.has_reject()) heartbeats_.clear();  // The answer to one of them.
   if (message.has_result_ack()) note_acknowledged(message.result_ack(), now);
   if (message.has_heartbeat_ack() && !heartbeats_.empty()) {
     count_.heartbeat_answers_s.push_back(seconds(now - heartbeats_.front()));
@@ -114,7 +109,6 @@ void SwarmWorker::receive(std::string_view bytes, TimePoint now) {
 }
 
 void SwarmWorker::note_sent(const proto::ResultBatch& batch, TimePoint now) {
-  ++count_.num_result_messages;
   count_.num_results += static_cast<std::uint64_t>(batch.results_size());
   const wire::CampaignId campaign{batch.campaign()};
   for (const proto::ComputedRun& computed : batch.results()) {
@@ -124,7 +118,6 @@ void SwarmWorker::note_sent(const proto::ResultBatch& batch, TimePoint now) {
 }
 
 void SwarmWorker::note_acknowledged(const proto::ResultAck& ack, TimePoint now) {
-  count_.num_acknowledged += static_cast<std::uint64_t>(ack.runs_size());
   for (const std::uint64_t run : ack.runs()) {
     const auto found = timed_.find({{ack.campaign()}, {run}});
     if (found == timed_.end()) continue;

@@ -24,12 +24,7 @@ inline double seconds(worker::Duration duration) {
 
 /// What the workers of a swarm have seen since somebody last looked.
 struct SwarmCount {
-  std::uint64_t num_leases = 0;  ///< Messages.
-  std::uint64_t num_result_messages = 0;
-  std::uint64_t num_results = 0;       ///< Runs, repetitions included.
-  std::uint64_t num_acknowledged = 0;  ///< Runs.
-  std::uint64_t num_rejects = 0;
-  std::uint64_t num_retracts = 0;           ///< Messages that ask runs back.
+  std::uint64_t num_results = 0;            ///< Runs, repetitions included.
   std::uint64_t num_unsent = 0;             ///< Messages for which there was no room.
   std::vector<double> heartbeat_answers_s;  ///< From each heartbeat to its answer.
   /// From a result to its acknowledgement; of one in sixteen.
