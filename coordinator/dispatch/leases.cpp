@@ -301,7 +301,12 @@ RunsByCampaign leased_runs(const State& state, const Worker& worker) {
 }
 
 RunSet leased_runs(const State& state, const Worker& worker, CampaignId campaign) {
-  return leased_runs(state, worker)[campaign];
+  RunSet runs;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = state.leases.at(id);
+    if (lease.campaign == campaign) runs.add(lease.remaining);
+  }
+  return runs;
 }
 
 void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outbox& outbox) {

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <regex>
 
 #include "coordinator/charts/chart.hpp"
@@ -149,11 +151,17 @@ std::string subject_of(const RequirementAnswer& row) {
   return row.is_of_error ? "|error| of " + symbol : symbol;
 }
 
+/// The number that figure_text() spells, whose whole numbers have all their digits.
+double shown_with(double value, int num_digits) {
+  if (num_digits < 5 && std::abs(value) >= 1e3 && std::abs(value) < 1e5) return std::round(value);
+  return std::strtod(fmt::format("{:.{}e}", value, num_digits - 1).c_str(), nullptr);
+}
+
 /// Three digits, or as many as show on which side of a limit a value lies.
 int num_digits_beside(double value, double limit) {
   int num_digits = 3;
   for (; num_digits < 15; ++num_digits) {
-    const double shown = std::stod(fmt::format("{:.{}e}", value, num_digits - 1));
+    const double shown = shown_with(value, num_digits);
     if ((shown < limit) == (value < limit) && (shown > limit) == (value > limit)) break;
   }
   return num_digits;
@@ -169,9 +177,9 @@ Cell value_cell(const RequirementAnswer& row, const std::optional<double>& value
           *value};
 }
 
-/// With the digits that somebody gave it.
+/// With its relation and the digits that somebody gave it.
 Cell limit_cell(const RequirementAnswer& row) {
-  if (row.is_joint()) return value_cell(row, row.limit());
+  if (row.is_joint()) return {"≤ 1 × objective", row.limit()};
   return {fmt::format("{} {}", row.requirement.admits_limit ? "≤" : "<",
                       quantity_text(row.limit(), row.subject, 10)),
           row.limit()};

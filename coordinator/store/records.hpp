@@ -152,9 +152,9 @@ struct CampaignExecution {
   std::uint64_t num_coordinators = 0;  ///< Starts of one.
   std::uint64_t num_workers = 0;
   std::uint64_t num_hosts = 0;
-  double compute_s = 0.0;          ///< Of the results that were kept; time of processor cores.
-  std::uint64_t num_retried = 0;   ///< Results that were kept of a later attempt than the first.
-  std::uint64_t num_audited = 0;   ///< Results that were compared with a second one.
+  double compute_s = 0.0;         ///< Of the results that were kept: from their begin to their end.
+  std::uint64_t num_retried = 0;  ///< Results that were kept of a later attempt than the first.
+  std::uint64_t num_audited = 0;  ///< Results that were compared with a second one.
   std::string first_result_utc{};  ///< Empty if there is none.
   std::string last_result_utc{};
   std::vector<HostShare> hosts{};  ///< At most 20, those with the most results first.

@@ -226,7 +226,8 @@ class Campaign:
 
         def is_log_there():
             try:
-                return log.stat().st_size > 0  # SQLite makes an empty one where it finds none.
+                # SQLite makes an empty one where it finds none. Headers alone are 56 bytes.
+                return log.stat().st_size > 56
             except FileNotFoundError:
                 return False
 

@@ -14,6 +14,7 @@ import os
 import pathlib
 import re
 import resource
+import socket
 import statistics
 import sys
 import tempfile
@@ -21,13 +22,19 @@ import threading
 import time
 import urllib.request
 
-from scale_benchmark import Fleet, free_port, say, wait_until
+from scale_benchmark import Fleet, say, wait_until
 
 PATHS = ["", "workers", "workers?sort=throughput&page=100", "campaigns/scale",
          "campaigns/scale?events=2"]
 FURTHER_PATHS = ["workers?filter=99", "metrics"]
 ANSWER_S_MAX = 0.2
 VIEWERS_CORES_MAX = 0.02
+
+
+def free_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
 
 
 class PageFleet(Fleet):

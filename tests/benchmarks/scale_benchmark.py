@@ -17,7 +17,6 @@ import pathlib
 import re
 import resource
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -28,12 +27,6 @@ from dispatch_benchmark import Program
 AGENTS_PER_PROCESS = 500
 IDLE_PER_PROCESS = 2000
 PATIENCE_S = 900.0
-
-
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 def wait_until(what, condition):
@@ -52,8 +45,7 @@ class Fleet:
         self.directory = directory
         self.options = options
         self.num_runs = 0
-        self.port = free_port()
-        self.clients = f"ipc://{directory}/clients"
+        self.workers = self.clients = "tcp://127.0.0.1:*"
         self.agents, self.idle = [], []
         self.keys = [] if options.without_keys else ["--keys", directory / "keys"]
         self.proofmass("keygen", "keys")
@@ -69,14 +61,17 @@ class Fleet:
     def start_coordinator(self, *further):
         coordinator = Program(
             [self.binaries / "proofmass-coordinator", "--directory", self.directory / "served",
-             "--bind", f"tcp://127.0.0.1:{self.port}", "--bind-clients", self.clients,
-             "--log-format", "json", *self.keys, *further], "stderr")
+             "--bind", self.workers, "--bind-clients", self.clients, "--log-format", "json",
+             *self.keys, *further], "stderr")
         coordinator.wait_for(lambda line: line["event"] == "coordinator_started")
+        started = next(line for _, line in coordinator.lines
+                       if line["event"] == "coordinator_started")
+        self.workers, self.clients = started["bind"], started["bind_clients"]
         return coordinator
 
     def start_swarm(self, *arguments):
-        return Program([self.binaries / "proofmass-swarm", "--connect",
-                        f"tcp://127.0.0.1:{self.port}", *self.keys, *map(str, arguments)], "stdout")
+        return Program([self.binaries / "proofmass-swarm", "--connect", self.workers, *self.keys,
+                        *map(str, arguments)], "stdout")
 
     def add_agents(self, count):
         for first in range(0, count, AGENTS_PER_PROCESS):
@@ -106,11 +101,9 @@ class Fleet:
         self.num_runs += num_more
         (self.directory / "scale.toml").write_text(
             f'[campaign]\nname = "scale"\nseed = 1\nruns = {self.num_runs}\n')
-        for _ in range(5):  # A connection may be cut just then.
-            done = self.ask("submit", "scale.toml")
-            if done.returncode == 0:
-                return
-        raise RuntimeError("submit: " + done.stderr)
+        done = self.ask("submit", "scale.toml")
+        if done.returncode != 0:
+            raise RuntimeError("submit: " + done.stderr)
 
     def wait_for_end(self, num_before=0):
         self.coordinator.wait_for(lambda line: line["event"] == "campaign_finished",
@@ -123,7 +116,7 @@ class Fleet:
 
     def network_bytes(self):
         """Of all connections that are open now, in both directions."""
-        text = subprocess.run(["ss", "-tinH", f"sport = :{self.port}"], capture_output=True,
+        text = subprocess.run(["ss", "-tinH", f"sport = :{self.workers.rsplit(':', 1)[1]}"], capture_output=True,
                               text=True, check=True).stdout
         return sum(map(int, re.findall(r"bytes_(?:received|sent):(\d+)", text)))
 

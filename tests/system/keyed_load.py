@@ -20,6 +20,15 @@ sys.path.append(str(checking.SOURCE / "tests/benchmarks"))
 from scale_benchmark import Fleet, compute, problems_of_file, say, wait_until  # noqa: E402
 
 
+class ChurnedFleet(Fleet):
+    def ask(self, *command):
+        for _ in range(5):  # A connection may be cut just then.
+            done = super().ask(*command)
+            if done.returncode == 0:
+                break
+        return done
+
+
 def figures(fleet):
     return {"resident_mib": round(fleet.memory_mib("VmRSS"), 1),
             "peak_mib": round(fleet.memory_mib("VmHWM"), 1), "descriptors": fleet.descriptors()}
@@ -109,7 +118,7 @@ def main():
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     with tempfile.TemporaryDirectory(prefix="proofmass-load-") as directory:
-        fleet = Fleet(options.programs.resolve(), Path(directory), options)
+        fleet = ChurnedFleet(options.programs.resolve(), Path(directory), options)
         try:
             failures = run(fleet, options)
         except RuntimeError as error:

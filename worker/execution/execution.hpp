@@ -24,6 +24,9 @@ namespace proofmass::worker {
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::steady_clock::duration;
 
+/// A run of any campaign.
+using RunKey = std::pair<wire::CampaignId, RunIndex>;
+
 /// Runs whose simulation crashed, together, outside this process.
 struct CrashedBatch {
   wire::CampaignId campaign;

@@ -31,9 +31,6 @@ using HeldRunsList = google::protobuf::RepeatedPtrField<proto::HeldRuns>;
 /// Number of ranges of all of them together.
 [[nodiscard]] std::size_t num_ranges(const HeldRunsList& held);
 
-/// A run of any campaign.
-using RunKey = std::pair<wire::CampaignId, RunIndex>;
-
 /// Results that the coordinator has not acknowledged. They are sent again and again, at growing
 /// intervals, until they are dropped.
 class UnacknowledgedResults {

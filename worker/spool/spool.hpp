@@ -11,7 +11,6 @@
 
 #include "proto/link/whole_file.hpp"
 #include "worker/execution/execution.hpp"
-#include "worker/net/held_runs.hpp"
 
 namespace proofmass::worker {
 

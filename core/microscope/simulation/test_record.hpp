@@ -45,8 +45,11 @@ template <typename T>
 struct TestSums {
   using Averaged = std::array<T, num_averaged_signals>;
 
-  /// Samples of the open block that are not in the sums yet: a sum is read and written once for all.
-  std::array<Averaged, 4> pending{};
+  /// Samples of the open block that are not in the sums yet: a sum is read and written once for
+  /// all.
+  static constexpr std::size_t num_pending = 4;
+  static_assert(test_block_size % num_pending == 0);
+  std::array<Averaged, num_pending> pending{};
   Averaged plain{};  ///< Of the open block.
   /// Of `plain` after each sample of the open block: in it the sample k of n counts n − k times.
   Averaged of_plain{};
@@ -62,11 +65,11 @@ struct TestSums {
 
   /// Adds the sample `k` of a block.
   PROOFMASS_INLINE void add(const Averaged& values, std::size_t k, const TestSetup& setup) {
-    Averaged& kept = pending[k % pending.size()];
+    Averaged& kept = pending[k % num_pending];
     // One loop more than the compiler unrolls by itself, and the values would be written twice.
 #pragma GCC unroll 32
     for (std::size_t s = 0; s < num_averaged_signals; ++s) kept[s] = values[s];
-    if ((k + 1) % pending.size() == 0) add_pending();
+    if ((k + 1) % num_pending == 0) add_pending();
     if (k + 1 == test_block_size) end_block(setup);
   }
 

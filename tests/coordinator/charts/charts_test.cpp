@@ -313,6 +313,9 @@ TEST(LinearRange, HasStepsOfOneTwoOrFive) {
   EXPECT_THAT(labels_of(linear_range({}, 0.0, 100.0, 6)),
               ElementsAre("0", "20", "40", "60", "80", "100"));
   EXPECT_THAT(labels_of(linear_range({}, 0.0, 100.0, 5)), ElementsAre("0", "50", "100"));
+  EXPECT_THAT(labels_of(linear_range({}, 0.0, 2.0, 5)),
+              ElementsAre("0.0", "0.5", "1.0", "1.5", "2.0"));
+  EXPECT_THAT(labels_of(linear_range({.is_count = true}, 0.0, 2.0, 5)), ElementsAre("0", "1", "2"));
   EXPECT_THAT(
       labels_of(linear_range({}, 0.0, 1.0, 11)),
       ElementsAre("0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1.0"));

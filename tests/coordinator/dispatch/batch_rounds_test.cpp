@@ -330,7 +330,7 @@ TEST(BatchTimes, LeaveNoWorkerIdleForLongWhateverTheNumberOfRuns) {
   };
   for (const std::size_t num_workers : {1U, 3U, 16U}) {
     for (const std::size_t num_threads : {1U, 4U}) {
-      const std::size_t step = 7 + num_workers * num_threads / 4;
+      const std::size_t step = (7 + num_workers * num_threads / 4) | 1U;  // All remainders of 16.
       for (std::uint64_t num_runs = 1; num_runs <= 50 * num_workers * num_threads;
            num_runs += step) {
         const Plan plan{num_runs, num_workers, num_threads, Workers::registered};

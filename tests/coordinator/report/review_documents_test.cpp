@@ -88,6 +88,26 @@ TEST_F(ReviewHtml, SaysHowManyDrawsDoWhereTheyAreTooFew) {
   EXPECT_THAT(review_html(review), HasSubstr(">0 of 59</td>"));
 }
 
+// Three digits, and of whole numbers all, would show some of them on the other side or on it.
+TEST_F(ReviewHtml, ShowsOnWhichSideOfItsLimitAWorstValueLies) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  RequirementAnswer& row = review.matrix.front();
+  struct Case {
+    double limit_nm, worst_nm;
+    std::string limit, worst;
+  };
+  for (const Case& of :
+       {Case{100.0, 81.234, "100", "81.2"}, Case{116.02, 116.0, "116.02", "116"},
+        Case{116.02, 116.0301, "116.02", "116.03"}, Case{1235.0, 1235.4, "1235", "1235.4"},
+        Case{1234.0, 1233.6, "1234", "1233.6"}, Case{12350.0, 12349.0, "12350", "12349"}}) {
+    row.requirement.limit = 1e-9 * of.limit_nm;
+    row.worst->value = 1e-9 * of.worst_nm;
+    EXPECT_THAT(review_html(review),
+                AllOf(HasSubstr(">≤ " + of.limit + " nm<"), HasSubstr(">" + of.worst + " nm<")));
+  }
+}
+
 /// Spectra of a session with a line of amplitude 3e-9 m/s².
 RunSpectra some_spectra() {
   SessionSpectrum spectrum{.session = "a_c13",

@@ -69,7 +69,8 @@ void check_joint_records(const std::vector<Session>& sessions, double orbit_peri
                          double transient_s);
 
 /// Largest amplitude of a push, m/s², where what the model leaves out moves a_d11' by a fiftieth of
-/// its objective if K2 is as large as it is drawn (root mean square). README.md derives both.
+/// its objective if K2 is as large as it is drawn (root mean square). README.md derives both, and
+/// says why the lower one holds beside motions.
 struct PushLimits {
   double alone_along_x;  ///< Of a push along X if nothing else pushes or moves.
   double beside_others;  ///< Of a push along X beside another push or motion.

@@ -271,10 +271,13 @@ void check_joint_pushes(const std::vector<Session>& sessions, const PushLimits& 
       throw ConfigError(
           fmt::format("session[{}].excitations[{}].amplitude_m_s2", i, k),
           fmt::format("{}", excitations[k].amplitude),
-          fmt::format("must be <= {} for estimation.method = \"joint\"{}: beyond, what K2 makes "
-                      "of it and the model leaves out may move a_d11' by 1/50 of its objective",
-                      allowed_text(limit_m_s2),
-                      shakes_once(sessions[i]) ? "" : " beside the session's other excitations"));
+          fmt::format(
+              "must be <= {} for estimation.method = \"joint\"{}", allowed_text(limit_m_s2),
+              shakes_once(sessions[i])
+                  ? ": beyond, what K2 makes of it and the model leaves out may move a_d11' "
+                    "by 1/50 of its objective"
+                  : " beside the session's other excitations: beyond, errors exceed the "
+                    "standard errors"));
     }
   }
 }

@@ -311,7 +311,7 @@ struct Coverage {
 Coverage coverage(double spin, const NoiseConfig& noise, const GapsConfig& gaps,
                   std::optional<double> offcentring_m = {}) {
   constexpr std::uint64_t num_runs = 208;
-  MicroscopeCampaign campaign = test::coarse_campaign();
+  MicroscopeCampaign campaign;
   campaign.scenario.noise = noise;
   campaign.scenario.sessions = {test_session("ep", 2, spin)};
   campaign.scenario.gaps = gaps;
