@@ -10,7 +10,7 @@
 namespace proofmass {
 namespace {
 
-MicroscopeCampaign short_campaign() {
+MicroscopeCampaign campaign_of_two_orbits() {
   MicroscopeCampaign campaign;
   campaign.scenario.simulation.sample_period_s = 1.0;
   campaign.scenario.simulation.settling_s = 100.0;
@@ -26,7 +26,7 @@ void expect_name(const std::string& name, std::set<std::string>& names) {
 
 // Names become those of datasets, of their fields and of files.
 TEST(RecordedSignals, HaveNamesOfTheirOwnAndKnownFrames) {
-  const RunPlan plan(short_campaign());
+  const RunPlan plan(campaign_of_two_orbits());
   const Recording& recording = plan.recording();
   std::set<std::string> frames{""}, groups, sessions;
   for (const RecordedFrame& frame : recording.frames) expect_name(frame.name, frames);
@@ -47,22 +47,24 @@ TEST(RecordedSignals, HaveNamesOfTheirOwnAndKnownFrames) {
 // out with the bits that the sample has itself.
 TEST(ObservedSample, HasTheLoopThatTheSampleBeganWith) {
   std::size_t num_samples = 0, num_equal = 0;
-  (void)RunPlan(short_campaign()).record(RunIndex{1}, {}, {}, [&](const ObservedSample& sample) {
-    const SatelliteMotion<double> motion =
-        sample.loop.motion(sample.constants, sample.shared, sample.noise);
-    for (std::size_t k = 0; k < 2; ++k) {
-      const double x =
-          kinematic_acceleration(sample.constants.sensors[k], motion, sample.shared.mass_motion).x;
-      ++num_samples;
-      if (x == sample.observation.kinematic_S_x[k]) ++num_equal;
-    }
-  });
+  (void)RunPlan(campaign_of_two_orbits())
+      .record(RunIndex{1}, {}, {}, [&](const ObservedSample& sample) {
+        const SatelliteMotion<double> motion =
+            sample.loop.motion(sample.constants, sample.shared, sample.noise);
+        for (std::size_t k = 0; k < 2; ++k) {
+          const double x =
+              kinematic_acceleration(sample.constants.sensors[k], motion, sample.shared.mass_motion)
+                  .x;
+          ++num_samples;
+          if (x == sample.observation.kinematic_S_x[k]) ++num_equal;
+        }
+      });
   EXPECT_EQ(num_samples, 11U * 2U * (100U + 2U * 5950U));
   EXPECT_EQ(num_equal, num_samples);
 }
 
 TEST(Replay, PassesTheRecordsAndReturnsTheResultOfTheRun) {
-  const RunPlan plan(short_campaign());
+  const RunPlan plan(campaign_of_two_orbits());
   std::size_t num_values = 0;
   for (const SignalGroup& group : plan.recording().groups) num_values += group.signals.size();
   std::vector<std::uint64_t> num_samples(plan.recording().sessions.size());
@@ -95,7 +97,7 @@ std::string name_of_value(const Recording& recording, std::size_t value) {
 
 // The fits together have each line of the session once, those that are fitted first.
 TEST(RecordedSignals, ExpectTheLinesOfEachSession) {
-  const MicroscopeCampaign campaign = short_campaign();
+  const MicroscopeCampaign campaign = campaign_of_two_orbits();
   const RunPlan plan(campaign);
   const Recording& recording = plan.recording();
   ASSERT_EQ(recording.spectra.size(), campaign.scenario.sessions.size());
@@ -123,7 +125,7 @@ TEST(RecordedSignals, ExpectTheLinesOfEachSession) {
 // Half the difference of two independent sensors has half the power of one; the filter that makes
 // their noise keeps within 0.5 dB, a factor of 1.122, of the density that it is asked to have.
 TEST(RecordedSignals, ExpectTheNoiseOfHalfADifference) {
-  MicroscopeCampaign campaign = short_campaign();
+  MicroscopeCampaign campaign = campaign_of_two_orbits();
   campaign.scenario.noise.scale = 3.0;
   const RunPlan plan(campaign);
   for (const double frequency_hz : {1e-4, 1e-3, 1e-2, 1e-1}) {
