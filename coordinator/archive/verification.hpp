@@ -48,7 +48,7 @@ struct Check {
 struct VerifyOptions {
   /// Of the finished runs, simulated again; in [0, 1], one at least.
   double fraction = fraction_by_default;
-  std::size_t num_threads = 1;  ///< That draw and simulate; at least 1.
+  std::size_t num_threads = 1;          ///< That draw and simulate; at least 1.
   std::string_view model_version = {};  ///< The model that simulates; empty: Store::model().
 };
 

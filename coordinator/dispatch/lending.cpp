@@ -95,7 +95,6 @@ std::uint64_t share_of_intake(const State& state, CampaignId id, const CampaignS
   return static_cast<std::uint64_t>(std::clamp(fraction * of_all, 1.0, limit));
 }
 
-/// Runs on the leases of a worker's processors.
 std::uint64_t num_lent_to_processors(const Worker& worker) {
   return worker.num_lent - worker.num_lent_to_cards;
 }
@@ -230,7 +229,6 @@ struct Borrower {
   Outbox& outbox;
 
   [[nodiscard]] std::uint64_t missing() const { return wanted - std::min(wanted, worker.num_lent); }
-  /// Of the missing runs, those that one lease can have.
   [[nodiscard]] std::uint64_t missing_of_lease() const {
     return std::min<std::uint64_t>(missing(), wire::runs_per_lease_max);
   }

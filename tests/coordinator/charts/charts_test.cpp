@@ -314,7 +314,7 @@ TEST(LinearRange, HasStepsOfOneTwoOrFive) {
               ElementsAre("0", "20", "40", "60", "80", "100"));
   EXPECT_THAT(labels_of(linear_range({}, 0.0, 100.0, 5)), ElementsAre("0", "50", "100"));
   EXPECT_THAT(labels_of(linear_range({}, 0.0, 2.0, 5)),
-              ElementsAre("0.0", "0.5", "1.0", "1.5", "2.0"));
+              ElementsAre("0", "0.5", "1.0", "1.5", "2.0"));
   EXPECT_THAT(labels_of(linear_range({.is_count = true}, 0.0, 2.0, 5)), ElementsAre("0", "1", "2"));
   EXPECT_THAT(
       labels_of(linear_range({}, 0.0, 1.0, 11)),

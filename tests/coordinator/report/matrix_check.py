@@ -90,6 +90,9 @@ def expected_row(database, requirement):
     while order < n and binom.cdf(order, n, q) <= doubt:
         order += 1
     bound = sorted(values.values(), reverse=True)[order - 1] if order else math.inf
+    num_enough = n
+    while binom.cdf(beyond, num_enough, q) > doubt:
+        num_enough += 1
     verdict = "undecided"
     if binom.cdf(beyond, n, q) <= doubt:
         verdict = "met"
@@ -98,8 +101,8 @@ def expected_row(database, requirement):
     finite = {run: value for run, value in values.items() if math.isfinite(value)}
     run, worst = max(finite.items(), key=lambda item: (item[1], -item[0]))
     is_bound = math.isfinite(bound)
-    return {"limit": limit, "draws": n, "without": n - len(finite),
-            "exceedances": beyond, "allowed": order - 1 if order else "none",
+    return {"limit": limit, "relation": "<" if sign == "<" else "≤", "draws": n, "without": n - len(finite),
+            "exceedances": beyond, "allowed": order - 1 if order else (beyond, num_enough),
             "bound": bound if is_bound else "none",
             "margin": 1 - bound / limit if is_bound else "none",
             "verdict": verdict, "worst": worst, "run": run}
@@ -120,7 +123,17 @@ def differences(row, expected):
         if column not in expected:
             continue
         wanted = expected[column]
-        if isinstance(wanted, str):
+        if column == "limit":
+            relation, text = text.split(" ", 1)
+            if relation != expected["relation"]:
+                found.append(f"limit has {relation} (must be {expected['relation']})")
+        if isinstance(wanted, tuple):  # Those who go on need no fewer than who begin with so many.
+            beyond, num_enough = wanted
+            shown = re.fullmatch(r"(\d+) of (\d+)", text)
+            is_met_by_more = shown and int(shown[1]) == beyond and int(shown[2]) >= num_enough
+            if not is_met_by_more and (text, expected["verdict"]) != ("too few draws", "not met"):
+                found.append(f"{column} = {text} (must be {beyond} of {num_enough} or more)")
+        elif isinstance(wanted, str):
             if text != wanted:
                 found.append(f"{column} = {text} (must be {wanted})")
         elif value is None or abs(value - wanted) > 1e-12 * abs(wanted) + 1e-15:
