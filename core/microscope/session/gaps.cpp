@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
@@ -59,16 +61,23 @@ double relative_rate(const GapsConfig& gaps, const Session& session, double orbi
 void GapsConfig::validate(double sample_period_s) const {
   const double depth = orbital.depth + spin.depth + test.depth;
   if (depth > 1.0) {
-    throw ConfigError("gaps.orbital_modulation", fmt::format("{}", orbital.depth),
+    const std::array depths{std::pair("orbital", orbital.depth), std::pair("spin", spin.depth),
+                            std::pair("test", test.depth)};
+    const auto [name, largest] =
+        *std::ranges::max_element(depths, {}, [](auto of) { return of.second; });
+    throw ConfigError(fmt::format("gaps.{}_modulation", name), fmt::format("{}", largest),
                       fmt::format("must be at most 1 with the other modulations, not {:.6g}, as no "
                                   "rate is below 0",
                                   depth));
   }
   const double window_s = 2.0 * static_cast<double>(test_block_size) * sample_period_s;
-  const double touches = glitch_rate_hz * (glitch_duration_s + window_s) +
-                         telemetry_rate_hz * (telemetry_duration_s + window_s);
+  const double of_glitches = glitch_rate_hz * (glitch_duration_s + window_s);
+  const double of_telemetry = telemetry_rate_hz * (telemetry_duration_s + window_s);
+  const double touches = of_glitches + of_telemetry;
   if (touches > touches_max) {
-    throw ConfigError("gaps.glitch_rate_hz", fmt::format("{}", glitch_rate_hz),
+    const bool are_glitches = of_glitches >= of_telemetry;
+    throw ConfigError(are_glitches ? "gaps.glitch_rate_hz" : "gaps.telemetry_rate_hz",
+                      fmt::format("{}", are_glitches ? glitch_rate_hz : telemetry_rate_hz),
                       fmt::format("must leave more than a seventh of the windows of {} s: {:.6g} "
                                   "losses touch one, and may be {}",
                                   window_s, touches, touches_max));

@@ -133,11 +133,22 @@ TEST(Gaps, AreRefusedIfARateIsNegativeOrLittleIsLeft) {
   EXPECT_EQ(refusal(gaps),
             "gaps.glitch_rate_hz = 0.1 (must leave more than a seventh of the windows of 8 s: 2.3 "
             "losses touch one, and may be 2)");
+  gaps.telemetry_rate_hz = 0.2;
+  gaps.telemetry_duration_s = 17.0;
+  EXPECT_EQ(
+      refusal(gaps),
+      "gaps.telemetry_rate_hz = 0.2 (must leave more than a seventh of the windows of 8 s: 7.3 "
+      "losses touch one, and may be 2)");
   gaps.spin.depth = 0.25;
   EXPECT_EQ(
       refusal(gaps),
       "gaps.orbital_modulation = 0.5 (must be at most 1 with the other modulations, not 1.25, "
       "as no rate is below 0)");
+  gaps.test.depth = 0.7;
+  EXPECT_EQ(
+      refusal(gaps),
+      "gaps.test_modulation = 0.7 (must be at most 1 with the other modulations, not 1.45, as "
+      "no rate is below 0)");
 }
 
 }  // namespace
