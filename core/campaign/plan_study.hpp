@@ -66,8 +66,8 @@ struct PlanScope {
   int num_steps_max = 0;
   std::size_t num_instruments = 0;  ///< Drawn, that a bound is the mean over.
   std::size_t num_probed = 0;       ///< Runs that were simulated, in short sessions.
-  /// Of these, those whose data do not fit what the method takes them for: its errors are larger
-  /// than the bound.
+  /// Of these, those whose data do not fit what the method takes them for, each by itself or all
+  /// together: its errors are larger than the bound.
   std::size_t num_misfits = 0;
   /// ErrorBudget::level by all probed runs that are not lost, fitted together, SI; 0 if they tell
   /// none, so that the assumed one holds.

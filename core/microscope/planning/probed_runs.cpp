@@ -140,18 +140,25 @@ ProbedRuns::ProbedRuns(const MicroscopeCampaign& campaign, const std::vector<Run
   for (const Session& session : brief.scenario.sessions) num_orbits_.push_back(session.num_orbits);
   const RunPlan plan(brief, joint_method);
   std::vector<const RunRecord*> held;
+  double chi_squared = 0.0, degrees_of_freedom = 0.0;
   probes_.reserve(requests.size());
   for (RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
     const RunResult result = plan.estimate(record);
     const bool is_misfit = !result.fit.empty() && is_beyond_chance(result.fit[0], result.fit[1]);
+    if (!result.fit.empty()) {
+      chi_squared += result.fit[0];
+      degrees_of_freedom += result.fit[1];
+    }
     probes_.push_back({.record = std::move(record), .is_misfit = is_misfit});
     if (result.status != RunStatus::lost) held.push_back(&probes_.back().record);
   }
+  do_fit_together_ = !is_beyond_chance(chi_squared, degrees_of_freedom);
   level_m_s2_ = common_level_m_s2(brief.scenario, held);
 }
 
 std::size_t ProbedRuns::num_misfits() const {
-  return static_cast<std::size_t>(std::ranges::count_if(probes_, &Probe::is_misfit));
+  const auto count = std::ranges::count_if(probes_, &Probe::is_misfit);
+  return count == 0 && !do_fit_together_ ? probes_.size() : static_cast<std::size_t>(count);
 }
 
 void ProbedRuns::judge(const Scenario& scenario, const std::vector<ParameterArray>& errors,

@@ -24,7 +24,8 @@ class ProbedRuns {
 
   [[nodiscard]] std::size_t size() const { return probes_.size(); }
 
-  /// Runs whose data do not fit the model of `joint`, beyond chance.
+  /// Runs whose data do not fit the model of `joint`, beyond chance. All of them if none is one by
+  /// itself and they are together: so smaller misfits are seen.
   [[nodiscard]] std::size_t num_misfits() const;
 
   /// ErrorBudget::level that the runs that are not lost have in common, m/s²; 0 if no session tells
@@ -45,6 +46,7 @@ class ProbedRuns {
 
   std::vector<int> num_orbits_;  ///< Of each session, as simulated.
   std::vector<Probe> probes_;
+  bool do_fit_together_ = true;
   double level_m_s2_ = 0.0;
 };
 
