@@ -32,7 +32,8 @@ constexpr const char* database_name = "campaign.db";
 struct WorkDirectory {
   WorkDirectory() {
     const char* const parent = std::getenv("TMPDIR");
-    std::string name = path(parent == nullptr ? "/tmp" : parent) / "proofmass-archive-XXXXXX";
+    const bool is_set = parent != nullptr && *parent != '\0';
+    std::string name = path(is_set ? parent : "/tmp") / "proofmass-archive-XXXXXX";
     if (mkdtemp(name.data()) == nullptr) {
       throw Error(fmt::format("temporary directory = {} ({})", name, std::strerror(errno)));
     }
