@@ -41,7 +41,6 @@ std::uint16_t port_in(std::string_view digits, std::string_view text) {
 
 constexpr std::size_t token_size_min = 16;
 constexpr std::size_t token_size_max = 256;
-constexpr std::string_view cookie_name = "proofmass_page";
 constexpr std::string_view cookie_purpose = "proofmass page cookie";
 
 using TokenDigest = std::array<unsigned char, 32>;
@@ -63,17 +62,6 @@ std::vector<std::string_view> parts_of(std::string_view text, char separator) {
   return parts;
 }
 
-/// The value of our cookie in a header `a=b; c=d`; empty if it is not there.
-std::string_view cookie_in(std::string_view header) {
-  for (std::string_view part : parts_of(header, ';')) {
-    part.remove_prefix(std::min(part.find_first_not_of(' '), part.size()));
-    if (part.starts_with(cookie_name) && part.substr(cookie_name.size()).starts_with('=')) {
-      return part.substr(cookie_name.size() + 1);
-    }
-  }
-  return {};
-}
-
 /// The token in `Bearer TOKEN`. Letters of the scheme have no case, and several blanks may follow
 /// it: RFC 7235, section 2.1.
 std::string_view bearer_in(std::string_view header) {
@@ -83,6 +71,16 @@ std::string_view bearer_in(std::string_view header) {
   if (!is_bearer) return {};
   header.remove_prefix(scheme.size());
   return header.substr(std::min(header.find_first_not_of(' '), header.size()));
+}
+
+/// `./` at the front page and beside it, `./../` one level below: also behind a proxy that serves
+/// the page below an address of its own.
+std::string way_to_front_page(std::string_view target) {
+  std::string way = "./";
+  for (auto i = std::ranges::count(target.substr(0, target.find('?')), '/'); i > 1; --i) {
+    way += "../";
+  }
+  return way;
 }
 
 }  // namespace
@@ -124,18 +122,25 @@ PageAccess PageAccess::read(const std::filesystem::path& token_file) {
                           what, token_file.string(), token_size_min, token_size_max));
 }
 
-PageAccess::PageAccess(std::string_view token)
-    : digest_(digest_of(token, "")),
-      cookie_value_(fmt::format("{:02x}", fmt::join(digest_of(token, cookie_purpose), ""))) {}
+// A browser keeps one cookie of a name for all ports of a host: each token has its own.
+PageAccess::PageAccess(std::string_view token) : digest_(digest_of(token, "")) {
+  const std::string value = fmt::format("{:02x}", fmt::join(digest_of(token, cookie_purpose), ""));
+  constexpr std::size_t num_name_digits = 8;
+  cookie_ = fmt::format("proofmass_page_{}={}", value.substr(0, num_name_digits),
+                        value.substr(num_name_digits));
+}
 
 bool PageAccess::is_token(std::string_view text) const {
   const TokenDigest other = digest_of(text, "");
   return has_token() && sodium_memcmp(digest_.data(), other.data(), digest_.size()) == 0;
 }
 
-bool PageAccess::is_cookie(std::string_view value) const {
-  return value.size() == cookie_value_.size() &&
-         sodium_memcmp(value.data(), cookie_value_.data(), value.size()) == 0;
+bool PageAccess::has_cookie(std::string_view header) const {
+  return std::ranges::any_of(parts_of(header, ';'), [this](std::string_view part) {
+    part.remove_prefix(std::min(part.find_first_not_of(' '), part.size()));
+    return part.size() == cookie_.size() &&
+           sodium_memcmp(part.data(), cookie_.data(), part.size()) == 0;
+  });
 }
 
 std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) const {
@@ -146,15 +151,18 @@ std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) con
                         "has a --page-token-file");
   }
   if (is_token(bearer_in(request.authorization))) return std::nullopt;
-  if (is_cookie(cookie_in(request.cookie))) return std::nullopt;
+  if (has_cookie(request.cookie)) return std::nullopt;
+  // Of one who comes by a link from elsewhere the browser holds the cookie back, but not if the
+  // same address is opened from here.
   return HttpAnswer{
       .status = 401,
-      .body =
+      .body = fmt::format(
           "<!DOCTYPE html><html lang=\"en\"><head><title>Proofmass</title></head><body><main>"
-          "<h1>A token is needed</h1><p>Open this page once with <code>?token=</code> and the "
-          "content of the page token file at the end of its address. If you have just done so "
-          "by a link from another page, <a href=\"./\">open it again</a>.</p></main></body>"
-          "</html>\n",
+          "<h1>A token is needed</h1><p>Open the <a href=\"{}\">front page</a> once with "
+          "<code>?token=</code> and the content of the page token file at the end of its address. "
+          "If you have done so and came here by a link, <a href=\"\">open this page again</a>.</p>"
+          "</main></body></html>\n",
+          way_to_front_page(request.target)),
       .headers = {{"WWW-Authenticate", "Bearer"}}};
 }
 
@@ -162,9 +170,7 @@ std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) con
 std::optional<HttpAnswer> PageAccess::welcome(std::string_view given_token) const {
   if (!is_token(given_token)) return std::nullopt;
   HttpAnswer answer = plain_answer(303, "the token is right");
-  answer.headers = {
-      {"Location", "./"},
-      {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict", cookie_name, cookie_value_)}};
+  answer.headers = {{"Location", "./"}, {"Set-Cookie", cookie_ + "; HttpOnly; SameSite=Strict"}};
   return answer;
 }
 

@@ -46,7 +46,7 @@ class PageAccess {
   ///         the token.
   [[nodiscard]] static PageAccess read(const std::filesystem::path& token_file);
 
-  [[nodiscard]] bool has_token() const { return !cookie_value_.empty(); }
+  [[nodiscard]] bool has_token() const { return !cookie_.empty(); }
 
   /// Why a request is not answered; nothing if it is.
   [[nodiscard]] std::optional<HttpAnswer> refusal_of(const HttpRequest& request) const;
@@ -58,10 +58,10 @@ class PageAccess {
  private:
   /// Takes the same time for each text of one length.
   [[nodiscard]] bool is_token(std::string_view text) const;
-  [[nodiscard]] bool is_cookie(std::string_view value) const;
+  [[nodiscard]] bool has_cookie(std::string_view header) const;
 
   std::array<unsigned char, 32> digest_{};
-  std::string cookie_value_;  ///< What a browser keeps instead of the token, which it hides.
+  std::string cookie_;  ///< NAME=VALUE that a browser keeps instead of the token, which it hides.
 };
 
 /// True if the header names this machine: `localhost`, an address 127.x.x.x or `[::1]`, with a port

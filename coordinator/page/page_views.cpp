@@ -409,7 +409,7 @@ constexpr std::string_view script = R"js('use strict';
       const signal = AbortSignal.timeout(10000);
       const answer = await fetch(address, { cache: 'no-store', signal });
       if (answer.status === 401) {
-        say('The token is not valid any more.', true);
+        say('This page needs its token again: reload it to see how it is given.', true);
         return;
       }
       if (!answer.ok) throw new Error(String(answer.status));

@@ -81,9 +81,19 @@ TEST(PageWithToken, AsksForIt) {
   EXPECT_EQ(status({.authorization = "Bearer " + page_secret + "x"}), 401U);
   EXPECT_EQ(status({.authorization = "Bearer "}), 401U);
   EXPECT_EQ(status({.authorization = page_secret}), 401U);
-  EXPECT_EQ(status({.cookie = "proofmass_page=" + page_secret}),
-            401U);  // The cookie is another word.
-  EXPECT_EQ(status({.cookie = "proofmass_page="}), 401U);
+  EXPECT_EQ(status({.cookie = page_secret}), 401U);  // The cookie is another word.
+  EXPECT_EQ(status({.cookie = ""}), 401U);
+}
+
+TEST(PageWithToken, LeadsToTheFrontPageFromEachAddress) {
+  const PageAccess access(page_secret);
+  const auto body = [&](const std::string& target) {
+    return access.refusal_of({.target = target}).value_or(HttpAnswer{}).body;
+  };
+  EXPECT_THAT(body("/?token=a/b/c"), HasSubstr("<a href=\"./\">front page"));
+  EXPECT_THAT(body("/workers?sort=a"), HasSubstr("<a href=\"./\">front page"));
+  EXPECT_THAT(body("/campaigns/a"), HasSubstr("<a href=\"./../\">front page"));
+  EXPECT_THAT(body("/campaigns/a/b"), HasSubstr("<a href=\"./../../\">front page"));
 }
 
 TEST(PageWithToken, GivesACookieForIt) {
@@ -103,6 +113,10 @@ TEST(PageWithToken, GivesACookieForIt) {
   EXPECT_TRUE(access.refusal_of({.cookie = "x" + pair}).has_value());
   const PageAccess other("another-secret-of-20");
   EXPECT_TRUE(other.refusal_of({.cookie = pair}).has_value());
+  // A browser sends the cookies of all pages of a host to each of them.
+  const std::string of_other =
+      header_of(other.welcome("another-secret-of-20").value(), "Set-Cookie");
+  EXPECT_NE(of_other.substr(0, of_other.find('=')), pair.substr(0, pair.find('=')));
 }
 
 class TokenFileTest : public ::testing::Test {
