@@ -69,6 +69,8 @@ struct PlanScope {
   /// Of these, those whose data do not fit what the method takes them for, each by itself or all
   /// together: its errors are larger than the bound.
   std::size_t num_misfits = 0;
+  /// Parts whose data, of all probed runs together, do not fit: their names.
+  std::vector<std::string> misfits{};
   /// ErrorBudget::level by all probed runs that are not lost, fitted together, SI; 0 if they tell
   /// none, so that the assumed one holds.
   double probed_level = 0.0;

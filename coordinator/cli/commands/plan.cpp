@@ -148,8 +148,11 @@ void add_misfits(const PlanScope& scope, Table& table) {
                    scope.num_probed, scope.method),
        Tone::bad});
   table.notes.push_back(
-      "where data do not fit, errors are larger than σ and the chances above are too high; "
-      "`report` of some runs tells which sessions do not fit");
+      "where data do not fit, errors are larger than σ and the chances above are too high");
+  if (scope.misfits.empty()) return;
+  table.notes.push_back(
+      fmt::format("make excitations weaker, or their lines farther apart, in what does not fit: {}",
+                  fmt::join(scope.misfits, ", ")));
 }
 
 /// Names the parameters whose objectives are small against what the sessions tell of them.
@@ -242,6 +245,7 @@ void print_plan(const PlanOptions& options, const Planned& plan) {
             {"num_instruments", plan.study.scope().num_instruments},
             {"num_probed", plan.study.scope().num_probed},
             {"num_misfits", plan.study.scope().num_misfits},
+            {"misfits", plan.study.scope().misfits},
             {"misses_any", plan.bound.misses_any},
             {"mean_budget", plan.bound.mean_budget},
             {"probed_level", plan.study.scope().probed_level},

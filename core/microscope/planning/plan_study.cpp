@@ -145,6 +145,7 @@ class JointStudy final : public PlanStudy {
         .num_instruments = instruments_.size(),
         .num_probed = probes_->size(),
         .num_misfits = probes_->num_misfits(),
+        .misfits = probes_->misfit_sessions(),
         .probed_level = probes_->level_m_s2()};
     for (const Session& session : whole_.scenario.sessions) {
       if (is_test(session)) {

@@ -140,19 +140,20 @@ ProbedRuns::ProbedRuns(const MicroscopeCampaign& campaign, const std::vector<Run
   for (const Session& session : brief.scenario.sessions) num_orbits_.push_back(session.num_orbits);
   const RunPlan plan(brief, joint_method);
   std::vector<const RunRecord*> held;
-  double chi_squared = 0.0, degrees_of_freedom = 0.0;
+  std::vector<double> fits(2 + 2 * num_orbits_.size());  // Sums of RunResult::fit.
   probes_.reserve(requests.size());
   for (RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
     const RunResult result = plan.estimate(record);
     const bool is_misfit = !result.fit.empty() && is_beyond_chance(result.fit[0], result.fit[1]);
-    if (!result.fit.empty()) {
-      chi_squared += result.fit[0];
-      degrees_of_freedom += result.fit[1];
-    }
+    for (std::size_t i = 0; i < result.fit.size(); ++i) fits[i] += result.fit[i];
     probes_.push_back({.record = std::move(record), .is_misfit = is_misfit});
     if (result.status != RunStatus::lost) held.push_back(&probes_.back().record);
   }
-  do_fit_together_ = !is_beyond_chance(chi_squared, degrees_of_freedom);
+  do_fit_together_ = !is_beyond_chance(fits[0], fits[1]);
+  for (std::size_t i = 0; i < num_orbits_.size(); ++i) {
+    if (!is_beyond_chance(fits[2 + 2 * i], fits[3 + 2 * i])) continue;
+    misfit_sessions_.push_back(brief.scenario.sessions[i].name);
+  }
   level_m_s2_ = common_level_m_s2(brief.scenario, held);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "core/campaign/plan_study.hpp"
@@ -28,6 +29,9 @@ class ProbedRuns {
   /// itself and they are together: so smaller misfits are seen.
   [[nodiscard]] std::size_t num_misfits() const;
 
+  /// Sessions whose data of all probed runs together do not fit: their names.
+  [[nodiscard]] const std::vector<std::string>& misfit_sessions() const { return misfit_sessions_; }
+
   /// ErrorBudget::level that the runs that are not lost have in common, m/s²; 0 if no session tells
   /// it.
   [[nodiscard]] double level_m_s2() const { return level_m_s2_; }
@@ -47,6 +51,7 @@ class ProbedRuns {
   std::vector<int> num_orbits_;  ///< Of each session, as simulated.
   std::vector<Probe> probes_;
   bool do_fit_together_ = true;
+  std::vector<std::string> misfit_sessions_;
   double level_m_s2_ = 0.0;
 };
 
