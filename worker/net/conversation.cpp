@@ -202,7 +202,7 @@ void Conversation::on_tick(TimePoint now) {
   if (silence(now) >= config_.give_up_after) {
     return end(Ending::Kind::failed,
                fmt::format("coordinator = silent for {} s ({})", whole_seconds(silence(now)),
-                           refusal_.empty() ? "is it running?" : refusal_));
+                           why_not_registered()));
   }
   if (revocation_ && now - revocation_->first >= config_.refusal_memory) {
     return end(Ending::Kind::failed, "refused by the coordinator: " + revocation_->second);
@@ -227,6 +227,10 @@ void Conversation::on_tick(TimePoint now) {
 }
 
 // Registration.
+
+std::string Conversation::why_not_registered() const {
+  return refusal_.empty() ? "is it running?" : refusal_;
+}
 
 void Conversation::send(proto::Envelope message) {
   message.set_session(session_.value);
@@ -253,6 +257,7 @@ void Conversation::come_again(const proto::Reject& reject, TimePoint now) {
   if (now - refused_at_ >= config_.refusal_memory) refusal_delay_ = config_.refusal_delay;
   refused_at_ = now;
   is_registered_ = false;
+  refusal_ = reject.text();
   is_closed_out_ = reject.reason() == proto::REJECT_REASON_MALFORMED || revocation_;
   hello_due_at_ = now + with_jitter(refusal_delay_);
   hello_delay_ = config_.hello_delay;

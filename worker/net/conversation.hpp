@@ -162,6 +162,8 @@ class Conversation {
                  std::span<const RunIndex> runs);
   void leave_if_done();
   void leave(const std::string& reason);
+  void leave_unneeded(const std::string& reason);
+  [[nodiscard]] std::string why_not_registered() const;
   void say_bye(wire::LossReason reason);
   void end(Ending::Kind kind, std::string reason);
   void note(wire::Event event);
@@ -190,7 +192,7 @@ class Conversation {
   bool wants_connection_ = false;
   TimePoint heartbeat_at_;
   std::vector<std::uint64_t> reported_batches_;  ///< By the heartbeat sent last.
-  std::string refusal_;  ///< Why there is no connection; empty if not known.
+  std::string refusal_;  ///< Why there is no connection or registration; empty if not known.
 
   /// Table values of one run, as the first lease or the definition of a campaign has them.
   std::map<wire::CampaignId, std::size_t> table_widths_;

@@ -44,8 +44,8 @@ void Conversation::watch_idleness(TimePoint now) {
   if (!unfinished_.empty() || unacknowledged_.size() > 0) busy_at_ = now;
   if (now - busy_at_ < *config_.idle_timeout) return;
   leaving_ = Leaving{};
-  leave(fmt::format("no run for {} s",
-                    std::chrono::duration_cast<std::chrono::seconds>(now - busy_at_).count()));
+  leave_unneeded(fmt::format(
+      "no run for {} s", std::chrono::duration_cast<std::chrono::seconds>(now - busy_at_).count()));
 }
 
 /// Half again of the usual time of a batch, so that one that begins now is finished; and up to
@@ -98,9 +98,16 @@ void Conversation::give_back_late_batches(TimePoint now) {
 void Conversation::leave_if_done() {
   if (ending_ || !leaving_ || !unfinished_.empty() || !unacknowledged_.empty()) return;
   const wire::LossReason reason = leaving_->reason;
-  const bool is_out_of_time = reason == wire::LossReason::walltime;
-  leave(reason == wire::LossReason::drained ? "drained"
-                                            : (is_out_of_time ? "its time is up" : "asked to end"));
+  if (reason == wire::LossReason::walltime) return leave_unneeded("its time is up");
+  leave(reason == wire::LossReason::drained ? "drained" : "asked to end");
+}
+
+/// A worker that no coordinator has ever registered has not done what it was started for, which a
+/// batch system is to see.
+void Conversation::leave_unneeded(const std::string& reason) {
+  if (epoch_.value != 0) return leave(reason);
+  end(Ending::Kind::failed, fmt::format("{}, and no coordinator has taken this worker ({})", reason,
+                                        why_not_registered()));
 }
 
 void Conversation::leave(const std::string& reason) {

@@ -261,6 +261,21 @@ TEST_F(ConversationTest, LeavesAfterTheIdleTimeout) {
   expect_left(proto::LOSS_REASON_DRAINED, "no run for 300 s");
 }
 
+// A batch system is to see that a job has computed nothing because of a mistyped address.
+TEST_F(ConversationTest, HasFailedIfNoCoordinatorTookItInItsTime) {
+  start({.idle_timeout = 30s});
+  tick_after(30s);
+  sent.clear();
+  expect_ending(Ending::Kind::failed,
+                "no run for 30 s, and no coordinator has taken this worker (is it running?)");
+  start({.walltime_end = now + 50s});
+  conversation->on_refused("key not listed");
+  tick_after(40s);
+  sent.clear();
+  expect_ending(Ending::Kind::failed,
+                "its time is up, and no coordinator has taken this worker (key not listed)");
+}
+
 TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {
   register_with_campaign({.resend_after = std::chrono::hours(1), .idle_timeout = 300s});
   receive(lease(0, 1));
