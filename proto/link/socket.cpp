@@ -112,7 +112,9 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
     socket.bind(endpoint);
   } catch (const zmq::error_t& error) {
     const std::string_view why =
-        error.num() == ENODEV ? "is no address of this machine" : error.what();
+        error.num() == ENODEV
+            ? "must be *, an IP address of this machine or the name of an interface as lo"
+            : error.what();
     throw Error(fmt::format("{} = {} ({})", option, endpoint, why));
   }
   return socket;

@@ -197,7 +197,9 @@ TEST_F(ServiceStart, SaysThatAnAddressIsTaken) {
 TEST_F(ServiceStart, SaysThatAnAddressIsOfAnotherMachine) {
   config.workers_endpoint = "tcp://nohost:1";
   config.is_plain_waived = true;
-  EXPECT_EQ(refusal(), "bind = tcp://nohost:1 (is no address of this machine)");
+  EXPECT_EQ(refusal(),
+            "bind = tcp://nohost:1 (must be *, an IP address of this machine or the name of an "
+            "interface as lo)");
 }
 
 TEST_F(ServiceStart, RefusesTwoCampaignsOfOneName) {
