@@ -160,11 +160,9 @@ enum class SvgUse : std::uint8_t {
   /// In an HTML page, which sets the colours with light_colours() and dark_colours(). Without them,
   /// they are the light ones.
   embedded,
-  /// As a file: with its namespace, its style and its ground. It follows `prefers-color-scheme`.
-  standalone,
-  /// As a file for programs that know neither custom properties nor media queries, such as those
-  /// that make a bitmap of it: the light colours stand at each element.
-  plain,
+  /// As a file: with its namespace, its ground, and the light colours at each element, as programs
+  /// for documents and bitmaps know no custom properties.
+  file,
 };
 
 /// The picture as SVG, the same bytes for the same picture. All texts of all pictures have one

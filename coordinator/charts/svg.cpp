@@ -76,18 +76,6 @@ std::string light_colours() { return declarations(&ThemeColour::light); }
 
 std::string dark_colours() { return declarations(&ThemeColour::dark); }
 
-namespace {
-
-/// Light, and dark for readers who prefer that.
-std::string standalone_style() {
-  return fmt::format(
-      "<style>svg{{{}}}@media (prefers-color-scheme:dark){{svg{{{}}}}}"
-      "@media print{{svg{{{}}}}}</style>",
-      light_colours(), dark_colours(), light_colours());
-}
-
-}  // namespace
-
 std::string svg_of(const Picture& picture, SvgUse use) {
   const double width = width_of_picture(picture);
   SvgWriter body;
@@ -100,14 +88,11 @@ std::string svg_of(const Picture& picture, SvgUse use) {
           picture);
   SvgWriter svg;
   svg.raw(opening(text_of(picture), use, width, height));
-  if (use == SvgUse::standalone) svg.raw(standalone_style() + "\n");
-  if (use != SvgUse::embedded) {
-    svg.rectangle({0.0, 0.0, width, height}, svg.colour(Ink::ground));
-  }
+  if (use == SvgUse::file) svg.rectangle({0.0, 0.0, width, height}, svg.colour(Ink::ground));
   svg.raw(body.markup());
   const std::string markup = svg.markup() + "</svg>\n";
   static const std::regex with_light_colour("var\\(--[a-z-]+,(#[0-9a-f]+)\\)");
-  return use == SvgUse::plain ? std::regex_replace(markup, with_light_colour, "$1") : markup;
+  return use == SvgUse::file ? std::regex_replace(markup, with_light_colour, "$1") : markup;
 }
 
 namespace {

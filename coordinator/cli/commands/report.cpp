@@ -230,7 +230,7 @@ pid_t start_converter(const std::filesystem::path& svg, const std::filesystem::p
 void write_png(const Picture& picture, const PlotOptions& options) {
   const wire::DraftFile svg("output", options.output, wire::private_mode, ".svg-draft");
   wire::DraftFile png("output", options.output);
-  svg.write(svg_of(picture, SvgUse::plain));
+  svg.write(svg_of(picture, SvgUse::file));
   const int status = wire::wait_for_end(start_converter(svg.draft(), png.draft(), options.output));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     throw Error(fmt::format("output = {} (rsvg-convert failed)", options.output.string()));
@@ -243,7 +243,7 @@ void write_picture(const Picture& picture, const PlotOptions& options) {
     write_png(picture, options);
     return;
   }
-  write_document(options.output, options.if_there, svg_of(picture, SvgUse::standalone));
+  write_document(options.output, options.if_there, svg_of(picture, SvgUse::file));
 }
 
 /// Of what can be simulated here.

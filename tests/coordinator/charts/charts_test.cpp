@@ -43,7 +43,7 @@ std::vector<Picture> pictures_with(const std::string& text) {
 
 TEST(Svg, IsWellFormedWhateverTheTexts) {
   for (const Picture& picture : pictures_with(hostile)) {
-    for (const SvgUse use : {SvgUse::embedded, SvgUse::standalone, SvgUse::plain}) {
+    for (const SvgUse use : {SvgUse::embedded, SvgUse::file}) {
       const std::string svg = svg_of(picture, use);
       EXPECT_EQ(test::malformed_part(svg), "") << svg;
       EXPECT_THAT(svg, Not(HasSubstr("<script")));
@@ -67,19 +67,17 @@ TEST(Svg, TakesTheColoursOfThePage) {
 }
 
 TEST(Svg, CarriesItsColoursAsAFile) {
-  EXPECT_THAT(svg_of(histogram(), SvgUse::standalone), HasSubstr("prefers-color-scheme:dark"));
-  EXPECT_THAT(svg_of(histogram(), SvgUse::standalone),
-              HasSubstr("xmlns=\"http://www.w3.org/2000/svg\""));
-  const std::string plain = svg_of(histogram(), SvgUse::plain);
-  EXPECT_THAT(plain, HasSubstr("fill=\"#0072b2\""));
-  EXPECT_THAT(plain, Not(HasSubstr("var(")));
+  const std::string file = svg_of(histogram(), SvgUse::file);
+  EXPECT_THAT(file, HasSubstr("xmlns=\"http://www.w3.org/2000/svg\""));
+  EXPECT_THAT(file, HasSubstr("fill=\"#0072b2\""));
+  EXPECT_THAT(file, Not(HasSubstr("var(")));
 }
 
 // On axes whose ends are given, a bar's edges and height are linear functions of its values: the
 // bar of 5 of 10 is half as high as that of 10, and all stand side by side on one line.
 TEST(Bars, StandWhereTheirValuesAre) {
   const std::vector<std::string> bars =
-      test::tags_of(svg_of(histogram(), SvgUse::plain), "<rect[^>]* fill=\"#0072b2\"/>");
+      test::tags_of(svg_of(histogram(), SvgUse::file), "<rect[^>]* fill=\"#0072b2\"/>");
   ASSERT_THAT(bars, SizeIs(3));                                 // One is empty.
   const double unit = test::number_of(bars[0], "width") + 1.0;  // The gap between bars.
   EXPECT_NEAR(test::number_of(bars[1], "x") - test::number_of(bars[0], "x"), unit, 0.02);
@@ -119,7 +117,7 @@ Chart curve(std::vector<Point> points, Scale scale) {
 TEST(Line, FollowsALogarithmicAxis) {
   const std::string svg =
       svg_of(curve({{0.1, 0.0}, {1.0, 0.5}, {10.0, 1.0}, {1000.0, 0.25}}, Scale::logarithmic),
-             SvgUse::plain);
+             SvgUse::file);
   const std::vector<Point> points = points_of(svg, "#008f68");
   ASSERT_THAT(points, SizeIs(4));
   const std::vector<std::string> boxes =
@@ -139,7 +137,7 @@ TEST(Line, LeavesOutWhatHasNoPlace) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const std::string svg =
       svg_of(curve({{0.0, 0.5}, {1.0, nan}, {infinity, 0.5}, {-1.0, 0.5}}, Scale::logarithmic),
-             SvgUse::plain);
+             SvgUse::file);
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
   EXPECT_THAT(test::tags_of(svg, "<path[^>]*#008f68"), SizeIs(0));
@@ -156,7 +154,7 @@ TEST(Chart, WithoutDataSaysSo) {
 TEST(Chart, CutsNoLabelOfATick) {
   Chart chart = curve({{-1e6, 0.0}, {1.2e6, 1.0}}, Scale::linear);
   chart.x.from = chart.x.to = std::nullopt;
-  const std::string svg = svg_of(chart, SvgUse::plain);
+  const std::string svg = svg_of(chart, SvgUse::file);
   const std::vector<std::string> labels =
       test::tags_of(svg, "<text[^>]*text-anchor=\"middle\">[^<]*10[⁵⁶]");
   ASSERT_THAT(labels, Not(IsEmpty()));
@@ -170,7 +168,7 @@ TEST(Chart, CutsNoLabelOfATick) {
 }
 
 TEST(Chart, HasNoLineOfOnePoint) {
-  EXPECT_THAT(svg_of(curve({{1.0, 0.5}}, Scale::logarithmic), SvgUse::plain),
+  EXPECT_THAT(svg_of(curve({{1.0, 0.5}}, Scale::logarithmic), SvgUse::file),
               HasSubstr(">no data</text>"));
 }
 
@@ -180,7 +178,7 @@ TEST(BarChart, HasValuesAsText) {
                        .categories = {"a", "b"},
                        .series = {{.name = "before", .values = {1e-13, 2e-14}},
                                   {.name = "after", .values = {1e-15, std::nullopt}}}};
-  const std::string svg = svg_of(chart, SvgUse::plain);
+  const std::string svg = svg_of(chart, SvgUse::file);
   EXPECT_THAT(svg, HasSubstr(">10⁻¹³</text>"));
   EXPECT_THAT(svg, HasSubstr(">2×10⁻¹⁴</text>"));
   // Two samples in the legend, three bars.
@@ -197,7 +195,7 @@ TEST(Timeline, HasBarsWhereTheirTimesAre) {
           {.label = "a", .bars = {{-10.0, 0.0, "run 1"}, {-25.0, -15.0, "run 0"}}},
           {.label = "", .bars = {{-10.0, -5.0, "run 2"}, {-40.0, -30.0, "left out"}}},
           {.label = "b", .marks = {{-10.0, -10.0, "run 3 lost"}, {-30.0, -30.0, "left out"}}}}};
-  const std::string svg = svg_of(timeline, SvgUse::plain);
+  const std::string svg = svg_of(timeline, SvgUse::file);
   const std::vector<std::string> bars = test::tags_of(svg, "<rect[^>]* fill=\"#0072b2\"/>");
   ASSERT_THAT(bars, SizeIs(3));
   const auto x = [&](std::size_t i) { return test::number_of(bars[i], "x"); };
@@ -222,7 +220,7 @@ TEST(HeatMap, ShowsSignAndStrength) {
                     .rows = {"a"},
                     .columns = {"b", "c", "d"},
                     .cells = {{.value = -1.0, .label = "−1"}, {.value = 0.5, .label = ".5"}, {}}};
-  const std::string svg = svg_of(map, SvgUse::plain);
+  const std::string svg = svg_of(map, SvgUse::file);
   EXPECT_THAT(svg, HasSubstr("fill=\"#d55e00\" fill-opacity=\"0.5\""));
   EXPECT_THAT(svg, HasSubstr("fill=\"#0072b2\" fill-opacity=\"0.25\""));
   EXPECT_THAT(svg, HasSubstr("fill=\"#0072b2\" fill-opacity=\"0\""));
