@@ -221,6 +221,17 @@ std::string noise_meaning_of(const NoiseConfig& noise) {
   return text;
 }
 
+/// The lines of the session. A test reads g at its frequency, and the gradient at twice that.
+LineFit spectrum_fit(const Scenario& scenario, const Session& session) {
+  LineFit fit = line_fit(scenario, session);
+  if (!is_test(session)) return fit;
+  const double frequency_hz = test_frequency_hz(session, scenario.orbit.period_s);
+  fit.fit_hz = {frequency_hz};
+  fit.known_hz = {2.0 * frequency_hz};
+  fit.filter = no_filter;
+  return fit;
+}
+
 /// Half the difference of two sensors whose noise is independent has a quarter of the sum of both
 /// PSDs. What the loops leave of thrust and attitude reaches Γ_mes,dx through factors of a percent
 /// and is left out.
@@ -234,7 +245,7 @@ std::vector<ExpectedSpectrum> expected_spectra(const Scenario& scenario, const N
   const std::string noise_meaning = noise_meaning_of(scenario.noise);
   std::vector<ExpectedSpectrum> spectra;
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
-    const LineFit fit = line_fit(scenario, scenario.sessions[i]);
+    const LineFit fit = spectrum_fit(scenario, scenario.sessions[i]);
     ExpectedSpectrum& spectrum = spectra.emplace_back();
     spectrum.session = i;
     spectrum.value = differential_x;
