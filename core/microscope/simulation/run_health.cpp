@@ -204,9 +204,13 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
     quiet.num_steps += num_steps(scenario, scenario.sessions[i]);
   }
   HealthFinding finding;
+  bool has_test_largest_attitude = false;
   for (std::size_t i = 0; i < record.size(); ++i) {
     const Session& session = scenario.sessions[i];
     const LoopHealth health = session_health(scenario, session, record[i], phasors[i]);
+    if (health.attitude_rad > finding.health.attitude_rad) {
+      has_test_largest_attitude = is_test(session);
+    }
     take_larger(finding.health, health);
     if (is_test(session)) {
       finding.test_residual_m_s2 =
@@ -219,6 +223,9 @@ HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
   finding.health.square_noise = square_noise(scenario, phasors, quiet);
   if (finding.loss.cause == LossCause::none) {
     finding.loss = loss_by_shift(bounds, finding.health, truth, standard_errors);
+  }
+  if (finding.loss.cause == LossCause::attitude && has_test_largest_attitude) {
+    finding.loss.session = SessionTarget::ep_test;
   }
   return finding;
 }
