@@ -77,6 +77,10 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
   return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
 }
 
+bool is_of_fixed_size(const Review& review) {
+  return review.matrix.empty() || review.matrix.front().check.is_of_fixed_size;
+}
+
 /// Which biases differ from 0, and which intervals do not hold.
 std::string bias_sentence(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
@@ -92,7 +96,10 @@ std::string bias_sentence(const Review& review) {
       symbols_of(review.schema, [&](std::size_t i) { return is_biased(review, i); });
   const std::size_t count = statistics.accuracy.size();
   return fmt::format(
-      "Bias: each interval holds by itself{}. {} {}.",
+      "Bias: each interval holds by itself{}{}. {} {}.",
+      is_of_fixed_size(review)
+          ? ""
+          : ", and for a number of runs fixed beforehand, which this campaign's was not",
       skewed.empty() ? ""
                      : fmt::format(", but not of errors that are too skewed for {} runs: {}",
                                    num_runs, skewed),
@@ -306,12 +313,8 @@ Table interval_table(const Review& review) {
   add_column(table, {"std", false, 8, deviation, true}, [&](auto i) {
     return has_deviation ? figure_cell(all[i].standard_deviation, scale(i)) : no_figure();
   });
-  add_ends(table, {"from", false, 8, deviation}, {"to", false, 9, deviation}, [&](auto i) {
-    // Values that differ have a deviation: an end of 0 is that of resamples without the far ones.
-    const std::optional<Interval>& interval = all[i].deviation_interval;
-    const bool is_known = !interval || all[i].standard_deviation == 0.0 || interval->lower > 0.0;
-    return IntervalAndScale(is_known ? interval : std::nullopt, scale(i));
-  });
+  add_ends(table, {"from", false, 8, deviation}, {"to", false, 9, deviation},
+           [&](auto i) { return IntervalAndScale(all[i].deviation_interval, scale(i)); });
   add_column(table, {"bias", false, 9, "error", true},
              [&](auto i) { return figure_cell(all[i].error.bias, scale(i)); });
   add_column(table, {"skew", false, 7, "error"},

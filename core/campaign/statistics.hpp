@@ -45,7 +45,7 @@ struct AccuracyStatistic {
   std::uint64_t num_beyond_objective = 0;      ///< Runs whose |error| is above the objective.
   Interval beyond_objective;                   ///< Of the share of such runs among all draws.
   std::optional<Interval> mean_interval;       ///< Empty for a single run.
-  std::optional<Interval> deviation_interval;  ///< By the bootstrap; empty below three runs.
+  std::optional<Interval> deviation_interval;  ///< bootstrap_deviation_interval().
   std::array<PercentileStatistic, percentile_levels.size()> percentiles{};
   ErrorStatistic error;  ///< With its sign.
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <ranges>
 #include <vector>
 
@@ -64,8 +65,11 @@ struct Group {
     sum += other.sum;
     squares += other.squares;
   }
+  /// 0 where what is left of the squares is within their rounding.
   [[nodiscard]] double standard_deviation() const {
-    return std::sqrt(std::max(squares - sum * sum / count, 0.0) / (count - 1.0));
+    const double rest = squares - sum * sum / count;
+    const double rounding = count * std::numeric_limits<double>::epsilon() * squares;
+    return rest > rounding ? std::sqrt(rest / (count - 1.0)) : 0.0;
   }
 };
 
@@ -158,7 +162,10 @@ std::optional<Interval> bootstrap_deviation_interval(std::span<const double> val
     return percentile(deviations, normal_cumulative(bias + shifted / (1.0 - rate * shifted))) /
            scale;
   };
-  return Interval{bound(0.5 - 0.5 * confidence), bound(0.5 + 0.5 * confidence), confidence};
+  const double lower = bound(0.5 - 0.5 * confidence);
+  // Values that differ have a deviation: 0 is that of resamples without those far off.
+  if (lower <= 0.0) return std::nullopt;
+  return Interval{lower, bound(0.5 + 0.5 * confidence), confidence};
 }
 
 std::optional<Interval> mean_interval(const Moments& moments, double confidence) {

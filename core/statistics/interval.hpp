@@ -68,7 +68,8 @@ inline constexpr std::size_t num_bootstrap_groups_max = 1024;
 /// the time stays some 5 ms for a million values. Draws are Philox blocks under a fixed key: a
 /// pure function of the values and their order.
 ///
-/// @returns Empty below three values; a single point if all values are equal.
+/// @returns Empty below three values, and where so few differ that resamples without them reach its
+///          lower end; a single point if all values are equal.
 /// @throws InvalidArgument also if a value is not finite.
 [[nodiscard]] std::optional<Interval> bootstrap_deviation_interval(std::span<const double> values,
                                                                    double confidence);

@@ -160,20 +160,6 @@ TEST(IntervalTable, NamesMeansThatAreTooSkewed) {
                                 "cover less than 95\n  %: K2c/K1c²\n"));
 }
 
-// Resamples without the far ones have no deviation, which values that differ have.
-TEST(IntervalTable, HasNoDeviationThatMayBeZero) {
-  CampaignStatistics statistics = paper_statistics(300);
-  std::optional<Interval>& interval =
-      statistics.accuracy[index(Parameter::a_c11_delta_x)].deviation_interval;
-  interval = Interval{.lower = 1e-9, .upper = 9e-9, .confidence = 0.95};
-  const auto line = [&] {
-    return lines_of(interval_text(review_of(MicroscopeCampaign(), statistics))).at(5);
-  };
-  EXPECT_THAT(line(), HasSubstr("│    7.30    1.00    9.00 │"));
-  interval->lower = 0.0;
-  EXPECT_THAT(line(), HasSubstr("│    7.30       -       - │"));
-}
-
 // A rule that stops where errors are small makes the worst one too small.
 TEST(IntervalTable, ClaimsNothingOfTheWorstOneAfterAStop) {
   Review review = review_of(MicroscopeCampaign(), paper_statistics(100));

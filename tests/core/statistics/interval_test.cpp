@@ -56,9 +56,16 @@ TEST(BootstrapDeviationInterval, CountsResamplesThatEqualTheEstimateByHalves) {
   EXPECT_DOUBLE_EQ(interval->upper, std::sqrt(4.0 / 3.0));
 }
 
-TEST(BootstrapDeviationInterval, NeedsThreeValues) {
-  EXPECT_FALSE(bootstrap_deviation_interval(std::vector<double>{1.0, 2.0}, 0.95).has_value());
-  EXPECT_TRUE(bootstrap_deviation_interval(std::vector<double>{1.0, 2.0, 4.0}, 0.95).has_value());
+// An eighth of the resamples of 57 equal values and two others have the equal ones alone, and
+// deviate by nothing but rounding.
+TEST(BootstrapDeviationInterval, IsNotKnownWhereResamplesOfEqualValuesReachItsEnd) {
+  std::vector<double> values(59, 0.5);
+  values[7] = values[31] = 1.5;
+  EXPECT_FALSE(bootstrap_deviation_interval(values, 0.95).has_value());
+  // A ninth of the resamples of three values have one alone, and of ten next to none.
+  EXPECT_FALSE(bootstrap_deviation_interval(one_to(2), 0.95).has_value());
+  EXPECT_FALSE(bootstrap_deviation_interval(one_to(3), 0.95).has_value());
+  EXPECT_TRUE(bootstrap_deviation_interval(one_to(10), 0.95).has_value());
 }
 
 // A campaign database may hold errors whose cubes no double can hold.
