@@ -85,31 +85,57 @@ struct AttitudeNoise {
   double xx = 0.0, xz = 0.0, zz = 0.0, yy = 0.0;
 };
 
-/// Of the turn about Y at the rate Ω, G_xx has 2 Ω ω_y, G_xy −Ω ω_x + α_z and G_xz −α_y of the
-/// errors ω of the estimated rate and α of the measured angular acceleration. With the estimator's
-/// crossover ω_h and s = 2πi f, ω is of these and of the star tracker's angles θ
+/// What the estimated rate ω has of errors θ of the star tracker's angles and α of the measured
+/// angular acceleration.
+struct RateErrors {
+  std::complex<double> of_angle;         ///< 1/s.
+  std::complex<double> of_acceleration;  ///< s.
+};
+
+/// In a frame that turns about Y at the rate Ω the estimator has θ̂' = ω − Ω × θ̂ + 3 ω_h (θ − θ̂),
+/// ω' = α + 3 ω_h² (θ − θ̂) + ω_h³ ∫(θ − θ̂), ω_h being its crossover. Of θ_x + i θ_z and
+/// α_x + i α_z, with a = s − iΩ, L = 3 ω_h²/s + ω_h³/s² and Q = L/(a + 3 ω_h + L), this makes
 ///
-///     ω = ((3 ω_h² s² + ω_h³ s) θ + (s + 3 ω_h) s α)/(s + ω_h)³
+///     ω_x + i ω_z = Q a θ + (1 − Q) α/s
+///
+/// About Y it is the same with Ω = 0.
+RateErrors rate_errors(double crossover, double rate_rad_s, std::complex<double> s) {
+  const std::complex<double> a = s - std::complex<double>(0.0, rate_rad_s);
+  const std::complex<double> slow = crossover * crossover * (3.0 * s + crossover) / (s * s);
+  const std::complex<double> part = slow / (a + 3.0 * crossover + slow);
+  return {.of_angle = part * a, .of_acceleration = (1.0 - part) / s};
+}
+
+/// Of the turn about Y at the rate Ω, G_xx has 2 Ω ω_y, G_xy −Ω ω_x + α_z and G_xz −α_y of the
+/// errors ω of the estimated rate and α of the measured angular acceleration.
 AttitudeNoise attitude_noise(const EstimationInput& input, double rate_rad_s, double frequency_hz) {
-  const double of_blending = 2.0 * std::numbers::pi * input.attitude.blending_hz;
+  const double crossover = 2.0 * std::numbers::pi * input.attitude.blending_hz;
   const std::complex<double> s(0.0, 2.0 * std::numbers::pi * frequency_hz);
-  const std::complex<double> pole = s + of_blending;
-  const std::complex<double> cube = pole * pole * pole;
-  const std::complex<double> of_angle =
-      of_blending * of_blending * s * (3.0 * s + of_blending) / cube;
-  const std::complex<double> of_acceleration = (s + 3.0 * of_blending) * s / cube;
+  const RateErrors about_y = rate_errors(crossover, 0.0, s);
+  // The real part of a complex signal has half the sum of its law and that of its conjugate.
+  const RateErrors one = rate_errors(crossover, rate_rad_s, s);
+  const RateErrors other = rate_errors(crossover, -rate_rad_s, s);
+  const std::complex<double> half(0.5, 0.0), turned(0.0, 0.5);
+  const RateErrors x_of_x{.of_angle = half * (one.of_angle + other.of_angle),
+                          .of_acceleration = half * (one.of_acceleration + other.of_acceleration)};
+  const RateErrors x_of_z{
+      .of_angle = turned * (one.of_angle - other.of_angle),
+      .of_acceleration = turned * (one.of_acceleration - other.of_acceleration)};
 
   const Eigen::Matrix3d factor =
       make_star_tracker(input.noise, input.sample_period_s).noise_factor_S_rad;
   const Eigen::Matrix3d angles = 2.0 * input.sample_period_s * factor * factor.transpose();
   const double acceleration = nominal_psd(input.noise.angular, frequency_hz);
-  const auto rate_about = [&](Eigen::Index axis) {
-    return std::norm(of_angle) * angles(axis, axis) + std::norm(of_acceleration) * acceleration;
-  };
-  return {.xx = 4.0 * rate_rad_s * rate_rad_s * rate_about(1),
-          .xz = -4.0 * rate_rad_s * of_acceleration.real() * acceleration,
+  const auto rate_about_y = std::norm(about_y.of_angle) * angles(1, 1) +
+                            std::norm(about_y.of_acceleration) * acceleration;
+  const double rate_about_x = std::norm(x_of_x.of_angle) * angles(0, 0) +
+                              std::norm(x_of_z.of_angle) * angles(2, 2) +
+                              std::norm(x_of_x.of_acceleration) * acceleration;
+  return {.xx = 4.0 * rate_rad_s * rate_rad_s * rate_about_y,
+          .xz = -4.0 * rate_rad_s * about_y.of_acceleration.real() * acceleration,
           .zz = acceleration,
-          .yy = rate_rad_s * rate_rad_s * rate_about(0) + acceleration};
+          .yy = rate_rad_s * rate_rad_s * rate_about_x +
+                std::norm(1.0 - rate_rad_s * x_of_z.of_acceleration) * acceleration};
 }
 
 /// A session that tests.
