@@ -299,6 +299,7 @@ void DrawCursor::begin(bool is_other_campaign, int plan, sqlite3_value** argumen
   for (std::size_t i = 0; i < offers.size(); ++i) {
     if ((plan & bit_of(i)) != 0) narrow(scan, offers[i], drawn(), *arguments++);
   }
+  if (drawn().empty()) scan.end_run = scan.first_run;
   go_to_run(scan.first_run);
 }
 

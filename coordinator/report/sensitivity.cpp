@@ -312,7 +312,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
     if (is_first) ++drawn.num_first;
     require_in_range(result, schema);
     const RunDraw draw = campaign.draw(result.run);
-    if (draw.values.empty()) {
+    if (draw.truth.empty()) {
       store.refuse_as_damaged(fmt::format(
           "run {} has an estimate, and its definition yields no draw", result.run.value));
     }

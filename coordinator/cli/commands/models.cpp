@@ -198,7 +198,7 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
     const std::uint64_t run = outlook.num_drawn * each;
     const RunDraw draw = campaign.draw(RunIndex{run});
     outlook.num_draws += draw.num_draws;
-    if (draw.values.empty()) ++outlook.num_without_draw;
+    if (draw.truth.empty()) ++outlook.num_without_draw;
   }
   return outlook;
 }
