@@ -58,12 +58,23 @@ std::vector<CommonQuantity> common_quantities(std::span<const Quantity> first,
   return common;
 }
 
-bool have_same_draw(std::span<const CommonQuantity> common, const RunResult& first,
-                    const RunResult& second) {
+bool have_same_truth(std::span<const CommonQuantity> common, const RunResult& first,
+                     const RunResult& second) {
   if (first.has_truth() != second.has_truth()) return false;
   return !first.has_truth() || std::ranges::all_of(common, [&](const CommonQuantity& quantity) {
     return have_same_bits(first.truth[quantity.in_first], second.truth[quantity.in_second]);
   });
+}
+
+/// Where a parameter of a model program stands in a truth, draws that are the same have other
+/// truths: those that their definitions yield.
+bool have_same_values(const ComparedCampaign& first, const ComparedCampaign& second,
+                      const RunResult& of_first, const RunResult& of_second) {
+  if (first.model_version != second.model_version) return false;
+  const RunDraw a = first.campaign->draw(of_first.run), b = second.campaign->draw(of_second.run);
+  return std::ranges::equal(a.truth, of_first.truth, have_same_bits) &&
+         std::ranges::equal(b.truth, of_second.truth, have_same_bits) &&
+         std::ranges::equal(a.values, b.values, have_same_bits);
 }
 
 /// What the other side has of a run with an estimate.
@@ -121,7 +132,8 @@ void read_errors(const ComparedCampaign& first, const ComparedCampaign& second,
       has_common_run = true;
       if (!first_truth) first_truth = a->truth;
       varies = varies || a->truth != first_truth;
-      if (why.empty() && !have_same_draw(common, *a, *b)) {
+      if (why.empty() && !have_same_truth(common, *a, *b) &&
+          !have_same_values(first, second, *a, *b)) {
         why = fmt::format("the draws of run {} differ", a->run.value);
       }
     }
@@ -234,11 +246,13 @@ ComparedCampaign open_campaign(const Store& store, const std::filesystem::path& 
                                const HeedStop& heed_stop) {
   heed_stop();
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-  const auto open_results = [&store, heed_stop]() -> ResultStream {
+  const JudgedRuns judged = judged_runs(store.finished_runs(), store.given_up_runs());
+  const auto open_results = [&store, heed_stop, judged]() -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
-    return [reader = std::make_shared<ResultReader>(store.results()), heed_stop] {
+    return [reader = std::make_shared<ResultReader>(store.results()), heed_stop, end = judged.end] {
       heed_stop();
-      return reader->next();
+      std::optional<RunResult> result = reader->next();
+      return result && result->run.value < end ? std::move(result) : std::nullopt;
     };
   };
   return {.file = file,
@@ -247,6 +261,7 @@ ComparedCampaign open_campaign(const Store& store, const std::filesystem::path& 
           .model_version = store.model_version(),
           .reference_digest = store.reference_digest(),
           .build = store.build(),
+          .num_left_out = judged.num_left_out,
           .results = read_checked_results(store, *campaign),
           .open_results = open_results};
 }
@@ -278,6 +293,19 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
     }
   }
   return comparison;
+}
+
+MemberNames lettered(std::size_t count) {
+  constexpr std::size_t num_letters = 26;
+  MemberNames names{.title = "campaign", .names = {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    std::string name;
+    for (std::size_t rest = i + 1; rest > 0; rest = (rest - 1) / num_letters) {
+      name.insert(name.begin(), static_cast<char>('A' + (rest - 1) % num_letters));
+    }
+    names.names.push_back(name);
+  }
+  return names;
 }
 
 std::size_t place_of(const Quantity& quantity, std::span<const Quantity> among) {

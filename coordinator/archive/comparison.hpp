@@ -84,7 +84,8 @@ struct ComparedCampaign {
   std::string model_version = {};
   std::uint64_t reference_digest = 0;  ///< Store::reference_digest().
   std::string build = {};
-  ReadResults results = {};
+  std::uint64_t num_left_out = 0;  ///< JudgedRuns::num_left_out: in no comparison.
+  ReadResults results = {};        ///< Of all runs.
   /// Begins with the first result, the same ones each time; nothing once its file is closed.
   std::function<ResultStream()> open_results = {};
   /// With the first campaign as its first side; empty for the first campaign itself. The adjusted

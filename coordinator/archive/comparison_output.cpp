@@ -179,6 +179,10 @@ Table campaign_table(std::span<const ComparedCampaign> members, const MemberName
       table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.",
                                            names.names[i], reasons_text(member.results.missing))});
     }
+    if (member.num_left_out > 0) {
+      table.remarks.push_back({fmt::format("Left out of {}: {} after the first that is missing.",
+                                           names.names[i], counted(member.num_left_out, "run"))});
+    }
     add_selection(members, names, i, table);
   }
   return table;
@@ -324,8 +328,8 @@ Table scatter_table(std::span<const ComparedCampaign> members, const MemberNames
       fmt::format("tail: beyond twice the root mean square of {} and the campaign, p: sign test of "
                   "pairs; as a whole Fisher's exact test",
                   first),
-      fmt::format("All p are adjusted for three tests of all parameters of all campaigns (Holm); "
-                  "*: below {:.2f}",
+      fmt::format("All p are adjusted for three tests of all parameters of all campaigns (Holm), "
+                  "and hold for numbers of runs that were fixed beforehand; *: below {:.2f}",
                   significance)};
   return table;
 }
@@ -362,19 +366,6 @@ Table magnitude_table(std::span<const ComparedCampaign> members, const MemberNam
 }
 
 }  // namespace
-
-MemberNames lettered(std::size_t count) {
-  constexpr std::size_t num_letters = 26;
-  MemberNames names{.title = "campaign", .names = {}};
-  for (std::size_t i = 0; i < count; ++i) {
-    std::string name;
-    for (std::size_t rest = i + 1; rest > 0; rest = (rest - 1) / num_letters) {
-      name.insert(name.begin(), static_cast<char>('A' + (rest - 1) % num_letters));
-    }
-    names.names.push_back(name);
-  }
-  return names;
-}
 
 std::string comparison_text(std::span<const ComparedCampaign> members, const MemberNames& names,
                             Paint paint) {
@@ -466,6 +457,7 @@ Json member_json(const ComparedCampaign& member, const ComparedCampaign& first) 
             {"num_runs", member.campaign->num_runs},
             {"num_finished", member.results.statistics.num_runs},
             {"num_with_estimate", member.results.statistics.num_estimated},
+            {"num_left_out", member.num_left_out},
             {"num_without_estimate", member.results.missing.total()},
             {"digest", member.results.digests.results},
             {"parameters", Json::array()},

@@ -210,6 +210,25 @@ std::string warnings_text(const ResultSchema& schema, const CampaignWarnings& wa
   return text;
 }
 
+JudgedRuns judged_runs(std::vector<RunRange> finished, std::span<const RunRange> given_up) {
+  const auto first_of = [](const RunRange& range) { return range.first.value; };
+  std::vector<RunRange>& settled = finished;
+  settled.insert(settled.end(), given_up.begin(), given_up.end());
+  std::ranges::sort(settled, {}, first_of);
+  JudgedRuns judged{.end = settled.empty() ? 0 : first_of(settled.front())};
+  for (const RunRange& range : settled) {
+    if (first_of(range) == judged.end) {
+      judged.end = range.end();
+    } else {
+      judged.num_left_out += range.count;
+    }
+  }
+  for (const RunRange& range : given_up) {
+    if (first_of(range) < judged.end) judged.num_given_up += range.count;
+  }
+  return judged;
+}
+
 ReadResults read_results(const Store& store, const Campaign& campaign,
                          const ResultVisitor& further) {
   ReadResults results;

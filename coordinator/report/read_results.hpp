@@ -27,6 +27,19 @@
 
 namespace proofmass::coordinator {
 
+/// The runs that tests and verdicts are about: from the first that is settled (finished or given
+/// up) to the next that is not. Where runs that exceed take longer, later ones are a biased sample
+/// as long as earlier ones are missing.
+struct JudgedRuns {
+  std::uint64_t end = num_runs_max;
+  std::uint64_t num_given_up = 0;  ///< Below `end`.
+  std::uint64_t num_left_out = 0;  ///< Settled, but not before the first that is missing.
+};
+
+/// @param finished  Ascending, as are those given up; no run is both.
+[[nodiscard]] JudgedRuns judged_runs(std::vector<RunRange> finished,
+                                     std::span<const RunRange> given_up);
+
 /// Splits results in run order into groups of one size: the runs of an instrument, or of a
 /// replicate of a design. Group g has the runs from g·size on.
 class RunGroups {

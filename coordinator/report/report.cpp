@@ -245,6 +245,7 @@ Json json_of(const RequirementAnswer& answer) {
           {"coverage", requirement.tolerance.coverage},
           {"confidence", requirement.tolerance.confidence},
           {"num_runs", check.num_runs},
+          {"num_left_out", answer.num_left_out},
           {"num_exceedances", check.num_exceedances},
           {"num_without_estimate", check.num_without_estimate},
           {"num_exceedances_allowed",
@@ -345,27 +346,36 @@ std::string_view cause_of_contradictions(const Model& model) {
 
 namespace {
 
-std::string note_of(const Campaign& campaign, const Store& store) {
-  std::string note = campaign.note();
-  const std::uint64_t num_contradicting = store.num_contradicting();
-  if (num_contradicting == 0) return note;
-  if (!note.empty()) note += "; ";
-  return note + fmt::format(
-                    "audits found {}: {}, and no verdict can be relied on; `proofmass verify` "
-                    "names the runs",
-                    counted(num_contradicting, "contradiction"),
-                    cause_of_contradictions(store.model()));
+std::string note_of(const Campaign& campaign, const Store& store, const JudgedRuns& judged) {
+  std::vector<std::string> notes;
+  if (std::string of_campaign = campaign.note(); !of_campaign.empty()) {
+    notes.push_back(std::move(of_campaign));
+  }
+  if (judged.num_left_out > 0) {
+    notes.push_back(fmt::format(
+        "run {} is not finished, and {} after it are: if runs take longer because of what they "
+        "draw, all figures but verdicts, which are about the runs before it, are biased",
+        judged.end, counted(judged.num_left_out, "run")));
+  }
+  if (const std::uint64_t num_contradicting = store.num_contradicting(); num_contradicting > 0) {
+    notes.push_back(fmt::format(
+        "audits found {}: {}, and no verdict can be relied on; `proofmass verify` "
+        "names the runs",
+        counted(num_contradicting, "contradiction"), cause_of_contradictions(store.model())));
+  }
+  return fmt::format("{}", fmt::join(notes, "; "));
 }
 
 Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDepth depth,
                          std::vector<StatedRequirement> stated) {
+  const JudgedRuns judged = judged_runs(store.finished_runs(), store.given_up_runs());
   Review review{.name = store.name(),
                 .seed = store.seed(),
                 .num_runs = store.num_runs(),
                 .model_version = store.model_version(),
                 .is_of_program = !store.model().description().empty(),
                 .is_imported = store.model().is_imported(),
-                .note = note_of(campaign, store),
+                .note = note_of(campaign, store, judged),
                 .build = store.build(),
                 .created_utc = store.created_utc(),
                 .definition_digest = store.table_digest(),
@@ -378,9 +388,8 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
   const bool are_independent = review.why_not_independent.empty();
   ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()),
                        are_independent);
-  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives,
-                            num_runs_in(store.given_up_runs()), store.num_runs_fixed(),
-                            review.budget);
+  VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives, judged,
+                            store.num_runs_fixed(), review.budget);
   review.results = read_checked_results(
       store, campaign,
       {.result =

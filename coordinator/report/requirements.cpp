@@ -194,7 +194,10 @@ std::string rule_text(const RequirementAnswer& answer) {
     return fmt::format("{}, a number fixed before the first result{}",
                        counted(answer.check.num_runs, "draw"), later);
   }
-  return "sequential: holds however often one looks and goes on";
+  return "sequential: holds however often one looks and goes on" +
+         (answer.num_left_out == 0 ? std::string()
+                                   : fmt::format("; left out: {} after the first that is missing",
+                                                 counted(answer.num_left_out, "run")));
 }
 
 std::string text_of_all(const RequirementAnswer& answer) {
@@ -326,14 +329,14 @@ std::vector<StatedRequirement> matrix_requirements(const ResultSchema& schema,
 
 VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
                                        std::vector<StatedRequirement> stated,
-                                       std::span<const double> objectives,
-                                       std::uint64_t num_given_up,
+                                       std::span<const double> objectives, const JudgedRuns& judged,
                                        std::optional<std::uint64_t> num_fixed,
                                        const std::optional<ErrorBudget>& budget)
-    : num_fixed_(num_fixed),
+    : judged_(judged),
+      num_fixed_(num_fixed),
       budget_(budget),
-      missing_{.num_given_up = num_given_up},
-      num_runs_(num_given_up) {
+      missing_{.num_given_up = judged.num_given_up},
+      num_runs_(judged.num_given_up) {
   if (budget_) {
     assumed_level_ = fmt::format("{} = {:.3g} {}", budget_->level_label, budget_->assumed_level,
                                  schema.health.at(budget_->level).unit);
@@ -341,6 +344,7 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
   for (StatedRequirement& each : stated) {
     RequirementAnswer answer;
     answer.stated = std::move(each);
+    answer.num_left_out = judged_.num_left_out;
     answer.requirement = parse_requirement(answer.stated.requirement, schema);
     require_answerable(answer.requirement, objectives, "requirement", answer.stated.requirement);
     if (!answer.is_joint()) {
@@ -353,6 +357,7 @@ VerificationMatrix::VerificationMatrix(const ResultSchema& schema,
 }
 
 void VerificationMatrix::add(const RunResult& result) {
+  if (result.run.value >= judged_.end) return;
   // Where one of the first was given up, it is among all that were.
   if (num_fixed_ && num_runs_ - missing_.num_given_up == *num_fixed_ &&
       result.run.value == *num_fixed_) {
@@ -366,7 +371,7 @@ void VerificationMatrix::add(const RunResult& result) {
   const bool tells_level = budget_ && budget_->level_of_run(result) != 0.0;
   for (Row& row : rows_) {
     const double value = row.of_all.exceedances.add(result);
-    if (!row.answer.is_of_error) row.values.push_back(value);
+    if (keeps_values(row)) row.values.push_back(value);
     if (row.answer.is_of_budget() && !tells_level) row.answer.assumption = assumed_level_;
     std::optional<RunValue>& worst = row.of_all.worst;
     if (!worst || value > worst->value) worst = {.run = result.run, .value = value};
@@ -410,7 +415,7 @@ void VerificationMatrix::Row::set_bound(std::span<const double> ascending) {
 void VerificationMatrix::add_magnitudes(std::size_t parameter, std::span<const double> magnitudes) {
   end_results();
   for (Row& row : rows_) {
-    if (row.answer.is_of_error && row.answer.requirement.parameter == parameter) {
+    if (!keeps_values(row) && row.answer.requirement.parameter == parameter) {
       row.set_bound(magnitudes);
     }
   }

@@ -83,7 +83,8 @@ struct RequirementAnswer {
   Requirement requirement;
   Quantity subject;  ///< What it is about, see requirement_subject(); unless is_joint().
   RequirementCheck check;
-  MissingEstimates missing;  ///< The exceedances for want of an estimate.
+  std::uint64_t num_left_out = 0;  ///< JudgedRuns::num_left_out.
+  MissingEstimates missing;        ///< The exceedances for want of an estimate.
   /// What all runs have, where a number that was fixed decided before the last of them: its verdict
   /// stands, whatever follows. There is no bound then.
   std::optional<ExceedanceCount> of_all;
@@ -148,16 +149,17 @@ class VerificationMatrix {
  public:
   /// @param stated        Their order is that of the answers.
   /// @param objectives    Of the campaign, SI.
-  /// @param num_given_up  Runs that have no result, and count as exceedances.
+  /// @param judged        Those given up count as exceedances.
   /// @param num_fixed     As for decide().
   /// @param budget        Of the campaign, for requirements about it.
   /// @throws ConfigError as parse_requirement().
   VerificationMatrix(const ResultSchema& schema, std::vector<StatedRequirement> stated,
-                     std::span<const double> objectives, std::uint64_t num_given_up,
+                     std::span<const double> objectives, const JudgedRuns& judged,
                      std::optional<std::uint64_t> num_fixed,
                      const std::optional<ErrorBudget>& budget = std::nullopt);
 
-  /// @param result  Its numbers are in range. Results come in run order.
+  /// @param result  Its numbers are in range. Results come in run order, also those that are not
+  ///                judged.
   void add(const RunResult& result);
   /// To be called after all results, for each parameter that a requirement is about.
   /// @param magnitudes  |error| of all completed runs, SI, ascending; at least one.
@@ -176,7 +178,8 @@ class VerificationMatrix {
     RequirementAnswer answer;
     Seen of_all;
     std::optional<Seen> of_fixed = {};  ///< Of the first num_fixed runs, if there are more.
-    std::vector<double> values = {};    ///< Of the runs that have an estimate; none of a parameter.
+    /// Of the judged runs that have an estimate; none of a parameter if these are all runs.
+    std::vector<double> values = {};
 
     /// @param ascending  All values of the runs that have an estimate.
     void set_bound(std::span<const double> ascending);
@@ -185,6 +188,11 @@ class VerificationMatrix {
   void end_results();
   void keep_fixed_verdict(Row& row) const;
 
+  [[nodiscard]] bool keeps_values(const Row& row) const {
+    return !row.answer.is_of_error || judged_.num_left_out > 0;
+  }
+
+  JudgedRuns judged_;
   std::optional<std::uint64_t> num_fixed_;
   std::optional<ErrorBudget> budget_;
   std::string assumed_level_;

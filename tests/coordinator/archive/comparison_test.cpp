@@ -362,6 +362,20 @@ TEST_F(ComparedFile, IsReadWithAllThatCountsAndHeldAgainstItsDigest) {
               HasSubstr("the digest of its 5 results is "));
 }
 
+// Where slow runs have other errors, those that are finished behind them are a selection.
+TEST_F(ComparedFile, EndsBeforeTheFirstRunThatIsMissing) {
+  const MicroscopeCampaign campaign = test::campaign_of(9);
+  std::vector<RunResult> results = side(7).results;
+  results.erase(results.begin() + 3, results.begin() + 5);
+  (void)test::store_of(file(), campaign, results);
+  const std::vector<std::filesystem::path> files{file(), file()};
+  const std::vector<ComparedCampaign> members = compare_several(files, test::never_stopped);
+  EXPECT_EQ(members[1].comparison->num_pairs, 3U);
+  EXPECT_EQ(members[1].comparison->first.num_estimated, 3U);
+  EXPECT_THAT(comparison_text(members, lettered(2)),
+              HasSubstr("Left out of B: 2 runs after the first that is missing."));
+}
+
 TEST(Letters, GoOnWithTwoAfterZ) {
   const MemberNames names = lettered(703);
   EXPECT_EQ(names.names[0], "A");

@@ -341,7 +341,8 @@ std::vector<RequirementAnswer> answers_to(const std::vector<StatedRequirement>& 
                                           const std::vector<RunResult>& results,
                                           std::uint64_t num_given_up = 0,
                                           std::optional<std::uint64_t> num_fixed = {}) {
-  VerificationMatrix matrix(test::schema(), stated, ones(), num_given_up, num_fixed);
+  VerificationMatrix matrix(test::schema(), stated, ones(), {.num_given_up = num_given_up},
+                            num_fixed);
   for (const RunResult& result : results) matrix.add(result);
   for (std::size_t i = 0; i < num_parameters; ++i) {
     std::vector<double> magnitudes;
@@ -412,6 +413,46 @@ TEST(VerificationMatrix, BoundsByTheRuleOfItsVerdict) {
   EXPECT_LT(*fixed.bound, *open.bound);
 }
 
+TEST(JudgedRuns, EndBeforeTheFirstThatIsMissing) {
+  const auto judged = [](const std::vector<RunRange>& finished,
+                         const std::vector<RunRange>& given_up) {
+    const JudgedRuns runs = judged_runs(finished, given_up);
+    return std::array{runs.end, runs.num_given_up, runs.num_left_out};
+  };
+  EXPECT_THAT(judged({}, {}), ElementsAre(0, 0, 0));
+  EXPECT_THAT(judged({{{0}, 10}}, {}), ElementsAre(10, 0, 0));
+  EXPECT_THAT(judged({{{0}, 4}, {{6}, 4}}, {{{4}, 2}}), ElementsAre(10, 2, 0));
+  EXPECT_THAT(judged({{{0}, 4}, {{6}, 4}}, {{{4}, 1}, {{12}, 3}}), ElementsAre(5, 1, 7));
+  EXPECT_THAT(judged({{{100}, 50}}, {}), ElementsAre(150, 0, 0)) << "a part of a campaign";
+}
+
+// Every tenth run exceeds, and takes so long that only the first two of them are there.
+TEST(VerificationMatrix, LeavesOutRunsAfterTheFirstThatIsMissing) {
+  std::vector<RunResult> results;
+  std::vector<RunRange> finished;
+  for (std::uint64_t run = 0; run < 200; ++run) {
+    const bool exceeds = run % 10 == 9;
+    if (exceeds && run > 19) continue;
+    results.push_back(result_with(run, exceeds ? 0.9 : 0.001 * static_cast<double>(run)));
+    append(finished, {run});
+  }
+  const auto row_of = [&](const std::string& requirement) {
+    VerificationMatrix matrix(test::schema(), {stated(requirement)}, ones(),
+                              judged_runs(finished, {}), {});
+    for (const RunResult& result : results) matrix.add(result);
+    matrix.add_magnitudes(0, std::vector<double>(results.size(), 7.0));
+    return matrix.answers()[0];
+  };
+  const RequirementAnswer row = row_of("a_c11_delta_x < 0.5 for 92% with 90%");
+  EXPECT_EQ(row.check.num_runs, 29U);
+  EXPECT_EQ(row.check.num_exceedances, 2U);
+  EXPECT_EQ(row.check.verdict, RequirementVerdict::undecided);
+  EXPECT_EQ(rule_text(row),
+            "sequential: holds however often one looks and goes on; left out: 153 runs after the "
+            "first that is missing");
+  EXPECT_LE(row_of("a_c11_delta_x < 1 for 30% with 50%").bound.value(), 0.9);
+}
+
 // Runs without a session that watches the loops do not tell the level of a budget.
 TEST(VerificationMatrix, NamesTheLevelThatItAssumes) {
   const std::vector<StatedRequirement> both{stated("budget < 1 for 95% with 90%"),
@@ -420,7 +461,7 @@ TEST(VerificationMatrix, NamesTheLevelThatItAssumes) {
   told.health = test::values_of({.residual_m_s2 = 1e-10});
   untold.health = test::values_of({});
   const auto assumptions = [&](const RunResult& second) {
-    VerificationMatrix matrix(test::schema(), both, ones(), 0, {},
+    VerificationMatrix matrix(test::schema(), both, ones(), {}, {},
                               MicroscopeCampaign().error_budget());
     matrix.add(told);
     matrix.add(second);
