@@ -76,6 +76,20 @@ std::string exit_codes_text(std::initializer_list<ExitCode> further) {
   return text;
 }
 
+namespace {
+
+/// An address that does not stand behind `=` would be taken for a file.
+void refuse_page_address_apart(std::span<char* const> arguments) {
+  const auto page = std::ranges::find(arguments, std::string_view("--page"));
+  if (arguments.end() - page < 2) return;
+  const std::string_view next = page[1];
+  const std::size_t colon = next.rfind(':');
+  if (colon == next.npos || next.find_first_not_of("0123456789", colon + 1) != next.npos) return;
+  throw UsageError(fmt::format("page = {0} (an address stands behind =: --page={0})", next));
+}
+
+}  // namespace
+
 int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   const auto fail = [&app](std::string_view what, int exit_code) {
     wire::say(fmt::format("{}: error: {}\n", app.get_name(), what));
@@ -84,6 +98,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   try {
     wire::settle_surroundings();
     wire::refuse_options_as_values(app);
+    refuse_page_address_apart({argv, static_cast<std::size_t>(argc)});
     app.parse(argc, argv);
     const int exit_code = work();
     flush_standard_output();
