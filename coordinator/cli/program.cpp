@@ -388,12 +388,19 @@ void flush_standard_output() {
 
 // Files.
 
+namespace {
+
+constexpr std::string_view no_file = "must be a file; ./- is one of that name";
+
+}  // namespace
+
 void refuse_output(const std::filesystem::path& output, std::string_view why) {
   throw UsageError(fmt::format("output = {} ({})", output.string(), why));
 }
 
 void check_output_file(const std::filesystem::path& output, wire::IfThere if_there,
                        std::string_view remedy) {
+  if (output == "-") refuse_output(output, no_file);
   std::error_code ignored;
   if (std::filesystem::is_symlink(output, ignored)) {
     refuse_output(output, "is a symbolic link; name the file that it leads to");
@@ -423,9 +430,7 @@ void write_document(const std::filesystem::path& file, wire::IfThere if_there,
 
 void check_new_file(std::string_view argument, const std::filesystem::path& file) {
   std::error_code error;
-  if (file == "-") {
-    throw UsageError(fmt::format("{} = - (must be a file; ./- is one of that name)", argument));
-  }
+  if (file == "-") throw UsageError(fmt::format("{} = - ({})", argument, no_file));
   if (std::filesystem::exists(file, error)) {
     throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
   }
