@@ -101,6 +101,7 @@ int export_results(const ExportOptions& options, const HeedStop& heed_stop) {
   } else {
     export_sqlite(store, options.output, heed_stop);
   }
+  print_written(options.output, OutputFormat::text);
   return exit_done;
 }
 
