@@ -137,7 +137,7 @@ Table listing_table(std::span<const CampaignRecord> campaigns) {
                           {"seed", false, 9},
                           {"created", false, 11}}};
   for (const CampaignRecord& campaign : campaigns) {
-    const std::string file = campaign.file.filename().string();
+    const std::string file = campaign.file.lexically_normal().string();
     if (!campaign.problem.empty()) {
       table.rows.push_back({file, "", "", "-", "-", "-", "-"});
       table.remarks.push_back({campaign.problem, Tone::bad});

@@ -39,7 +39,8 @@ void require_campaign_file(const std::filesystem::path& file);
 [[nodiscard]] std::vector<CampaignRecord> list_campaigns(
     std::span<const std::filesystem::path> places);
 
-/// A row a campaign, and a line for each that cannot be opened.
+/// A row a campaign, whose file is named as its place was, and a line for each that cannot be
+/// opened.
 [[nodiscard]] Table listing_table(std::span<const CampaignRecord> campaigns);
 
 /// The campaigns as JSON, complete.

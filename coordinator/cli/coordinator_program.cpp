@@ -353,7 +353,7 @@ int run_proofmass_coordinator(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("proofmass-coordinator {} ({})", PROOFMASS_VERSION,
                                                 model().version()));
   wire::add_option_file(app, "File with these options, as in\n`bind = \"tcp://*:5555\"`",
-                        "PROOFMASS_CONFIG");
+                        "PROOFMASS_COORDINATOR_CONFIG");
   ServeOptions options;
   add_service(app, options);
   add_addresses(app, options);

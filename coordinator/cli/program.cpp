@@ -76,6 +76,20 @@ std::string exit_codes_text(std::initializer_list<ExitCode> further) {
   return text;
 }
 
+namespace {
+
+/// An address that does not stand behind `=` would be taken for a file.
+void refuse_page_address_apart(std::span<char* const> arguments) {
+  const auto page = std::ranges::find(arguments, std::string_view("--page"));
+  if (arguments.end() - page < 2) return;
+  const std::string_view next = page[1];
+  const std::size_t colon = next.rfind(':');
+  if (colon == next.npos || next.find_first_not_of("0123456789", colon + 1) != next.npos) return;
+  throw UsageError(fmt::format("page = {0} (an address stands behind =: --page={0})", next));
+}
+
+}  // namespace
+
 int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   const auto fail = [&app](std::string_view what, int exit_code) {
     wire::say(fmt::format("{}: error: {}\n", app.get_name(), what));
@@ -84,6 +98,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   try {
     wire::settle_surroundings();
     wire::refuse_options_as_values(app);
+    refuse_page_address_apart({argv, static_cast<std::size_t>(argc)});
     app.parse(argc, argv);
     const int exit_code = work();
     flush_standard_output();
@@ -373,12 +388,19 @@ void flush_standard_output() {
 
 // Files.
 
+namespace {
+
+constexpr std::string_view no_file = "must be a file; ./- is one of that name";
+
+}  // namespace
+
 void refuse_output(const std::filesystem::path& output, std::string_view why) {
   throw UsageError(fmt::format("output = {} ({})", output.string(), why));
 }
 
 void check_output_file(const std::filesystem::path& output, wire::IfThere if_there,
                        std::string_view remedy) {
+  if (output == "-") refuse_output(output, no_file);
   std::error_code ignored;
   if (std::filesystem::is_symlink(output, ignored)) {
     refuse_output(output, "is a symbolic link; name the file that it leads to");
@@ -408,9 +430,7 @@ void write_document(const std::filesystem::path& file, wire::IfThere if_there,
 
 void check_new_file(std::string_view argument, const std::filesystem::path& file) {
   std::error_code error;
-  if (file == "-") {
-    throw UsageError(fmt::format("{} = - (must be a file; ./- is one of that name)", argument));
-  }
+  if (file == "-") throw UsageError(fmt::format("{} = - ({})", argument, no_file));
   if (std::filesystem::exists(file, error)) {
     throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
   }

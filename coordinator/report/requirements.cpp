@@ -74,10 +74,14 @@ std::string count_lines(const RequirementAnswer& answer) {
                             given_percent(is_joint ? required : 1.0 - required));
 }
 
+std::string with_unit(double value, std::string_view unit) {
+  return unit == "1" ? fmt::format("{:.6g}", value) : fmt::format("{:.6g} {}", value, unit);
+}
+
 // Tables may show the quantity in another unit than that of the requirement.
 std::string limit_line(const RequirementAnswer& answer) {
-  if (answer.is_joint() || answer.subject.unit == "1") return "";
-  return fmt::format("Limit        {:.6g} {}\n", answer.limit(), answer.subject.unit);
+  if (answer.is_joint()) return "";
+  return fmt::format("Limit        {}\n", with_unit(answer.limit(), answer.subject.unit));
 }
 
 /// Of a requirement that a project's document states.
@@ -98,10 +102,9 @@ std::string bound_line(const RequirementAnswer& answer) {
             : fmt::format("draws of which {} have no estimate", answer.check.num_without_estimate),
         given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
-  const std::string_view unit = answer.subject.unit;
-  return fmt::format("Bound        {} of all draws at most {:.6g}{}{}, with {}\n",
-                     given_percent(tolerance.coverage), *answer.bound, unit == "1" ? "" : " ",
-                     unit == "1" ? "" : unit, given_percent(tolerance.confidence));
+  return fmt::format(
+      "Bound        {} of all draws at most {}, with {}\n", given_percent(tolerance.coverage),
+      with_unit(*answer.bound, answer.subject.unit), given_percent(tolerance.confidence));
 }
 
 std::string assumption_line(const RequirementAnswer& answer) {

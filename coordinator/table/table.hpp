@@ -138,9 +138,10 @@ struct TerminalStyle {
 
 /// Text broken between words, and in longer ones, to lines of at most 80 columns, from the second
 /// one on after `indent` spaces; the first one begins at column `begin`. No end of the last line.
+/// A longer word of a command, which stands between backticks, has a line that is wider.
 [[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin);
 
-/// Lines, those of more than 80 columns broken between words. What follows of such a line stands
+/// Lines, those of more than 80 columns broken as by wrapped(). What follows of such a line stands
 /// below what it has behind its label, as in `Note      text`, else two columns further right.
 [[nodiscard]] std::string fitted(std::string_view text);
 

@@ -23,12 +23,16 @@ std::size_t longest_word(const std::string& text) {
   return longest;
 }
 
-/// lines_of(), whatever the words are.
+/// lines_of(), whatever the words are but those of commands, between backticks, which people copy.
 std::vector<std::string> broken(const std::string& text, std::size_t first, std::size_t width) {
   std::vector<std::string> lines = lines_of(text, first, width);
+  bool is_in_command = false;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::size_t room = std::max(i == 0 ? first : width, text_width_min);
-    if (display_width(lines[i]) <= room) continue;
+    const auto num_marks = std::ranges::count(lines[i], '`');
+    const bool is_of_command = is_in_command || num_marks > 0;
+    is_in_command = is_in_command != (num_marks % 2 == 1);
+    if (is_of_command || display_width(lines[i]) <= room) continue;
     const std::size_t size = shortened(lines[i], room).size() - std::string_view("…").size();
     lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i) + 1, lines[i].substr(size));
     lines[i].resize(size);

@@ -351,14 +351,22 @@ void Document::check() const {
 }
 
 DefinitionError Document::located(const ConfigError& error) const {
-  // A table that holds for all of its elements has `mean` where the field is `x.mean`.
   const std::string& field = error.field();
-  const std::string key = field.substr(field.rfind('.') + 1);
-  const std::string shared = path_of(parent_of(parent_of(field)), key);
-  const bool is_shared = value_at(field) == nullptr && value_at(shared) != nullptr;
-  const std::string& written = is_shared ? shared : field;
-  return DefinitionError(prefix(place_of(written)) + written +
-                         std::string(error.what()).substr(field.size()));
+  const std::string table = parent_of(field), key = field.substr(field.rfind('.') + 1);
+  const std::string rest = std::string(error.what()).substr(field.size());
+  // A table that holds for all of its elements has `mean` where the field is `x.mean`. Covariances
+  // are checked as the correlations that they become.
+  for (const std::string_view name : {std::string_view(key), std::string_view("covariances")}) {
+    for (const std::string& holder : {table, parent_of(table)}) {
+      const std::string written = path_of(holder, name);
+      if (value_at(written) == nullptr) continue;
+      const std::string_view remark = name == key ? "" : " as correlations";
+      return DefinitionError(
+          fmt::format("{}{}{}{}", prefix(place_of(written)), written, remark, rest));
+    }
+    if (key != "correlations") break;
+  }
+  return DefinitionError(prefix(place_of(field)) + error.what());
 }
 
 }  // namespace proofmass

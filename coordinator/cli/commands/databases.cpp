@@ -94,7 +94,6 @@ int export_results(const ExportOptions& options, const HeedStop& heed_stop) {
   if (options.format == ExportFormat::sqlite && options.draws == DrawColumns::included) {
     throw UsageError("draws = (must not be given with --format sqlite)");
   }
-  if (options.output == "-") refuse_output("-", "must be a file");
   check_output_file(options.output, options.if_there, "name one that may be replaced");
   const Store store = Store::open_read_only(options.database);
   if (options.format == ExportFormat::hdf5) {
@@ -102,6 +101,7 @@ int export_results(const ExportOptions& options, const HeedStop& heed_stop) {
   } else {
     export_sqlite(store, options.output, heed_stop);
   }
+  print_written(options.output, OutputFormat::text);
   return exit_done;
 }
 

@@ -42,7 +42,8 @@ std::string list_head(KeyRole role) {
       "# Remove a line to revoke a key; a running coordinator notices within three seconds.\n",
       to_text(role), is_client ? " [RIGHTS]" : "",
       is_client ? "# RIGHTS: a comma list of observe, submit (and control what the same NAME\n"
-                  "# submitted), control (everybody's campaigns); observe,submit if left out.\n"
+                  "# submitted), control (everybody's campaigns; release hosts);\n"
+                  "# observe,submit if left out.\n"
                 : "");
 }
 

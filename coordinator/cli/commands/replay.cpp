@@ -87,8 +87,10 @@ void check_arguments(const ReplayOptions& options) {
     throw UsageError(fmt::format("worst = {} (must not be given with --run)", *options.num_worst));
   }
   std::error_code ignored;
-  if (options.has_directory() && std::filesystem::exists(options.output, ignored) &&
-      !std::filesystem::is_directory(options.output, ignored)) {
+  const bool is_other =
+      options.output == "-" || (std::filesystem::exists(options.output, ignored) &&
+                                !std::filesystem::is_directory(options.output, ignored));
+  if (options.has_directory() && is_other) {
     refuse_output(options.output, "must be a directory for csv and --worst");
   }
 }

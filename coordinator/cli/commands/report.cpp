@@ -307,11 +307,13 @@ void add_plot(CLI::App& app, Command& chosen) {
       app, chosen, "plot", "Draw a chart of the review report as a picture", plot);
   command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
-  command.add_option("--chart", options.chart,
-                     fmt::format("Which one, as in errors or histogram:{};\nsee --list",
-                                 example_quantity(example_results()).name));
-  add_path(command, wire::file_type, "--output", options.output,
-           "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output");
+  command.add_option(
+      "--chart", options.chart,
+      fmt::format("Which one, as in errors or histogram:{};\nsee --list; needed without it",
+                  example_quantity(example_results()).name));
+  add_path(
+      command, wire::file_type, "--output", options.output,
+      "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output; needed without --list");
   command.add_flag("--list", options.is_list, "Print the names of all charts");
   add_force_flag(command, options.if_there);
 }

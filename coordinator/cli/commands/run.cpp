@@ -145,8 +145,9 @@ std::unique_ptr<Page> begin_page(const RunOptions& options, ProgressDisplay& dis
 /// What nobody needs to see while all goes well goes into the database only.
 Log log_to(ProgressDisplay& display) {
   return [&display](const Event& event) {
-    // StorageNotes tells of the storage.
-    if (event.severity != Severity::error || event.kind == "storage_failed") return;
+    // StorageNotes and end_interrupted() tell of the storage.
+    if (event.kind == "storage_failed" || event.kind == "results_not_stored") return;
+    if (event.severity != Severity::error) return;
     display.note("proofmass: error: " + to_text(event), Tone::bad);
   };
 }

@@ -148,6 +148,17 @@ TEST(Fitted, BreaksLinesThatATerminalHasNoRoomForBelowTheirBeginning) {
   EXPECT_EQ(fitted(std::string(90, ' ')), std::string(90, ' ') + "\n");
 }
 
+// People copy it.
+TEST(Fitted, BreaksNoWordOfACommand) {
+  const std::string file(90, 'f'), other(85, 'o');
+  EXPECT_EQ(
+      fitted("Losses    not tried; see `proofmass plan " + file + " --db " + other + "` of it"),
+      "Losses    not tried; see `proofmass plan\n          " + file + "\n          --db\n" +
+          "          " + other + "`\n          of it\n");
+  EXPECT_EQ(fitted("run `" + file + "` " + other),
+            "run\n  `" + file + "`\n  " + other.substr(0, 77) + "\n  " + other.substr(77) + "\n");
+}
+
 TEST(SentenceMarkup, ShowsCommandsAsCode) {
   EXPECT_EQ(sentence_markup("run `a <b>` or `c`: it's"),
             "run <code>a &lt;b&gt;</code> or <code>c</code>: it&#39;s");
