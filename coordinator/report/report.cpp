@@ -368,7 +368,8 @@ std::string note_of(const Campaign& campaign, const Store& store, const JudgedRu
 
 Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDepth depth,
                          std::vector<StatedRequirement> stated) {
-  const JudgedRuns judged = judged_runs(store.finished_runs(), store.given_up_runs());
+  const std::vector<RunRange> finished = store.finished_runs();
+  const JudgedRuns judged = judged_runs(finished, store.given_up_runs());
   Review review{.name = store.name(),
                 .seed = store.seed(),
                 .num_runs = store.num_runs(),
@@ -386,8 +387,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
                 .why_not_independent = why_not_independent(campaign),
                 .num_contradicting = store.num_contradicting()};
   const bool are_independent = review.why_not_independent.empty();
-  ErrorFigures figures(review.objectives.size(), num_runs_in(store.finished_runs()),
-                       are_independent);
+  ErrorFigures figures(review.objectives.size(), num_runs_in(finished), are_independent);
   VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives, judged,
                             store.num_runs_fixed(), review.budget);
   review.results = read_checked_results(
