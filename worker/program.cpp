@@ -13,6 +13,7 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <new>
 #include <span>
 #include <string>
 #include <utility>
@@ -186,10 +187,21 @@ std::string text_of(const Cards& cards) {
   return text;
 }
 
+/// Where they are not there, a driver may be loaded before a service starts the worker again, but
+/// not before a campaign does.
+std::vector<CudaCard> cards_of(const Options& options) {
+  try {
+    return cuda_cards_of(options.gpus);
+  } catch (const DeviceError& error) {
+    if (options.parent) throw InvalidArgument(error.what());
+    throw;
+  }
+}
+
 /// Opens the cards that the options name and has each prove that it computes as processors do.
 Cards open_cards(const Options& options, std::uint64_t reference_digest, const wire::Log& log) {
   Cards cards;
-  for (const CudaCard& card : cuda_cards_of(options.gpus)) {
+  for (const CudaCard& card : cards_of(options)) {
     auto device = std::make_shared<CudaDevice>(card);
     const std::optional<Model::DeviceProof> proof = built_in_model().prove(*device);
     if (!proof) throw InvalidArgument("gpu = " + options.gpus + " (this build has no kernels)");
@@ -327,6 +339,10 @@ int reporting_errors(const Program& program, const std::function<int()>& what) {
     return fail(error, exit_usage);
   } catch (const DeviceError& error) {
     exit_at_once(fail(error, exit_failed));
+  } catch (const std::bad_alloc&) {
+    return fail(Error("memory = too little (raise `ulimit -v`, or the limit of the service, "
+                      "container or job)"),
+                exit_failed);
   } catch (const std::exception& error) {
     return fail(error, exit_failed);
   }
