@@ -6,13 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <map>
 #include <memory>
+#include <new>
 #include <span>
 #include <string>
 #include <utility>
@@ -42,25 +42,6 @@ constexpr unsigned threads_max = 256;
 /// The year 2286: ten digits, so that a time in milliseconds is refused.
 constexpr std::int64_t end_time_unix_s_max = 9'999'999'999;
 
-constexpr std::uint64_t seconds_max = std::uint64_t{366} * 24 * 3600;
-
-/// Seconds in the unit; nothing if there is no such unit.
-std::optional<std::uint64_t> seconds_in(std::string_view unit) {
-  static const std::map<std::string_view, std::uint64_t> units{
-      {"", 1}, {"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86400}};
-  const auto found = units.find(unit);
-  return found == units.end() ? std::nullopt : std::optional(found->second);
-}
-
-/// Declares an option whose value is a time.
-template <typename Target>
-CLI::Option* add_duration(CLI::App& app, const std::string& name, Target& target,
-                          const std::string& description) {
-  return app.add_option_function<std::string>(
-      "--" + name, [name, &target](const std::string& text) { target = duration_from(name, text); },
-      description);
-}
-
 void add_connection(CLI::App& app, Options& options) {
   app.add_option("--connect", options.serving.endpoint,
                  "Where the coordinator listens, ipc://PATH or\ntcp://HOST:PORT")
@@ -73,8 +54,8 @@ void add_connection(CLI::App& app, Options& options) {
                "Allow an address beyond this machine without\nkeys: on a network that you trust");
   app.add_option("--name", options.name, "Name in logs and database; HOST-PID by default")
       ->envname("PROOFMASS_NAME");
-  add_duration(app, "give-up-after", options.give_up_after,
-               "How long the coordinator may be silent; 1h by\ndefault")
+  wire::add_duration(app, "--give-up-after", options.give_up_after,
+                     "How long the coordinator may be silent; 1h by\ndefault")
       ->envname("PROOFMASS_GIVE_UP_AFTER");
 }
 
@@ -96,18 +77,18 @@ void add_work(CLI::App& app, Options& options) {
                  "File for results that are not acknowledged\nwhen the worker ends")
       ->type_name(wire::file_type)
       ->envname("PROOFMASS_SPOOL");
-  add_duration(app, "max-walltime", options.walltime_max,
-               "Time after which the worker must have ended,\ne.g. 3600, 90m, 2h")
+  wire::add_duration(app, "--max-walltime", options.walltime_max,
+                     "Time after which the worker must have ended,\ne.g. 3600, 90m, 2h")
       ->envname("PROOFMASS_MAX_WALLTIME");
   app.add_option("--end-time", options.end_time_unix_s,
                  "When the worker must have ended, in seconds\nsince 1970 (UTC), as Slurm sets it")
       ->envname("SLURM_JOB_END_TIME")
       ->check(wire::in_range(std::int64_t{0}, end_time_unix_s_max));
-  add_duration(app, "idle-timeout", options.serving.conversation.idle_timeout,
-               "Leave after this time without a run; by default\nthe worker waits for work")
+  wire::add_duration(app, "--idle-timeout", options.serving.conversation.idle_timeout,
+                     "Leave after this time without a run; by default\nthe worker waits for work")
       ->envname("PROOFMASS_IDLE_TIMEOUT");
-  add_duration(app, "drain-time", options.serving.conversation.drain_time,
-               "Time to finish and deliver after SIGTERM; 100s\nby default")
+  wire::add_duration(app, "--drain-time", options.serving.conversation.drain_time,
+                     "Time to finish and deliver after SIGTERM; 100s\nby default")
       ->envname("PROOFMASS_DRAIN_TIME");
 }
 
@@ -137,18 +118,6 @@ unsigned num_threads_of(const Options& options, std::size_t num_cards) {
   if (options.num_threads) return *options.num_threads;
   const unsigned num_processors = std::min(wire::num_processors(), threads_max);
   return num_processors - std::min(num_processors - 1, static_cast<unsigned>(num_cards));
-}
-
-Duration duration_from(std::string_view option, std::string_view text) {
-  std::uint64_t count = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  const auto unit = seconds_in(text.substr(static_cast<std::size_t>(end - text.data())));
-  if (error != std::errc{} || !unit || count < 1 || count > seconds_max / *unit) {
-    throw InvalidArgument(
-        fmt::format("{} = {} (must be 1 or more, in seconds or with s, m, h or d; at most 366d)",
-                    option, text));
-  }
-  return std::chrono::seconds(count * *unit);
 }
 
 namespace {
@@ -186,10 +155,21 @@ std::string text_of(const Cards& cards) {
   return text;
 }
 
+/// Where they are not there, a driver may be loaded before a service starts the worker again, but
+/// not before a campaign does.
+std::vector<CudaCard> cards_of(const Options& options) {
+  try {
+    return cuda_cards_of(options.gpus);
+  } catch (const DeviceError& error) {
+    if (options.parent) throw InvalidArgument(error.what());
+    throw;
+  }
+}
+
 /// Opens the cards that the options name and has each prove that it computes as processors do.
 Cards open_cards(const Options& options, std::uint64_t reference_digest, const wire::Log& log) {
   Cards cards;
-  for (const CudaCard& card : cuda_cards_of(options.gpus)) {
+  for (const CudaCard& card : cards_of(options)) {
     auto device = std::make_shared<CudaDevice>(card);
     const std::optional<Model::DeviceProof> proof = built_in_model().prove(*device);
     if (!proof) throw InvalidArgument("gpu = " + options.gpus + " (this build has no kernels)");
@@ -327,6 +307,10 @@ int reporting_errors(const Program& program, const std::function<int()>& what) {
     return fail(error, exit_usage);
   } catch (const DeviceError& error) {
     exit_at_once(fail(error, exit_failed));
+  } catch (const std::bad_alloc&) {
+    return fail(Error("memory = too little (raise `ulimit -v`, or the limit of the service, "
+                      "container or job)"),
+                exit_failed);
   } catch (const std::exception& error) {
     return fail(error, exit_failed);
   }

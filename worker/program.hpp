@@ -46,10 +46,6 @@ void add_options(CLI::App& app, Options& options);
 /// Threads that simulate, beside those that serve cards.
 [[nodiscard]] unsigned num_threads_of(const Options& options, std::size_t num_cards);
 
-/// A time such as `90`, `90s`, `15m`, `2h` or `1d`.
-/// @throws InvalidArgument reading `option = text (must be ...)`.
-[[nodiscard]] Duration duration_from(std::string_view option, std::string_view text);
-
 /// What makes one worker program differ from another.
 struct Program {
   std::string name;                      ///< In the log and in error messages.

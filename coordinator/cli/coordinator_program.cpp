@@ -128,7 +128,6 @@ class NoticeCommands {
   std::vector<Running> running_;
 };
 
-constexpr double drain_time_s_max = 366.0 * 86400.0;
 constexpr std::chrono::seconds command_wait_max(60);
 constexpr std::uint64_t memory_mib_min = 64;
 constexpr std::uint64_t memory_mib_max = std::uint64_t{1} << 24;
@@ -139,7 +138,6 @@ constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
 struct ServeOptions {
   std::filesystem::path directory;      ///< Of the campaign databases.
   ServiceConfig service;                ///< As far as options set it; see config_of().
-  double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
   PageConfig page;
   NoticeCommands::Config commands;
@@ -199,8 +197,6 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
     wire::check_endpoint("--bind-clients, by default in --directory,", *config.clients_endpoint,
                          wire::EndpointUse::bind, wire::Protection::none);
   }
-  config.drain_max =
-      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));
   config.memory_size_max = options.memory_mib_max << 20;
   config.files = &folder;
   config.directory = &folder;
@@ -309,8 +305,9 @@ void add_service(CLI::App& app, ServeOptions& options) {
   app.add_flag_callback(
       "--exit-when-done", [&end = options.service.end] { end = ServiceEnd::when_done; },
       "End when every campaign is finished");
-  add_number(app, "--drain-time", options.drain_time_s, {0.0, drain_time_s_max},
-             "Seconds that workers have after SIGTERM to\ndeliver what they hold");
+  wire::add_duration(
+      app, "--drain-time", options.service.drain_max,
+      "Time that workers have after SIGTERM to deliver\nwhat they hold; 120s by default");
   add_number(app, "--memory-max", options.memory_mib_max, {memory_mib_min, memory_mib_max},
              "Memory in MiB; near this limit it closes all\nconnections, and peers connect again")
       ->envname("PROOFMASS_MEMORY_MAX");

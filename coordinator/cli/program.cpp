@@ -130,6 +130,15 @@ void let_stop_signals_kill() {
 
 std::optional<int> refused_model(int argc, char** argv, std::string_view program,
                                  wire::Broken broken) {
+  const auto fail = [&](const Error& error, ExitCode exit_code) {
+    wire::say(fmt::format("{}: error: {}\n", program, wire::visible_text(error.what())));
+    return exit_code;
+  };
+  try {
+    wire::settle_surroundings();  // The pipes of a program are to be no standard descriptors.
+  } catch (const Error& error) {
+    return fail(error, exit_cannot_be_done);
+  }
   try {
     const auto say = [&](const std::string& what) {
       wire::say(fmt::format("{}: {}\n", program, wire::visible_text(what)));
@@ -139,8 +148,7 @@ std::optional<int> refused_model(int argc, char** argv, std::string_view program
     }
     return std::nullopt;
   } catch (const Error& error) {
-    wire::say(fmt::format("{}: error: {}\n", program, wire::visible_text(error.what())));
-    return exit_wrong_usage;
+    return fail(error, exit_wrong_usage);
   }
 }
 

@@ -234,8 +234,13 @@ void add_step_time(State& state, const HostId& host, const Progress& before,
 
 /// How long a batch may take for a step, by what this host has shown: others may say anything.
 /// Before anything is known, as if a step usually took a tenth of what is waited at least; a run
-/// takes longer than any of its steps.
+/// takes longer than any of its steps. A model program is ended by its worker if it takes longer
+/// than it may.
 Duration patience(const State& state, const Worker& worker, CampaignId id) {
+  const auto campaign = state.campaigns.find(id);
+  const bool is_of_program =
+      campaign != state.campaigns.end() && campaign->second.model.description_digest != 0;
+  if (is_of_program) return Duration::max();
   const DispatchConfig& config = state.config;
   const std::map<CampaignId, double>& steps = state.hosts.at(worker.host).step_time_s;
   double step_time_s = 0.1 * seconds(config.hung_after_min);

@@ -185,8 +185,11 @@ void StoreWriter::fold(wire::CampaignId campaign, Lock& lock) {
     open_file.is_fold_due = true;
     open_file.be_due(std::chrono::steady_clock::now() + config_.retry_after);
   }
-  if (reason.has_value() == open_file.is_log_kept) return;
-  open_file.is_log_kept = reason.has_value();
+  // One failure is that of a short reader, such as the answer to whoever waited for the campaign.
+  constexpr int num_failures_said = 2;
+  const int num_before =
+      std::exchange(open_file.num_folds_failed, reason ? open_file.num_folds_failed + 1 : 0);
+  if (reason ? num_before + 1 != num_failures_said : num_before < num_failures_said) return;
   completions_.emplace_back(FileEvent{
       .campaign = campaign,
       .event = reason ? wire::Event::warning("write_ahead_log_kept", {wire::Field::reason(*reason)})

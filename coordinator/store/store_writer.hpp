@@ -134,7 +134,7 @@ class StoreWriter {
     std::set<wire::SessionId> known;  // Workers of which the file has no end yet.
     bool is_rest_wanted = false;      // Nothing more is expected.
     bool is_fold_due = false;         // The log is to be folded in, once nothing waits.
-    bool is_log_kept = false;         // A reader keeps the log from that, as was last said.
+    int num_folds_failed = 0;         // In a row: a reader keeps the log from that.
 
     [[nodiscard]] bool is_written_out() const { return writing.empty() && waiting.empty(); }
     /// Sets `due`, unless something sooner is.

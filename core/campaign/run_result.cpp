@@ -16,8 +16,10 @@ std::string_view name_at(const std::vector<std::string_view>& names, std::uint32
 }
 
 std::string loss_text(const ResultSchema& schema, const Loss& loss) {
-  return fmt::format("{} in {}", name_at(schema.loss_causes, loss.cause),
-                     name_at(schema.loss_sessions, loss.session));
+  const std::string_view cause = name_at(schema.loss_causes, loss.cause);
+  // The only cause that a model program has: it tells that a run is lost, and not why.
+  if (cause == "program") return "said by the model program";
+  return fmt::format("{} in {}", cause, name_at(schema.loss_sessions, loss.session));
 }
 
 std::optional<std::size_t> find_quantity(const ResultSchema& schema, std::string_view name) {

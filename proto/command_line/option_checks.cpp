@@ -21,10 +21,14 @@
 namespace proofmass::wire {
 namespace {
 
-// CLI11 says `name: ` before what a check says.
-std::string with_equals_sign(std::string text) {
-  if (const std::size_t colon = text.find(": "); colon != text.npos) text.replace(colon, 1, " =");
-  return text;
+constexpr std::uint64_t seconds_max = std::uint64_t{366} * 24 * 3600;
+
+/// Seconds in the unit; nothing if there is no such unit.
+std::optional<std::uint64_t> seconds_in(std::string_view unit) {
+  static const std::map<std::string_view, std::uint64_t> units{
+      {"", 1}, {"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86400}};
+  const auto found = units.find(unit);
+  return found == units.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::string with_nearest(std::string rule, std::string_view name,
@@ -60,6 +64,24 @@ const CLI::App* command_of(const CLI::App& app, const std::string& name) {
 const CLI::App& chosen_command(const CLI::App& app) {
   const std::vector<CLI::App*> chosen = app.get_subcommands();
   return chosen.empty() ? app : *chosen.front();
+}
+
+/// Where the value of an option is from: the variable that has it, or the option.
+std::string source_of(const CLI::App& command, const std::string& name) {
+  const CLI::Option* const option = command.get_option_no_throw(name);
+  if (option == nullptr || option->get_envname().empty()) return name;
+  const char* const value = std::getenv(option->get_envname().c_str());
+  const bool is_from_variable =
+      value != nullptr && option->results() == std::vector<std::string>{value};
+  return is_from_variable ? option->get_envname() : name;
+}
+
+/// @param text  Of CLI11, which says `name: ` before what a check says.
+std::string refusal_of_value(const CLI::App& app, const std::string& text) {
+  const std::size_t colon = text.find(": ");
+  if (colon == text.npos) return text;
+  return fmt::format("{} ={}", source_of(chosen_command(app), text.substr(0, colon)),
+                     text.substr(colon + 1));
 }
 
 /// `usage: proofmass query [OPTIONS] DB SQL`
@@ -159,6 +181,15 @@ class OptionFile : public CLI::ConfigTOML {
 
 }  // namespace
 
+std::optional<std::chrono::seconds> duration_from(std::string_view text) {
+  std::uint64_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  const auto unit = seconds_in(text.substr(static_cast<std::size_t>(end - text.data())));
+  if (error != std::errc{} || !unit || count < 1 || count > seconds_max / *unit)
+    return std::nullopt;
+  return std::chrono::seconds(count * *unit);
+}
+
 void refuse_options_as_values(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands(nullptr)) {
     for (CLI::Option* option : command->get_options(nullptr)) {
@@ -192,7 +223,8 @@ void add_option_file(CLI::App& app, const std::string& description, const std::s
 
 std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
-  if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr) return with_equals_sign(text);
+  if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr)
+    return refusal_of_value(app, text);
   const bool needs_command = app.get_require_subcommand_min() > 0;
   if (needs_command && app.get_subcommands().empty() && app.remaining_size() > 0) {
     const std::string name = app.remaining().front();
@@ -214,8 +246,13 @@ std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
   if (is_missing && !text.starts_with('-') && !app.get_subcommands().empty()) {
     return fmt::format("{}; {}", text, usage_of(chosen_command(app)));
   }
-  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr && text.ends_with(" missing")) {
-    return fmt::format("option = {} (needs a value behind it)", text.substr(0, text.find(':')));
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    const std::string name = text.substr(0, text.find(':'));
+    if (text.ends_with(" missing"))
+      return fmt::format("option = {} (needs a value behind it)", name);
+    if (text.find(": At Most 1 ") != text.npos) {
+      return fmt::format("option = {} (must be given once)", name);
+    }
   }
   if (dynamic_cast<const CLI::ConfigError*>(&error) != nullptr) return refusal_of_file(app, text);
   if (dynamic_cast<const CLI::FileError*>(&error) != nullptr) {

@@ -4,7 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <chrono>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -34,6 +36,24 @@ template <typename Number>
     return fmt::format("{} (must be {}in [{}, {}])", text, kind, minimum, maximum);
   };
   return CLI::Validator(check, fmt::format("[{}, {}]", minimum, maximum), "in_range");
+}
+
+/// A time such as `90`, `90s`, `15m`, `2h` or `1d`, from 1 s to 366 d; nothing if it is none.
+[[nodiscard]] std::optional<std::chrono::seconds> duration_from(std::string_view text);
+
+/// Declares an option whose value is such a time.
+/// @param target  Lives as long as the command.
+template <typename Target>
+CLI::Option* add_duration(CLI::App& command, const std::string& name, Target& target,
+                          const std::string& description) {
+  const auto check = [](const std::string& text) {
+    if (duration_from(text)) return std::string();
+    return text + " (must be 1 or more, in seconds or with s, m, h or d; at most 366d)";
+  };
+  return command
+      .add_option_function<std::string>(
+          name, [&target](const std::string& text) { target = *duration_from(text); }, description)
+      ->check(CLI::Validator(check, "", "duration"));
 }
 
 /// Makes every option of the commands refuse the name of another one as its value, which shows that
@@ -68,7 +88,8 @@ void add_option_file(CLI::App& app, const std::string& description,
                      const std::string& variable = {});
 
 /// What to tell people whose arguments were refused: `option = value (rule)` where there is a
-/// value, `config = FILE:LINE (rule)` for a line of an option file.
+/// value, `VARIABLE = value (rule)` if it is from the environment, `config = FILE:LINE (rule)` for
+/// a line of an option file.
 [[nodiscard]] std::string refusal_of(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace proofmass::wire

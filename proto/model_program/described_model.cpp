@@ -190,7 +190,9 @@ std::string DescribedModel::why_no_runs() const {
 }
 
 std::unique_ptr<const Plan> DescribedModel::prepare(const DescribedCampaign& campaign) const {
-  if (prepare_) return prepare_(campaign);
+  if (prepare_) {
+    return prepare_(campaign, [this](auto loaded_at) { require_repeatable_since(loaded_at); });
+  }
   throw ModelProgramError(fmt::format("model = {} ({})", version(), why_no_runs()));
 }
 
@@ -198,11 +200,15 @@ ResultSchema DescribedModel::results_of(std::string_view, std::string_view) cons
   return DescribedCampaign(*this).results();
 }
 
+std::unique_ptr<const Plan> DescribedModel::reference_plan() const {
+  return prepare_(DescribedCampaign(*this), {});
+}
+
 std::uint64_t DescribedModel::digest_of_reference_runs(std::uint64_t digest) const {
   const std::lock_guard lock(reference_mutex_);
   if (reference_runs_.empty()) {
     constexpr std::uint64_t num_runs = 3;
-    const std::unique_ptr<const Plan> plan = DescribedCampaign(*this).prepare();
+    const std::unique_ptr<const Plan> plan = reference_plan();
     std::vector<RunResult> runs;
     for (std::uint64_t run = 0; run < num_runs; ++run) {
       const RunRequest request{RunIndex{run}, {}};
@@ -227,10 +233,20 @@ std::uint64_t DescribedModel::former_reference_digest(std::string_view descripti
 }
 
 void DescribedModel::require_repeatable() const {
-  if (reference_digest_ || is_found_repeatable_) return;  // Once is enough.
+  if (reference_digest_) return;
   (void)reference_digest(best_instruction_set());
-  wire::require_repeatable(DescribedCampaign(*this), reference_runs_.back());
-  is_found_repeatable_ = true;
+  require_repeatable_since(std::chrono::steady_clock::time_point::min());
+}
+
+// The process that computes the run again is younger than the one in question, so that its code is
+// the same or newer. One after the other: each may need as much memory as the program does.
+void DescribedModel::require_repeatable_since(
+    std::chrono::steady_clock::time_point loaded_at) const {
+  const std::lock_guard lock(reference_mutex_);
+  if (reference_runs_.empty() || (repeated_at_ && *repeated_at_ >= loaded_at)) return;
+  const auto began_at = std::chrono::steady_clock::now();
+  wire::require_repeatable(DescribedCampaign(*this), *reference_plan(), reference_runs_.back());
+  repeated_at_ = began_at;
 }
 
 void require_repeatable(const Model& model) {
@@ -238,17 +254,17 @@ void require_repeatable(const Model& model) {
   if (described != nullptr) described->require_repeatable();
 }
 
-void require_repeatable(const Campaign& campaign, const RunResult& result) {
+void require_repeatable(const Campaign& campaign, const Plan& plan, const RunResult& result) {
   const RunRequest request{result.run, campaign.table_values(result.run)};
-  const std::vector<RunResult> again =
-      campaign.prepare()->simulate_batch({&request, 1}, best_instruction_set());
+  const std::vector<RunResult> again = plan.simulate_batch({&request, 1}, best_instruction_set());
   if (again.front().status == result.status && again.front().estimate == result.estimate &&
       again.front().standard_error == result.standard_error) {
     return;
   }
-  throw ModelProgramError(fmt::format(
-      "model = {} (run {} has another result when its program is started again: an "
-      "answer must follow from its question alone, random numbers from the seeds in it)",
+  throw ModelProgramChanged(fmt::format(
+      "model = {} (run {} has another result when its program is started again: its code has "
+      "changed, or an answer follows from more than its question, such as random numbers without "
+      "its seeds)",
       campaign.model().version(), result.run.value));
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -28,6 +29,13 @@ namespace proofmass::wire {
 
 /// A model program cannot be started, ended, is silent, answers what it must not, or is not there.
 class ModelProgramError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// The code of a model program is no longer that of its reference runs: no result of it may count
+/// for their digest, and only a process that computes them anew can go on.
+class ModelProgramChanged : public Error {
  public:
   using Error::Error;
 };
@@ -152,10 +160,15 @@ class DescribedCampaign final : public Campaign {
   std::vector<double> objectives_;
 };
 
+/// Called with the time by which a process of a program had loaded its code.
+using OnProcessStart = std::function<void(std::chrono::steady_clock::time_point loaded_at)>;
+
 /// What a description lacks, the program itself: it makes a plan, whose batches throw ConfigError
 /// naming the parameter that the program refuses, if it does.
-using PrepareProgram =
-    std::function<std::unique_ptr<const Plan>(const DescribedCampaign& campaign)>;
+///
+/// @param on_start  For each process before it computes runs.
+using PrepareProgram = std::function<std::unique_ptr<const Plan>(const DescribedCampaign& campaign,
+                                                                 OnProcessStart on_start)>;
 
 /// A model that a description tells of, with its program or without: then it does all that needs no
 /// simulation.
@@ -191,11 +204,16 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::unique_ptr<const Plan> prepare(const DescribedCampaign& campaign) const;
   /// Has the last of the reference runs computed again, once, see below.
   void require_repeatable() const;
+  /// The same for a process whose code was loaded by that time, unless it was done after that: the
+  /// code may have changed since the reference runs. If they are not computed, it does nothing.
+  void require_repeatable_since(std::chrono::steady_clock::time_point loaded_at) const;
   /// reference_digest() as older programs took it: of all that a description says.
   /// @pre The program is there.
   [[nodiscard]] std::uint64_t former_reference_digest(std::string_view description) const;
 
  private:
+  /// A plan for the reference runs, whose processes need not repeat them.
+  [[nodiscard]] std::unique_ptr<const Plan> reference_plan() const;
   /// Of the estimates of the reference runs, after what the digest begins with.
   [[nodiscard]] std::uint64_t digest_of_reference_runs(std::uint64_t digest) const;
 
@@ -206,7 +224,7 @@ class DescribedModel final : public Model {
   const std::optional<std::uint64_t> reference_digest_;  // As computed elsewhere.
   mutable std::mutex reference_mutex_;
   mutable std::vector<RunResult> reference_runs_;  // Empty: not computed yet.
-  mutable bool is_found_repeatable_ = false;
+  mutable std::optional<std::chrono::steady_clock::time_point> repeated_at_;  // When it began.
 };
 
 /// Refuses what is drawn under the name of a column of results, which would be confused with it,
@@ -217,10 +235,10 @@ class DescribedModel final : public Model {
 void check_names(const DescribedModel& model, const std::string& source);
 
 /// Has the run computed again by a process of the program that no other run came before.
-/// @param campaign  Of a model with its program.
-/// @throws ModelProgramError if the result is another one, which follows not from its question
+/// @param plan  New, of a campaign of a model with its program.
+/// @throws ModelProgramChanged if the result is another one, which follows not from its question
 ///         alone: then nobody could check it.
-void require_repeatable(const Campaign& campaign, const RunResult& result);
+void require_repeatable(const Campaign& campaign, const Plan& plan, const RunResult& result);
 /// Of a reference run of the model, if that is a program.
 void require_repeatable(const Model& model);
 

@@ -11,7 +11,6 @@
 
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/link/machine.hpp"
 #include "proto/model_program/program_model.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -60,7 +59,6 @@ std::vector<std::string> choose_models(int argc, const char* const* argv, Broken
     if (named.empty()) throw InvalidArgument("model-program = \"\" (must name a file)");
     const std::filesystem::path program = std::filesystem::absolute(named).lexically_normal();
     if (std::ranges::find(chosen, program, &ChosenModel::program) != chosen.end()) continue;
-    settle_surroundings();  // Its pipes are to be no standard descriptors.
     std::unique_ptr<const Model> model;
     try {
       model = model_of(program, [&] {

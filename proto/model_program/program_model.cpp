@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -43,24 +44,12 @@ void expect_accepted(std::string_view answer, const std::filesystem::path& progr
                   program.string(), excerpt_of(answer)));
 }
 
-/// The program as it was loaded, with its reference digest.
-struct LoadedProgram {
-  std::filesystem::path path;
-  std::filesystem::file_time_type written;
-};
-
-/// The least time there is where it cannot be told.
-std::filesystem::file_time_type time_written(const std::filesystem::path& program) {
-  std::error_code error;
-  return std::filesystem::last_write_time(program, error);
-}
-
-/// @throws ModelProgramError
+/// @throws ModelProgramChanged
 void expect_same(std::string_view answer, const ProgramDescription& loaded,
                  const std::filesystem::path& program) {
   const ProgramDescription now = description_in(answer, program.string() + ": description");
   if (now.text == loaded.text) return;
-  throw ModelProgramError(fmt::format(
+  throw ModelProgramChanged(fmt::format(
       "model program = {} (describes {} now, and not {} as when it was loaded: start what "
       "runs it anew)",
       program.string(), now.version, loaded.version));
@@ -111,21 +100,14 @@ class FreshProcesses {
 
 /// A process of the program that has accepted the parameters of a campaign. None is asked to accept
 /// others after its first ones.
-/// @throws ModelProgramError also if the file was replaced: other runs might be computed.
-std::unique_ptr<ProgramProcess> prepared_process(const LoadedProgram& loaded,
+/// @throws ModelProgramError, or ModelProgramChanged if it describes itself otherwise.
+std::unique_ptr<ProgramProcess> prepared_process(const std::filesystem::path& program,
                                                  const DescribedCampaign& campaign) {
-  const std::filesystem::path& program = loaded.path;
   const ProgramDescription& of = campaign.description();
   const std::string question = prepare_question(campaign);
   FreshProcess fresh = FreshProcesses::instance().take(program);
   if (fresh.process && fresh.prepared == question) return std::move(fresh.process);
   if (!fresh.process || !fresh.prepared.empty()) {
-    if (time_written(program) != loaded.written) {
-      throw ModelProgramError(fmt::format(
-          "model program = {} (was written anew after it was loaded, so that its runs may be "
-          "others: start what runs it anew)",
-          program.string()));
-    }
     fresh.process = std::make_unique<ProgramProcess>(program, of.limits);
     fresh.process->ask({describe_question()},
                        [&](std::string_view answer) { expect_same(answer, of, program); });
@@ -139,12 +121,13 @@ std::unique_ptr<ProgramProcess> prepared_process(const LoadedProgram& loaded,
 /// Processes of a program that have been told the parameters, each for one thread at a time.
 class ProgramPlan final : public Plan {
  public:
-  ProgramPlan(LoadedProgram program, const DescribedCampaign& campaign)
-      : program_(std::move(program)), campaign_(campaign) {}
+  ProgramPlan(std::filesystem::path program, const DescribedCampaign& campaign,
+              OnProcessStart on_start)
+      : program_(std::move(program)), campaign_(campaign), on_start_(std::move(on_start)) {}
   ~ProgramPlan() override {
     if (has_computed_ || idle_.empty()) return;
-    FreshProcesses::instance().keep(program_.path, {.process = std::move(idle_.back()),
-                                                    .prepared = prepare_question(campaign_)});
+    FreshProcesses::instance().keep(
+        program_, {.process = std::move(idle_.back()), .prepared = prepare_question(campaign_)});
   }
 
   [[nodiscard]] std::vector<RunResult> simulate_batch(
@@ -162,8 +145,9 @@ class ProgramPlan final : public Plan {
   [[nodiscard]] std::string question_of(RunIndex run, const std::vector<double>& drawn) const;
   void read(std::string_view answer, RunResult& result) const;
 
-  const LoadedProgram program_;
+  const std::filesystem::path program_;
   const DescribedCampaign campaign_;
+  const OnProcessStart on_start_;
   const Recording recording_;
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<ProgramProcess>> idle_;
@@ -179,7 +163,9 @@ std::unique_ptr<ProgramProcess> ProgramPlan::take_process() const {
       return process;
     }
   }
-  return prepared_process(program_, campaign_);
+  std::unique_ptr<ProgramProcess> process = prepared_process(program_, campaign_);
+  if (on_start_) on_start_(std::chrono::steady_clock::now());
+  return process;
 }
 
 std::string ProgramPlan::question_of(RunIndex run, const std::vector<double>& drawn) const {
@@ -220,8 +206,7 @@ void ProgramPlan::read(std::string_view answer, RunResult& result) const {
   const auto refuse_as = [&](std::string_view what) {
     return [this, answer, run = result.run.value, what](std::string_view rule) {
       throw ModelProgramError(fmt::format("model program = {} (run {}: {} {}: {})",
-                                          program_.path.string(), run, what, rule,
-                                          excerpt_of(answer)));
+                                          program_.string(), run, what, rule, excerpt_of(answer)));
     };
   };
   Json json;
@@ -288,7 +273,6 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
   constexpr ProgramLimits while_describing{.answer_time_max_s = 60};
   const std::filesystem::path program = std::filesystem::absolute(path);
   const std::string source = program.string() + ": description";
-  const LoadedProgram loaded{.path = program, .written = time_written(program)};
   ProgramDescription description;
   auto process = std::make_unique<ProgramProcess>(program, while_describing);
   process->ask(
@@ -306,8 +290,9 @@ std::unique_ptr<const Model> model_of(const std::filesystem::path& path,
                     source, quantity.name, quantity.display_unit, quantity.unit));
   }
   auto model = std::make_unique<DescribedModel>(
-      std::move(description), std::nullopt, [loaded](const DescribedCampaign& campaign) {
-        return std::make_unique<const ProgramPlan>(loaded, campaign);
+      std::move(description), std::nullopt,
+      [program](const DescribedCampaign& campaign, OnProcessStart on_start) {
+        return std::make_unique<const ProgramPlan>(program, campaign, std::move(on_start));
       });
   check_names(*model, source);
   FreshProcesses::instance().keep(program, {.process = std::move(process), .prepared = ""});

@@ -94,30 +94,32 @@ TEST(WorkerOptions, MustBeOfTheKnownKinds) {
             "--end-time = noon (must be a whole number in [0, 9999999999])");
   EXPECT_EQ(error_with("--log-format", "xml"), "--log-format = xml (must be one of json, text)");
   EXPECT_EQ(error_with("--faults", "drop=2").substr(0, 15), "faults.drop = 2");  // Of tests alone.
-  EXPECT_EQ(error_with("--max-walltime", "5x"),
-            "max-walltime = 5x (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
+  EXPECT_EQ(
+      error_with("--max-walltime", "5x"),
+      "--max-walltime = 5x (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
 }
 
-TEST(DurationFrom, KnowsUnits) {
-  EXPECT_EQ(duration_from("t", "90"), 90s);
-  EXPECT_EQ(duration_from("t", "90s"), 90s);
-  EXPECT_EQ(duration_from("t", "15m"), 15min);
-  EXPECT_EQ(duration_from("t", "2h"), 2h);
-  EXPECT_EQ(duration_from("t", "366d"), 24h * 366);
+TEST(WorkerOptions, FromVariablesAreRefusedByTheirNames) {
+  const auto error_with = [](const char* variable, const char* value) {
+    setenv(variable, value, 1);
+    const std::string error = error_of({"--connect", "ipc:///tmp/a", "--idle-timeout", "1s"});
+    unsetenv(variable);
+    return error;
+  };
+  EXPECT_EQ(error_with("PROOFMASS_THREADS", "0"), "PROOFMASS_THREADS = 0 (must be in [1, 256])");
+  EXPECT_EQ(error_with("SLURM_JOB_END_TIME", "abc"),
+            "SLURM_JOB_END_TIME = abc (must be a whole number in [0, 9999999999])");
+  EXPECT_EQ(error_with("PROOFMASS_LOG_FORMAT", "xml"),
+            "PROOFMASS_LOG_FORMAT = xml (must be one of json, text)");
+  EXPECT_EQ(error_with("PROOFMASS_MAX_WALLTIME", "5y"),
+            "PROOFMASS_MAX_WALLTIME = 5y (must be 1 or more, in seconds or with s, m, h or d; at "
+            "most 366d)");
+  EXPECT_EQ(error_with("PROOFMASS_IDLE_TIMEOUT", "5y"), "none") << "an argument is there";
 }
 
-TEST(DurationFrom, RefusesWhatIsNoTime) {
-  for (const char* const text : {"", "0", "-1", "1.5h", "h", "1 h", "1H", "367d", "1h30m",
-                                 "99999999999999999999", "9999999999999999d", " 1"}) {
-    try {
-      (void)duration_from("drain-time", text);
-      ADD_FAILURE() << text;
-    } catch (const InvalidArgument& error) {
-      EXPECT_EQ(error.what(),
-                "drain-time = " + std::string(text) +
-                    " (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
-    }
-  }
+TEST(WorkerOptions, AreGivenOnce) {
+  EXPECT_EQ(error_of({"--connect", "ipc:///tmp/a", "--idle-timeout", "1s", "--idle-timeout", "2s"}),
+            "option = --idle-timeout (must be given once)");
 }
 
 struct Outcome {

@@ -121,17 +121,17 @@ std::vector<CudaCard> cuda_cards() {
 
 std::vector<CudaCard> cuda_cards_of(std::string_view text) {
   if (text == "none") return {};
-  const auto refusal = [text](const std::string& reason) {
-    return InvalidArgument(fmt::format("gpu = {} ({})", text, reason));
+  const auto refusal_text = [text](const std::string& reason) {
+    return fmt::format("gpu = {} ({})", text, reason);
   };
   if (text != "all" && (text.empty() || text.find_first_not_of("0123456789,") != text.npos)) {
-    throw refusal("must be none, all, or numbers of cards as in 0,1");
+    throw InvalidArgument(refusal_text("must be none, all, or numbers of cards as in 0,1"));
   }
   std::vector<CudaCard> others;
   try {
     others = cuda_cards();
   } catch (const DeviceError& error) {
-    throw refusal(error.what());
+    throw DeviceError(refusal_text(error.what()));
   }
   if (text == "all") return others;
   const std::size_t num_cards = others.size();
@@ -141,8 +141,8 @@ std::vector<CudaCard> cuda_cards_of(std::string_view text) {
     const auto card = std::ranges::find(
         others, number, [](const CudaCard& other) { return std::to_string(other.index); });
     if (card == others.end()) {
-      throw refusal(
-          fmt::format("must be different numbers below {}, of the cards here", num_cards));
+      throw InvalidArgument(refusal_text(
+          fmt::format("must be different numbers below {}, of the cards here", num_cards)));
     }
     chosen.push_back(std::move(*card));
     others.erase(card);

@@ -189,7 +189,7 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
   // The program that accepts the example may be the one that computes a run again.
   outlook.differences = campaign.differences_from(*example_campaign(campaign.model()));
   const bool is_program = !campaign.model().description().empty();
-  if (is_program) wire::require_repeatable(campaign, batch.results.back());
+  if (is_program) wire::require_repeatable(campaign, *campaign.prepare(), batch.results.back());
   const std::uint64_t each = campaign.num_realisations();
   const std::uint64_t num_instruments = (campaign.num_runs + each - 1) / each;
   for (; outlook.num_drawn < std::min(num_instruments, instruments_max) &&
@@ -340,20 +340,23 @@ std::vector<RunRequest> first_requests(const Campaign& campaign, std::size_t cou
   return requests;
 }
 
-/// Of a program beside this one, the time that passes: one run, and a batch if that is short.
+/// Of a program beside this one, the time that passes: one run, and a batch if that is short. The
+/// first run of a process may compile and load; if it is long, the time is that of another one.
 FirstBatch try_program(const Campaign& campaign, const Plan& plan) {
   using Clock = std::chrono::steady_clock;
   const InstructionSet set = best_instruction_set();
   (void)plan.simulate_batch({}, set);  // Starts it.
   FirstBatch batch;
-  for (const std::size_t count : {std::size_t{1}, campaign.model().batch_size()}) {
-    const std::vector<RunRequest> requests = first_requests(campaign, count);
+  double elapsed_s = 0.0;
+  for (const bool is_first : {true, false}) {
+    const bool is_single = is_first || elapsed_s > measured_s_max;
+    const std::vector<RunRequest> requests =
+        first_requests(campaign, is_single ? 1 : campaign.model().batch_size());
     const Clock::time_point start = Clock::now();
     batch.results = plan.simulate_batch(requests, set);
-    const double elapsed_s = std::chrono::duration<double>(Clock::now() - start).count();
+    elapsed_s = std::chrono::duration<double>(Clock::now() - start).count();
     batch.time_s = elapsed_s * static_cast<double>(campaign.model().batch_size()) /
                    static_cast<double>(requests.size());
-    if (elapsed_s > measured_s_max) break;
   }
   return batch;
 }

@@ -50,6 +50,19 @@ TEST_F(ModelsTest, AreNotCopiedToWorkersWithoutThem) {
   EXPECT_EQ(runs_held_text(state, second), "0..7");
 }
 
+// Its worker ends one that takes longer than its description allows, which may be a day.
+TEST_F(ModelsTest, ThatAreProgramsAreNotTakenForHung) {
+  add_campaign_of_other_model(one, 100);
+  add_worker_with_other(first, 4);
+  campaign(one).model.description_digest = 1;
+  for (int i = 0; i < 1000; ++i, now += std::chrono::seconds(5)) {
+    heartbeat(first, {held(one, {{0}, 8})}, {make_computed_batch(one, {{{0}, 1}}, 0)});
+    on_tick(state, now, outbox);
+    outbox.forget();
+  }
+  EXPECT_TRUE(state.workers.contains(first));
+}
+
 TEST_F(ModelsTest, MustComputeWhatTheyDidWhereTheCampaignBegan) {
   add_campaign_of_other_model(one, 10);
   say_hello(first, hello_with_other(1, 0x123));

@@ -191,6 +191,21 @@ TEST_F(StoreRest, TheWriterSaysThatAReaderKeepsTheLogAndWhenItIsFolded) {
   EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 1u);
 }
 
+// As an answer to whoever waited for the campaign is.
+TEST_F(StoreRest, TheWriterDoesNotSpeakOfAShortReader) {
+  StoreWriter& writer = serve(100);
+  {
+    const Reader reader(file());
+    writer.write(id, delivery_of(1));
+    writer.rest(id);
+    writer.flush();
+    EXPECT_EQ(test::text_in(file(), "SELECT is_log_needed FROM campaign"), "1");
+  }
+  writer.flush();
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 1u);
+  EXPECT_THAT(take_completions(), Not(Contains("write_ahead_log_kept")));
+}
+
 TEST_F(StoreRest, EndsForTheWriterWithTheNextResult) {
   StoreWriter& writer = serve(100);
   writer.rest(id);

@@ -21,6 +21,21 @@ TEST(OneOf, NamesTheWordsThatItTakes) {
   EXPECT_EQ(check("JSON"), "JSON (must be one of csv, json)");
 }
 
+TEST(DurationFrom, KnowsUnits) {
+  EXPECT_EQ(duration_from("90"), 90s);
+  EXPECT_EQ(duration_from("90s"), 90s);
+  EXPECT_EQ(duration_from("15m"), 15min);
+  EXPECT_EQ(duration_from("2h"), 2h);
+  EXPECT_EQ(duration_from("366d"), 24h * 366);
+}
+
+TEST(DurationFrom, RefusesWhatIsNoTime) {
+  for (const char* const text : {"", "0", "-1", "1.5h", "h", "1 h", "1H", "367d", "1h30m",
+                                 "99999999999999999999", "9999999999999999d", " 1"}) {
+    EXPECT_EQ(duration_from(text), std::nullopt) << text;
+  }
+}
+
 /// What a program with `run --runs N` and `report` says of these arguments.
 std::string refusal(const std::string& arguments) {
   CLI::App app("", "program");

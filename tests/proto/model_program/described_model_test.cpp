@@ -128,13 +128,14 @@ TEST(RecordedModel, IsTheSameWithOtherLimits) {
   EXPECT_NE(digest, 0U);
 }
 
-/// Of a program that estimates 1.5 in each run.
+/// Of a program that estimates 1.5 in each run, or what it was changed to.
 class FixedPlan final : public Plan {
  public:
+  explicit FixedPlan(double estimate = 1.5) : estimate_(estimate) {}
   [[nodiscard]] std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet,
       const std::function<void(int)>&) const override {
-    return {{.run = requests.front().run, .truth = {1.0}, .estimate = {1.5}}};
+    return {{.run = requests.front().run, .truth = {1.0}, .estimate = {estimate_}}};
   }
   [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink&,
                                  const std::function<void(int)>&) const override {
@@ -144,15 +145,18 @@ class FixedPlan final : public Plan {
   [[nodiscard]] int num_steps() const override { return 1; }
 
  private:
+  const double estimate_;
   const Recording recording_;
 };
 
 // Campaigns that older programs began go on.
 TEST(ReferenceDigest, OfAnOlderProgramHadLimitsInIt) {
   const auto model_with = [](const std::string& limit) {
-    return std::make_unique<DescribedModel>(
-        description_in(description(limit), "test"), std::nullopt,
-        [](const DescribedCampaign&) { return std::make_unique<const FixedPlan>(); });
+    return std::make_unique<DescribedModel>(description_in(description(limit), "test"),
+                                            std::nullopt,
+                                            [](const DescribedCampaign&, const OnProcessStart&) {
+                                              return std::make_unique<const FixedPlan>();
+                                            });
   };
   const auto before = model_with(R"("run_time_max_s": 2)"), now = model_with(R"("purpose": "P.")");
   const auto set = InstructionSet::scalar;
@@ -168,6 +172,32 @@ TEST(ReferenceDigest, OfAnOlderProgramHadLimitsInIt) {
   EXPECT_EQ(current_reference_digest(ruler(record.description), record), former);
   record.reference_digest = 0x1234;
   EXPECT_EQ(current_reference_digest(*now, record), 0x1234U);
+}
+
+// Whoever has told others of the digest must not compute with other code.
+TEST(ReferenceRuns, AreRepeatedForEachProcessOfWhichNothingIsKnown) {
+  double estimate = 1.5;
+  int num_repetitions = -1;  // The first plan is that of the reference runs.
+  OnProcessStart on_start;
+  const DescribedModel model(description_in(description(), "test"), std::nullopt,
+                             [&](const DescribedCampaign&, const OnProcessStart& called) {
+                               if (called) on_start = called;
+                               if (!called) ++num_repetitions;
+                               return std::make_unique<const FixedPlan>(estimate);
+                             });
+  (void)example_of(model)->prepare();
+  const auto first = std::chrono::steady_clock::now(), second = first + 1h;
+  on_start(first);
+  EXPECT_EQ(num_repetitions, -1) << "nobody knows of a digest";
+  (void)model.reference_digest(InstructionSet::scalar);
+  on_start(first);
+  on_start(first);
+  EXPECT_EQ(num_repetitions, 1) << "its code is no newer than that of the repetition";
+  on_start(second);
+  EXPECT_EQ(num_repetitions, 2);
+  estimate = 1.75;
+  EXPECT_THAT([&] { on_start(second); },
+              ThrowsMessage<ModelProgramChanged>(HasSubstr("its code has changed")));
 }
 
 /// What is wrong with the names of a model program.
