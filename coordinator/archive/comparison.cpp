@@ -230,8 +230,9 @@ std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
 
 std::string why_not_compared(const ComparedCampaign& first, const ComparedCampaign& second,
                              const CampaignComparison& comparison) {
-  if (comparison.is_paired() && comparison.num_pairs == 0) {
-    return "no run has an estimate in both";
+  if (comparison.is_paired() && comparison.num_pairs < 2) {
+    return comparison.num_pairs == 0 ? "no run has an estimate in both"
+                                     : "one run has an estimate in both (must be at least 2)";
   }
   const std::size_t a = comparison.first.num_estimated, b = comparison.second.num_estimated;
   if (!comparison.is_paired() && std::min(a, b) < 2) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <regex>
 #include <span>
 #include <string>
@@ -192,8 +193,10 @@ namespace {
 constexpr std::array mantissas{1.0, 2.0, 5.0};
 constexpr std::string_view minus_sign = "\u2212";
 
-/// Correctly rounded: std::pow is not the same on every machine.
-double power_of_ten(int exponent) { return std::stod(fmt::format("1e{}", exponent)); }
+/// Correctly rounded, also where it is subnormal: std::pow is not the same on every machine.
+double power_of_ten(int exponent) {
+  return std::strtod(fmt::format("1e{}", exponent).c_str(), nullptr);
+}
 
 /// The largest k with 10ᵏ ≤ value. @pre value > 0 and finite.
 int decade_of(double value) {

@@ -38,7 +38,8 @@ std::string with_powers_of_ten(const std::string& text) {
   std::smatch found;
   auto begin = text.begin();
   for (; std::regex_search(begin, text.end(), found, program_spelling); begin = found[0].second) {
-    result += found.prefix().str() + figure_text(std::stod(found.str()));
+    // Unlike std::stod this takes subnormal numbers.
+    result += found.prefix().str() + figure_text(std::strtod(found.str().c_str(), nullptr));
   }
   return result + std::string(begin, text.end());
 }

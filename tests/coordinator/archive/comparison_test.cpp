@@ -315,6 +315,9 @@ TEST(Comparison, OfTooFewRunsIsOfTheDefinitionsAlone) {
   second.campaign.seed = 2;
   EXPECT_EQ(compare_campaigns(first, second).why_not_compared,
             "5 and 1 runs with an estimate (must be at least 2)");
+  first = second = side(1);
+  EXPECT_EQ(compare_campaigns(first, second).why_not_compared,
+            "one run has an estimate in both (must be at least 2)");
   first = second = side(2);
   for (RunResult& result : second.results) result.status = RunStatus::not_finite;
   const CampaignComparison comparison = compare_campaigns(first, second);

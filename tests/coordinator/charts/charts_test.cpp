@@ -113,6 +113,12 @@ Chart curve(std::vector<Point> points, Scale scale) {
           .layers = {Curve{.name = "", .points = std::move(points), .ink = Ink::third}}};
 }
 
+TEST(Line, IsDrawnOfSubnormalValues) {
+  Chart chart = curve({{1.0, 1e-310}, {2.0, 3e-310}}, Scale::linear);
+  chart.y.to = 4e-310;
+  EXPECT_THAT(points_of(svg_of(chart, SvgUse::file), "#008f68"), SizeIs(2));
+}
+
 // Powers of ten are equally far apart on a logarithmic axis, and its lower end is at the left.
 TEST(Line, FollowsALogarithmicAxis) {
   const std::string svg =
