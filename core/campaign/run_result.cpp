@@ -17,8 +17,8 @@ std::string_view name_at(const std::vector<std::string_view>& names, std::uint32
 
 std::string loss_text(const ResultSchema& schema, const Loss& loss) {
   const std::string_view cause = name_at(schema.loss_causes, loss.cause);
-  // The only cause that a model program has: it tells that a run is lost, and not why.
-  if (cause == "program") return "said by the model program";
+  // The only cause of model programs and imports: they tell that a run is lost, and not why.
+  if (cause == "program") return "said by the model";
   return fmt::format("{} in {}", cause, name_at(schema.loss_sessions, loss.session));
 }
 
