@@ -101,11 +101,10 @@ std::string test_note(const Scenario& scenario) {
     return is_watched && !turns_so(session);
   });
   if (!is_elsewhere) return note;
-  note +=
-      scenario.has_tests()
-          ? "Γ_res is the largest of all tests, also of those that turn otherwise\n"
-          : "Γ_res is that at f_EP of calibration sessions in another pointing; the loop leaves "
-            "more of the drag at a higher f_EP\n";
+  note += scenario.has_tests()
+              ? "Γ_res of a run is the largest of all tests, also of those that turn otherwise\n"
+              : "Γ_res of a run is that at f_EP of calibration sessions in another pointing; the "
+                "loop leaves more of the drag at a higher f_EP\n";
   return note;
 }
 

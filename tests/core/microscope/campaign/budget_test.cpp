@@ -180,8 +180,8 @@ TEST(BudgetAfterCalibration, TakesTheGradientOfTheTestNotOfTheSessions) {
   EXPECT_NEAR(budget.entries[0], 4.18e-9, 0.02e-9);
   EXPECT_NEAR(budget.entries[3], 1.67e-8, 0.01e-8);
   EXPECT_EQ(microscope_budget(scenario).note,
-            "Γ_res is that at f_EP of calibration sessions in another pointing; the loop leaves "
-            "more of the drag at a higher f_EP\n");
+            "Γ_res of a run is that at f_EP of calibration sessions in another pointing; the loop "
+            "leaves more of the drag at a higher f_EP\n");
   Session& test = scenario.sessions.emplace_back();
   test.name = "test";
   test.target = SessionTarget::ep_test;
@@ -192,7 +192,7 @@ TEST(BudgetAfterCalibration, TakesTheGradientOfTheTestNotOfTheSessions) {
   EXPECT_THAT(microscope_budget(scenario).note,
               ::testing::HasSubstr("No test of this campaign turns by"));
   EXPECT_THAT(microscope_budget(scenario).note,
-              ::testing::HasSubstr("Γ_res is the largest of all tests"));
+              ::testing::HasSubstr("Γ_res of a run is the largest of all tests"));
 }
 
 TEST(Budget, FollowsTheResidueOfTheRuns) {
