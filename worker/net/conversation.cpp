@@ -41,6 +41,7 @@ Conversation::Conversation(wire::SessionId session, proto::Hello hello, Executio
 void Conversation::on_welcome(const proto::Envelope& message, TimePoint now) {
   if (is_registered_) return;  // The answer to a repeated Hello.
   is_registered_ = true;
+  refusal_.clear();
   // The coordinator process that asked for the drain has ended; this one may need the worker.
   const bool is_drained = leaving_ && leaving_->reason == wire::LossReason::drained;
   if (is_drained && message.epoch() != epoch_.value) leaving_.reset();

@@ -276,6 +276,15 @@ TEST_F(ConversationTest, HasFailedIfNoCoordinatorTookItInItsTime) {
                 "its time is up, and no coordinator has taken this worker (key not listed)");
 }
 
+TEST_F(ConversationTest, ForgetsWhyItWasRefusedOnceItIsRegistered) {
+  start();
+  receive(test::make_reject(proto::REJECT_REASON_FULL, "enough workers"));
+  receive(welcome);
+  sent.clear();
+  tick_after(std::chrono::hours(1));
+  expect_ending(Ending::Kind::failed, "coordinator = silent for 3600 s (is it running?)");
+}
+
 TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {
   register_with_campaign({.resend_after = std::chrono::hours(1), .idle_timeout = 300s});
   receive(lease(0, 1));
