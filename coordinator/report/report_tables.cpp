@@ -99,7 +99,8 @@ std::string bias_sentence(const Review& review) {
       "Bias: each interval holds by itself{}{}. {} {}.",
       is_of_fixed_size(review)
           ? ""
-          : ", and for a number of runs fixed beforehand, which this campaign's was not",
+          : fmt::format(", and for a number of runs fixed beforehand, which {} was not",
+                        statistics.num_runs),
       skewed.empty() ? ""
                      : fmt::format(", but not of errors that are too skewed for {} runs: {}",
                                    num_runs, skewed),
