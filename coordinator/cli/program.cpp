@@ -7,7 +7,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
 #include <condition_variable>
@@ -24,8 +23,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <utility>
-#include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
@@ -154,11 +151,6 @@ std::optional<int> refused_model(int argc, char** argv, std::string_view program
 
 namespace {
 
-/// Commands whose help has `--model-program`, although all take it: what they compute needs the
-/// programs, and the others read what databases say of their models.
-constexpr std::array<std::string_view, 10> commands_with_programs{
-    "run", "init", "check", "sweep", "models", "replay", "submit", "verify", "merge", "publish"};
-
 /// Those that the variable names: what somebody asks for is not left out.
 wire::Broken broken_programs(std::span<char* const> arguments) {
   const auto asks = [](std::string_view argument) {
@@ -184,18 +176,7 @@ int run_proofmass(int argc, char** argv) {
   wire::add_model_program_option(app);
   app.fallthrough();  // Behind the command, too.
   Command chosen;
-  // As `--help` lists them: the usual ones first.
-  const std::vector<std::pair<const char*, std::vector<std::function<void(CLI::App&, Command&)>>>>
-      groups{{"Run a campaign",
-              {add_run, add_init, add_check, add_plan, add_sweep, add_environment, add_models}},
-             {"Look at its results", {add_report, add_plot, add_list}},
-             {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
-             {"Serve campaigns to other machines",
-              {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
-               add_release, add_factory}},
-             {"Keep databases",
-              {add_verify, add_backup, add_export, add_import, add_merge, add_publish}}};
-  for (const auto& [title, commands] : groups) {
+  for (const auto& [title, commands] : command_groups()) {
     app.group(title);  // A command begins with the group of its program.
     for (const auto& add : commands) add(app, chosen);
   }

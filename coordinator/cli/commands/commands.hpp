@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
@@ -223,6 +225,30 @@ void add_workers(CLI::App& app, Command& chosen);
 void add_release(CLI::App& app, Command& chosen);
 void add_factory(CLI::App& app, Command& chosen);
 void add_fetch(CLI::App& app, Command& chosen);
+
+/// The commands under a heading of `--help`.
+struct CommandGroup {
+  std::string title;
+  std::vector<void (*)(CLI::App& app, Command& chosen)> commands;
+};
+
+/// As `--help` lists them: the usual ones first.
+[[nodiscard]] inline std::vector<CommandGroup> command_groups() {
+  return {
+      {"Run a campaign",
+       {add_run, add_init, add_check, add_plan, add_sweep, add_environment, add_models}},
+      {"Look at its results", {add_report, add_plot, add_list}},
+      {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
+      {"Serve campaigns to other machines",
+       {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
+        add_release, add_factory}},
+      {"Keep databases", {add_verify, add_backup, add_export, add_import, add_merge, add_publish}}};
+}
+
+/// Commands whose help has `--model-program`, although all take it: what they compute needs the
+/// programs, and the others read what databases say of their models.
+inline constexpr std::array<std::string_view, 10> commands_with_programs{
+    "run", "init", "check", "sweep", "models", "replay", "submit", "verify", "merge", "publish"};
 
 // Options that several commands have.
 
