@@ -12,9 +12,10 @@ namespace {
 
 using Complex = ComplexDouble;
 
-constexpr double pole_ratio = 8.0;         // Between corners of the 1/f sum.
-constexpr double lowest_corner_hz = 6e-6;  // A factor 3 below the lowest frequency that matters.
-constexpr double pink_part_min = 0.12;     // The sum ends where 1/f is this part of white.
+constexpr double pole_ratio = 8.0;          // Between corners of the 1/f sum.
+constexpr double lowest_corner_hz = 6e-6;   // A factor 3 below the lowest frequency that matters.
+constexpr double pink_part_min = 0.12;      // The sum ends where 1/f is this part of white,
+constexpr double nyquist_parts_max = 16.0;  // or at a corner this far above what samples can tell.
 
 /// S(x)/white² = 1 + Σ gᵢ/(x + xᵢ) + r x²/((x − u)(x − v)), x = 4 sin²(πfT).
 struct RationalSpectrum {
@@ -39,6 +40,11 @@ void add_pink(const SensorNoise& noise, double sample_period_s, RationalSpectrum
     spectrum.pole.push_back(corner * corner);
     spectrum.weight.push_back(weight);
     if (corner_hz >= highest_hz) return;
+    if (corner_hz >= nyquist_parts_max * 0.5 / sample_period_s) {
+      // All from here on are flat up to the Nyquist frequency, and their states one and the same.
+      spectrum.weight.back() *= pole_ratio / (pole_ratio - 1.0);
+      return;
+    }
   }
 }
 

@@ -74,7 +74,7 @@ void check_sensor_noise(std::string_view axis, std::string_view unit, const Sens
   }
 }
 
-// Beyond the first bound shape_noise() has no room for the poles of the 1/f part.
+// Up to this corner shape_noise() is known to follow its spectrum.
 void check_wire(const NoiseConfig& noise) {
   constexpr double corner_max_hz = 50.0;
   for (std::size_t k = 0; k < noise.wire.factor.size(); ++k) {

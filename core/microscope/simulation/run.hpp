@@ -19,7 +19,7 @@ namespace proofmass {
 
 /// Changes with every change of core that may change a result's bits, or which runs are lost.
 /// Coordinator and workers must agree on it, and a campaign is finished by the model that began it.
-inline constexpr std::string_view model_version = "hardy2013-14";
+inline constexpr std::string_view model_version = "hardy2013-15";
 
 /// Runs that one batch advances together at most.
 inline constexpr std::size_t batch_lanes = 16;

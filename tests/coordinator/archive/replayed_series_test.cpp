@@ -480,7 +480,7 @@ TEST_F(ReplayedSpectra, SayWhyThereAreNone) {
       worst_run_spectra(store, review_of_worst(RunValue{RunIndex{0}, 0.9}), test::never_stopped)
           ->reasons,
       ElementsAre("Run 0 cannot be replayed: model_version = hardy2013-2 (must be "
-                  "hardy2013-14, the model of this program: others compute other bits)."));
+                  "hardy2013-15, the model of this program: others compute other bits)."));
 }
 
 TEST_F(ReplayedSpectra, NameTheirCharts) {

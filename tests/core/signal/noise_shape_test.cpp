@@ -75,6 +75,7 @@ TEST(NoiseShape, IsFiniteForEveryNoiseThatAScenarioAdmits) {
     noise.rise_corner_hz = exponential(1.001e-3, 0.999);
     noise.rise_limit_hz = i % 3 == 0 ? 0.0 : exponential(1.001e-6, 0.599);
     ASSERT_NO_THROW(scenario.validate());
+    if (i % 2 == 0) noise.pink_corner_hz = exponential(0.1, 50.0);  // A wire's.
     EXPECT_TRUE(is_finite(shape_noise(noise, exponential(0.05, 1.0)))) << i;
   }
 }
@@ -87,6 +88,21 @@ TEST(NoiseShape, FollowsTheNominalSpectrumOfEveryPreset) {
 TEST(NoiseShape, FollowsPinkAlone) {
   for (const double corner_hz : {1e-5, 1e-4, 1e-3, 0.01, 0.1}) {
     expect_shape_follows({1.0, corner_hz, 0.0, 0.03, 0.0}, 0.17, "pink");
+  }
+}
+
+// A wire's noise may be 1/f far above what samples can tell. At a tenth of the sample rate the
+// filter's 4 sin²(πfT) is 3.3 % or 0.14 dB less than (2πfT)², beside the ripple of 0.155 dB.
+TEST(NoiseShape, FollowsAWireAtEverySamplePeriod) {
+  for (const double period_s : {0.05, 0.2, 0.25, 0.3, 0.5, 1.0}) {
+    for (const double corner_hz : {0.9, 9.0, 50.0}) {
+      const SensorNoise noise{1.0, corner_hz, 0.0, 0.03, 0.0};
+      const NoiseShape shape = shape_noise(noise, period_s);
+      for (const double f : frequencies_up_to(0.1 / period_s)) {
+        EXPECT_NEAR(decibels(shape.psd(f, period_s) / nominal_psd(noise, f)), 0.0, 0.295)
+            << corner_hz << " Hz, a sample each " << period_s << " s, at " << f << " Hz";
+      }
+    }
   }
 }
 
