@@ -88,7 +88,7 @@ class Stability : public testing::Test {
                                              const std::string& what) const {
     std::size_t num_completed = 0;
     const std::vector<RunResult> results = simulate(campaign);
-    const ShiftBounds bounds(campaign.scenario);
+    const ShiftBounds bounds(campaign.scenario, campaign.dispersions);
     for (std::size_t i = 0; i < num_drawn_runs; ++i) {
       const RunResult& result = results[i];
       if (result.status == RunStatus::lost) {

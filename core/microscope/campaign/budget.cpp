@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
-#include "core/microscope/instrument/drawn_moments.hpp"
+#include "core/microscope/instrument/drawn_sizes.hpp"
 #include "core/microscope/results/health.hpp"
 
 namespace proofmass {
@@ -20,66 +20,6 @@ namespace {
 
 // 20 orbits, which the paper's test lasts at least, cannot tell closer lines apart.
 bool is_line(double multiple, double of_line) { return std::abs(multiple - of_line) < 0.05; }
-
-// The largest value of a law, but for one draw in 370 of a normal one; that of a table is in its
-// column.
-double size_of(const DispersionSet& dispersions, const DrawnMoments& moments,
-               std::size_t quantity) {
-  const Dispersion& law = dispersions[quantity];
-  switch (law.law) {
-    case Law::uniform:
-    case Law::truncated:
-    case Law::truncated_normal:
-      return std::max(std::abs(law.minimum), std::abs(law.maximum));
-    case Law::normal:
-    case Law::correlated:
-      return std::abs(law.mean) + 3.0 * law.standard_deviation;
-    case Law::fixed:
-      return std::abs(law.value);
-    case Law::discrete:
-      return std::abs(
-          *std::ranges::max_element(law.values, {}, [](double value) { return std::abs(value); }));
-    case Law::derived:
-      return std::abs(moments.mean[quantity]) +
-             3.0 * std::sqrt(moments.covariance.diagonal()[static_cast<Eigen::Index>(quantity)]);
-    case Law::table:
-      break;
-  }
-  return 0.0;
-}
-
-/// Sizes of drawn quantities.
-class Sizes {
- public:
-  Sizes(const DispersionSet& dispersions, const std::vector<std::vector<double>>& table_columns) {
-    constexpr std::uint64_t num_draws = 256;  // A size needs few digits.
-    const DrawnMoments moments = drawn_moments(dispersions, num_draws);
-    for (std::size_t i = 0; i < num_drawn; ++i) sizes_[i] = size_of(dispersions, moments, i);
-    const std::vector<std::size_t> of_table = table_elements(dispersions);
-    for (std::size_t i = 0; i < std::min(of_table.size(), table_columns.size()); ++i) {
-      for (const double value : table_columns[i]) {
-        sizes_[of_table[i]] = std::max(sizes_[of_table[i]], std::abs(value));
-      }
-    }
-  }
-
-  /// Of a vector's element.
-  [[nodiscard]] double of_axis(std::string_view group, std::size_t axis) const {
-    return sizes_[draw_group(group).first + axis];
-  }
-  /// Of half the sum, or the difference, of both sensors' about an axis.
-  [[nodiscard]] double of_pair(std::string_view group, std::size_t axis) const {
-    const std::size_t first = draw_group(group).first;
-    return 0.5 * (sizes_[first + axis] + sizes_[first + 3 + axis]);
-  }
-  /// Of η ± θ: element 1j of [M], about the axis that is neither X nor j.
-  [[nodiscard]] double off_diagonal(std::size_t axis) const {
-    return of_pair("misalignment_rad", axis) + of_pair("coupling_rad", axis);
-  }
-
- private:
-  DrawnValues sizes_{};
-};
 
 std::string test_note(const Scenario& scenario) {
   const double rate_rad_s = scenario.budget.test_spin_rate_rad_s;
@@ -164,9 +104,13 @@ ErrorBudget microscope_budget(const Scenario& scenario, const DispersionSet& dis
   const GradientLevels gradient = test_gradient_levels(scenario);
   const BudgetConfig& bound = scenario.budget;
   const AcceptanceConfig& acceptance = scenario.acceptance;
-  const Sizes sizes(dispersions, table_columns);
-  const double a_c12_max = sizes.off_diagonal(2);
-  const double a_c13_max = sizes.off_diagonal(1);
+  const DrawnSizes sizes(dispersions, table_columns);
+  // Element 1j of [M], η ± θ, is about the axis that is neither X nor j.
+  const auto off_diagonal = [&](std::size_t axis) {
+    return sizes.of_pair("misalignment_rad", axis) + sizes.of_pair("coupling_rad", axis);
+  };
+  const double a_c12_max = off_diagonal(2);
+  const double a_c13_max = off_diagonal(1);
   const double a_d11_max = std::min(acceptance.a_d11_max, sizes.of_pair("scale_factor_error", 0));
   const auto delta = [&](std::size_t axis) {
     return std::max(bound.offcentring_max_m, sizes.of_axis("offcentring_m", axis));

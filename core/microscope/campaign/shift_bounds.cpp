@@ -8,6 +8,7 @@
 
 #include "core/math/elementary.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
+#include "core/microscope/instrument/drawn_sizes.hpp"
 #include "core/microscope/instrument/stiffness.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/signal/line_weights.hpp"
@@ -26,9 +27,8 @@ constexpr double turn_rad = 2.0 * std::numbers::pi;
 constexpr double quiet_asd_m_s2 = 3e-13;
 
 // Bounds of construction, [Hardy2013] tab:Budget and core/microscope/instrument.
-constexpr double differential_bias_max_m_s2 = 1.4e-8;  // b_1d.
-constexpr double centre_offset_max_m = 1e-3;           // Of the unit from its place, each axis.
-constexpr double coupling_max_rad = 1e-4;              // η.
+constexpr double centre_offset_max_m = 1e-3;  // Of the unit from its place, each axis.
+constexpr double coupling_max_rad = 1e-4;     // η.
 
 /// The parameter that a session of each target helps to find; the two slopes of K2c have one.
 constexpr std::array<Parameter, index(SessionTarget::no_target)> found_parameters{
@@ -164,13 +164,15 @@ class ShiftBounds::Sum {
   std::span<const double> standard_errors_;
 };
 
-ShiftBounds::ShiftBounds(const Scenario& scenario)
+ShiftBounds::ShiftBounds(const Scenario& scenario, const DispersionSet& dispersions)
     : objectives_(scenario.objectives),
       least_density_(least_noise_density(scenario)),
       block_s_(LineWeights::block_size * scenario.simulation.sample_period_s),
       white_density_(differential_x_density(
           scenario.noise, [](const SensorNoise& x) { return square(x.white_asd); })),
       duration_s_(0.0),
+      // b_1d is half the difference of both sensors' p along X.
+      differential_bias_m_s2_(DrawnSizes(dispersions).of_pair("parasitic_acceleration_m_s2", 0)),
       has_noise_(scenario.noise.scale > 0.0),
       gradient_line_s2_(0.75 * square(mean_motion_rad_s(scenario))),
       delta_per_m_s2_(2.0 / (square(mean_motion_rad_s(scenario)) *
@@ -278,7 +280,7 @@ void ShiftBounds::add_noises(const LoopHealth& health, Sum& sum) const {
   constexpr double num_deviations = 3.0;
   // Lines times the constant b_1d, which a_d11' and a_c11 take up, look like noise too: those of
   // the residual with K2c, and with K2d that of the gradient in Γ_App,dx.
-  const double twice_bias_m_s2 = 2.0 * differential_bias_max_m_s2;
+  const double twice_bias_m_s2 = 2.0 * differential_bias_m_s2_;
   const double gradient_line_m_s2 =
       gradient_line_s2_ * std::sqrt(square(sum[a_c11_delta_x]) + square(sum[a_c11_delta_z]));
   const double of_residual = twice_bias_m_s2 * sum[k2c] * health.residual_m_s2;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/instrument/drawn_quantities.hpp"
 #include "core/microscope/results/health.hpp"
 #include "core/microscope/results/results.hpp"
 
@@ -43,8 +44,8 @@ inline constexpr double warned_part = 0.1;
 /// its truth.
 class ShiftBounds {
  public:
-  /// @pre scenario.validate() passed.
-  explicit ShiftBounds(const Scenario& scenario);
+  /// @pre scenario.validate() passed, and the laws are valid.
+  ShiftBounds(const Scenario& scenario, const DispersionSet& dispersions);
 
   /// Every shift of the ten parameters that is not 0, in the order of effects. Parts may be
   /// infinite.
@@ -88,6 +89,7 @@ class ShiftBounds {
   double step_share_ = 0.0;
   double white_density_;  ///< Of Γ_mes,dx, below that of every line; of scale 1 without noise.
   double duration_s_;     ///< Of the records of all sessions that are fitted.
+  double differential_bias_m_s2_;  ///< Largest |b_1d| that the laws allow.
   bool has_noise_;
   double gradient_line_s2_;  ///< Amplitude of ½T_xx and ½T_xz at 2 f_EP, on a circular orbit.
   /// Largest (ω² + |k/m|)Δ_TM of the masses that move along each axis.

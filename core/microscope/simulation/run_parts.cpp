@@ -53,7 +53,7 @@ RunParts::RunParts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
       noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
       drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
       attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)),
-      bounds(c.scenario),
+      bounds(c.scenario, c.dispersions),
       recording(recording_of(c.scenario, noise)),
       weights_of_windows(mean_linear_x(c.scenario.noise), c.scenario.simulation.sample_period_s) {
   weights.reserve(campaign.scenario.sessions.size());

@@ -378,7 +378,8 @@ TEST_F(ReviewedReading, ShowsTheTableOfAReview) {
       EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
     }
   }
-  EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
+  EXPECT_THAT(html,
+              HasSubstr("50 of 150 completed runs exceed the objective"));  // 101 to 150 % of it.
 }
 
 }  // namespace

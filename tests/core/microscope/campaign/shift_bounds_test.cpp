@@ -126,14 +126,16 @@ constexpr ParameterArray largest_truth{20e-6, 20e-6,  20e-6,  2.6e-3,  2.6e-3,
 
 double part_of(const Scenario& scenario, const LoopHealth& health, Effect effect,
                Parameter parameter) {
-  for (const Shift& shift : ShiftBounds(scenario).of(health, largest_truth, {})) {
+  for (const Shift& shift :
+       ShiftBounds(scenario, nominal_dispersions()).of(health, largest_truth, {})) {
     if (shift.effect == effect && shift.parameter == parameter) return shift.part;
   }
   return 0.0;
 }
 
 TEST(ShiftBounds, GiveNoWarningInANominalCampaign) {
-  for (const Shift& shift : ShiftBounds(Scenario()).of(nominal_health, largest_truth, {})) {
+  for (const Shift& shift :
+       ShiftBounds({}, nominal_dispersions()).of(nominal_health, largest_truth, {})) {
     EXPECT_LT(shift.part, warned_part) << name_of(shift.effect) << index(shift.parameter);
   }
 }
@@ -166,7 +168,7 @@ TEST(ShiftBounds, AreThoseOfTheTable) {
 // deviation that the line moves.
 TEST(ShiftBounds, FollowTheStandardErrorsOfAMethodThatHasThem) {
   const Scenario scenario;
-  const ShiftBounds bounds(scenario);
+  const ShiftBounds bounds(scenario, nominal_dispersions());
   const ParameterArray sigmas{4e-9, 4e-9, 6e-8, 4e-4, 4e-4, 3e-7, 2e-7, 2e-7, 8.0, 9.0};
   ParameterArray truth = largest_truth;
   const auto part = [&](const LoopHealth& health, Effect effect, Parameter parameter) {
@@ -195,6 +197,36 @@ TEST(ShiftBounds, FollowTheStandardErrorsOfAMethodThatHasThem) {
               4e-9 * std::sqrt(2.0 * duration_s / floor) * 0.5 * 14000.0 * 4e-18 / 1e-7, 1e-6);
 }
 
+// What b_1d makes of the gradient's line looks like noise to blocks of 512 s, whatever its law.
+TEST(ShiftBounds, TakeTheLineOfAConstantForNoNoise) {
+  const Scenario scenario;
+  constexpr double bias_m_s2 = 5e-8;  // b_1d, with p of both masses at opposite bounds.
+  DispersionSet laws = nominal_dispersions();
+  const std::size_t first = draw_group("parasitic_acceleration_m_s2").first;
+  laws[first] = {.law = Law::fixed, .value = -bias_m_s2};
+  laws[first + 3] = {.law = Law::fixed, .value = bias_m_s2};
+  ParameterArray truth{};
+  truth[index(Parameter::k2d)] = 14000.0;
+  truth[index(Parameter::a_c11_delta_z)] = 20e-6;
+
+  const double n = 2.0 * std::numbers::pi / scenario.orbit.period_s;
+  const double x = 512.0 * n;  // Half the line's turn in a block, at 2 f_orb.
+  const double line_m_s2 = 2.0 * bias_m_s2 * 14000.0 * 0.75 * n * n * 20e-6;
+  const double steps = line_m_s2 * std::sin(x) * std::sin(x) / x;
+  const double density = 2.0 * 512.0 * steps * steps;
+  const auto largest = [&](double part, const DispersionSet& of) {
+    const LoopHealth health{.quadratic_noise = part * density / least_noise_density(scenario)};
+    double shift = 0.0;
+    for (const Shift& each : ShiftBounds(scenario, of).of(health, truth, {})) {
+      if (each.effect == Effect::quadratic_noise) shift = std::max(shift, each.part);
+    }
+    return shift;
+  };
+  EXPECT_EQ(largest(0.999, laws), 0.0);
+  EXPECT_GT(largest(1.001, laws), 0.0);
+  EXPECT_GT(largest(0.999, nominal_dispersions()), 0.0);
+}
+
 // Noise that the user asks for is no reason to lose a run: errors show it.
 TEST(ShiftBounds, LoseNoRunToNoiseThatTheSensorsExplain) {
   Scenario scenario;
@@ -206,7 +238,7 @@ TEST(ShiftBounds, LoseNoRunToNoiseThatTheSensorsExplain) {
     ParameterArray truth = largest_truth;
     truth[index(Parameter::k2d)] = truth[index(Parameter::k2c)] = 0.0;
     truth[index(only)] = 14000.0;
-    for (const Shift& shift : ShiftBounds(scenario).of(health, truth, {})) {
+    for (const Shift& shift : ShiftBounds(scenario, nominal_dispersions()).of(health, truth, {})) {
       EXPECT_LE(shift.part, shift.part_of_loss) << name_of(shift.effect) << index(shift.parameter);
     }
   }
