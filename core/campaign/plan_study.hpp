@@ -12,8 +12,8 @@ namespace proofmass {
 
 /// Probed runs that are lost for one reason.
 struct PlanLoss {
-  std::string cause;         ///< One of ResultSchema::loss_causes.
-  std::string session;       ///< Where, as RunResult::loss has it or by its name.
+  std::string cause;         ///< One of ResultSchema::loss_causes, or `not_converged`.
+  std::string session;       ///< Where, as RunResult::loss has it or by its name; empty if nowhere.
   std::string detail;        ///< What is beyond which limit, for people.
   std::size_t num_runs = 0;  ///< ≥ 1.
 };

@@ -91,8 +91,10 @@ void add_warning(const std::vector<Shift>& shifts, PlanWarnings& warnings) {
 /// Level of the budget that all runs have in common. Noise differs between them, so that it is as
 /// small in a fit of all together as in one run with sessions that are so many times as long.
 /// @return 0 without a run, or if no session tells it.
-double common_level_m_s2(const Scenario& scenario, const std::vector<const RunRecord*>& runs) {
+double common_level_m_s2(const MicroscopeCampaign& campaign,
+                         const std::vector<const RunRecord*>& runs) {
   if (runs.empty()) return 0.0;
+  const Scenario& scenario = campaign.scenario;
   RunRecord all = *runs.front();
   for (std::size_t i = 0; i < all.health.size(); ++i) {
     std::vector<double>& products = all.phasors[i].test_products;
@@ -110,8 +112,8 @@ double common_level_m_s2(const Scenario& scenario, const std::vector<const RunRe
       }
     }
   }
-  const HealthFinding finding =
-      judge_health(scenario, ShiftBounds(scenario), all.health, all.phasors, all.truth, {});
+  const HealthFinding finding = judge_health(scenario, ShiftBounds(scenario, campaign.dispersions),
+                                             all.health, all.phasors, all.truth, {});
   return scenario.has_tests() ? finding.test_residual_m_s2 : finding.health.residual_m_s2;
 }
 
@@ -128,7 +130,8 @@ MicroscopeCampaign short_campaign(MicroscopeCampaign campaign) {
   return campaign;
 }
 
-ProbedRuns::ProbedRuns(const MicroscopeCampaign& campaign, const std::vector<RunIndex>& runs) {
+ProbedRuns::ProbedRuns(const MicroscopeCampaign& campaign, const std::vector<RunIndex>& runs)
+    : dispersions_(campaign.dispersions) {
   // One by one a run takes as long as a batch, a second or more.
   constexpr std::size_t one_by_one_max = 4;
   const std::size_t num_max = campaign.scenario.has_plain_loops() ? batch_lanes : one_by_one_max;
@@ -144,9 +147,14 @@ ProbedRuns::ProbedRuns(const MicroscopeCampaign& campaign, const std::vector<Run
   probes_.reserve(requests.size());
   for (RunRecord& record : plan.record_batch(requests, best_instruction_set())) {
     const RunResult result = plan.estimate(record);
-    const bool is_misfit = !result.fit.empty() && is_beyond_chance(result.fit[0], result.fit[1]);
-    for (std::size_t i = 0; i < result.fit.size(); ++i) fits[i] += result.fit[i];
-    probes_.push_back({.record = std::move(record), .is_misfit = is_misfit});
+    Probe& probe = probes_.emplace_back();
+    probe.record = std::move(record);
+    probe.has_converged = result.status != RunStatus::not_converged;
+    // Estimates that still move fit nothing.
+    if (probe.has_converged && !result.fit.empty()) {
+      probe.is_misfit = is_beyond_chance(result.fit[0], result.fit[1]);
+      for (std::size_t i = 0; i < result.fit.size(); ++i) fits[i] += result.fit[i];
+    }
     if (result.status != RunStatus::lost) held.push_back(&probes_.back().record);
   }
   do_fit_together_ = !is_beyond_chance(fits[0], fits[1]);
@@ -154,7 +162,7 @@ ProbedRuns::ProbedRuns(const MicroscopeCampaign& campaign, const std::vector<Run
     if (!is_beyond_chance(fits[2 + 2 * i], fits[3 + 2 * i])) continue;
     misfit_sessions_.push_back(brief.scenario.sessions[i].name);
   }
-  level_m_s2_ = common_level_m_s2(brief.scenario, held);
+  level_m_s2_ = common_level_m_s2(brief, held);
 }
 
 std::size_t ProbedRuns::num_misfits() const {
@@ -164,9 +172,17 @@ std::size_t ProbedRuns::num_misfits() const {
 
 void ProbedRuns::judge(const Scenario& scenario, const std::vector<ParameterArray>& errors,
                        PlanBound& bound) const {
-  const ShiftBounds bounds(scenario);
+  const ShiftBounds bounds(scenario, dispersions_);
   for (std::size_t k = 0; k < probes_.size(); ++k) {
     const RunRecord& probe = probes_[k].record;
+    if (!probes_[k].has_converged) {
+      add_loss({.cause = "not_converged",
+                .session = {},
+                .detail = fmt::format("estimates still move after estimation.num_rounds_max = {}",
+                                      scenario.estimation.num_rounds_max)},
+               bound.losses);
+      continue;
+    }
     HealthRecord record = probe.health;
     for (std::size_t i = 0; i < record.size(); ++i) {
       const double num_orbits = scenario.sessions[i].num_orbits;

@@ -45,9 +45,11 @@ class ProbedRuns {
  private:
   struct Probe {
     RunRecord record;
+    bool has_converged = false;
     bool is_misfit = false;
   };
 
+  DispersionSet dispersions_;
   std::vector<int> num_orbits_;  ///< Of each session, as simulated.
   std::vector<Probe> probes_;
   bool do_fit_together_ = true;
