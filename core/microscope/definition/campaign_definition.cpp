@@ -262,11 +262,11 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     check_thrust(campaign.scenario);
     check_tests(campaign.scenario.sessions);
     check_magnitudes(campaign);
-    check_regressors(campaign.scenario);
     check_independence(law_set(campaign.dispersions), campaign);
     if (estimation_method(campaign.scenario.estimation.method).name == joint_method.name) {
       check_joint_campaign(campaign);
     } else {
+      check_regressors(campaign.scenario);
       check_filter_start(campaign.scenario);
     }
   } catch (const ConfigError& error) {

@@ -154,7 +154,7 @@ const Need* need_of(Parameter parameter) {
 std::string allowed_text(double limit) {
   std::string text;
   double shown = std::numeric_limits<double>::infinity();
-  for (int num_digits = 2; shown > limit; ++num_digits) {
+  for (int num_digits = 3; shown > limit; ++num_digits) {
     text = fmt::format("{:.{}g}", limit, num_digits);
     std::from_chars(text.data(), text.data() + text.size(), shown);
   }

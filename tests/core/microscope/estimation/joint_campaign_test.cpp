@@ -225,7 +225,7 @@ TEST(JointCampaign, IsMovedByADisturbanceLessFarThanItsBound) {
   const double moved = std::abs(plan.estimation(record).values[delta] - before.values[delta]);
   double bound = 0.0;
   for (const Shift& shift :
-       ShiftBounds(campaign.scenario)
+       ShiftBounds(campaign.scenario, campaign.dispersions)
            .of({.residual_m_s2 = residual_m_s2}, record.truth, before.standard_errors)) {
     if (shift.effect == Effect::residual && index(shift.parameter) == delta) {
       bound = shift.part * campaign.scenario.objectives[delta];

@@ -427,7 +427,7 @@ TEST(Joint, RefusesPushesOfWhichItLeavesOutTooMuch) {
   for (const Excitation& other : {push(Axis::y, 2e-8), move_along(Axis::y)}) {
     EXPECT_EQ(
         refused({other, push(Axis::x, 1.8e-7)}),
-        "session[0].excitations[1].amplitude_m_s2 = 1.8e-07 (must be <= 1.7e-07 for "
+        "session[0].excitations[1].amplitude_m_s2 = 1.8e-07 (must be <= 1.7496e-07 for "
         "estimation.method = \"joint\" beside the session's other excitations: beyond, errors "
         "exceed the standard errors)");
   }
