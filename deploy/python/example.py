@@ -39,8 +39,8 @@ print(f"digest {campaign.digest}")
 
 # %%
 results = campaign.results()
-has_estimate = numpy.isin(results["status"], ["completed", "not_converged"])
-magnitudes = {quantity.name: numpy.abs(numpy.asarray(results[quantity.error])[has_estimate])
+is_completed = numpy.asarray(results["status"]) == "completed"
+magnitudes = {quantity.name: numpy.abs(numpy.asarray(results[quantity.error])[is_completed])
               for quantity in campaign.quantities}
 for quantity in campaign.quantities:
     magnitude = magnitudes[quantity.name]
@@ -87,9 +87,9 @@ figure.savefig(directory / "convergence.png")
 # `proofmass sensitivity` also looks at products of two.
 
 # %%
-errors = numpy.array([numpy.asarray(results[quantity.error])[has_estimate]
+errors = numpy.array([numpy.asarray(results[quantity.error])[is_completed]
                       for quantity in campaign.quantities])
-truths = numpy.array([numpy.asarray(results[quantity.truth])[has_estimate]
+truths = numpy.array([numpy.asarray(results[quantity.truth])[is_completed]
                       for quantity in campaign.quantities])
 count = len(campaign.quantities)
 correlation = numpy.corrcoef(errors, truths)[:count, count:]

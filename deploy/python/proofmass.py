@@ -146,14 +146,14 @@ class Campaign:
     def accuracy(self):
         """Of |error| of each quantity, computed from the results that are in the file now.
 
-        A row a quantity: `name`, `symbol`, `unit`, `objective`, `num_runs` (with an estimate),
+        A row a quantity: `name`, `symbol`, `unit`, `objective`, `num_runs` (completed),
         `worst`, `worst_run`, `mean`, `standard_deviation` (with n − 1), `num_beyond` (runs whose
         |error| is above the objective).
         """
         columns = [quantity.error for quantity in self.quantities]
         errors = self._arrays(
             f"SELECT run_index, {', '.join(map(_quoted, columns))} FROM run_result "
-            "WHERE status <= 2 ORDER BY run_index", ["run_index", *columns])
+            "WHERE status = 1 ORDER BY run_index", ["run_index", *columns])
         rows = [self._accuracy_of(quantity, errors) for quantity in self.quantities]
         return _table({name: numpy.array([row[name] for row in rows]) for name in rows[0]}, {},
                       "name")

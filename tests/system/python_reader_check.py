@@ -126,6 +126,18 @@ def check_accuracy(machine, campaign, numpy):
             assert abs(own(accuracy, name) / expected[name] - 1) < 1e-13, (name, i)
 
 
+def check_unconverged(machine, proofmass, numpy):
+    """A run whose estimates still moved has them, and is none of those that are accurate or not."""
+    copy = machine.path("unconverged.db")
+    shutil.copy(machine.path("a.db"), copy)
+    with sqlite3.connect(copy) as database:
+        run, = database.execute("SELECT min(run_index) FROM run_result WHERE status = 1").fetchone()
+        database.execute("UPDATE run_result SET status = 2 WHERE run_index = ?", (run,))
+    with proofmass.open(machine.path("a.db")) as of_all, proofmass.open(copy) as of_others:
+        counts = [int(numpy.asarray(of.accuracy()["num_runs"])[0]) for of in (of_all, of_others)]
+    assert counts[1] == counts[0] - 1, counts
+
+
 def check_draws(machine, campaign, numpy):
     draws = campaign.draws(machine.program)
     rows = machine.json("query", "a.db", "SELECT run_index, quantity, unit, value FROM draw",
@@ -222,6 +234,7 @@ def check_all(machine, has_pandas):
         num_lost = check_results(machine, campaign, numpy)
         check_accuracy(machine, campaign, numpy)
         check_draws(machine, campaign, numpy)
+    check_unconverged(machine, proofmass, numpy)
     check_replay(machine, proofmass, numpy)
     check_refusals(machine, proofmass)
     after = hashlib.sha256(machine.path("a.db").read_bytes()).digest()
