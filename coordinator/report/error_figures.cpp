@@ -204,9 +204,10 @@ std::string objective_sentence(const Review& review, std::size_t index) {
   const double objective = review.objectives[index];
   if (!std::isfinite(objective)) return "It has no objective.";
   const Quantity& quantity = quantity_at(review, index);
-  const std::uint64_t beyond = review.results.statistics.accuracy[index].num_beyond_objective;
-  return fmt::format("{} {} the objective of {}.", beyond,
-                     beyond == 1 ? "run exceeds" : "runs exceed",
+  const CampaignStatistics& statistics = review.results.statistics;
+  const std::uint64_t beyond = statistics.accuracy[index].num_beyond_objective;
+  return fmt::format("{} of {} exceed{} the objective of {}.", beyond,
+                     counted(statistics.num_estimated, "completed run"), beyond == 1 ? "s" : "",
                      quantity_text(objective, quantity, 6));
 }
 
@@ -217,7 +218,7 @@ std::string worst_sentence(const Review& review, std::size_t index) {
   std::string text = "The largest errors are";
   for (std::size_t i = 0; i < worst.size(); ++i) {
     text += fmt::format("{} {} in run {}", i == 0 ? "" : ",",
-                        figure_text(worst[i].value / quantity.display_scale), worst[i].run.value);
+                        quantity_text(worst[i].value, quantity), worst[i].run.value);
   }
   return text + ".";
 }
@@ -261,18 +262,18 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
   const std::vector<ConvergencePoint>& points = review.figures[index].convergence;
   if (points.empty()) return "No run has an estimate.";
   const ConvergencePoint& last = points.back();
-  const double scale = quantity_at(review, index).display_scale;
+  const auto as_text = [&](double value) {
+    return quantity_text(value, quantity_at(review, index));
+  };
   std::string text =
       fmt::format("After {} the worst is {}, the mean {}", counted(last.num_runs, "run"),
-                  figure_text(last.worst / scale), figure_text(last.mean / scale));
+                  as_text(last.worst), as_text(last.mean));
   if (last.mean_interval) {
-    text += fmt::format(" (95 %: {} to {})",
-                        figure_text(std::max(last.mean_interval->lower, 0.0) / scale),
-                        figure_text(last.mean_interval->upper / scale));
+    text += fmt::format(" (95 %: {} to {})", as_text(std::max(last.mean_interval->lower, 0.0)),
+                        as_text(last.mean_interval->upper));
   }
   if (last.num_runs < 2) return text + ".";
-  return text + fmt::format(", and the standard deviation {}.",
-                            quantity_text(last.standard_deviation, quantity_at(review, index)));
+  return text + fmt::format(", and the standard deviation {}.", as_text(last.standard_deviation));
 }
 
 /// What an overview shows errors in: the objective, or the worst error where there is none.
@@ -331,10 +332,10 @@ Chart error_chart(const Review& review, std::size_t index) {
                chart);
   chart.text.description = fmt::format(
       "Histogram of the errors with their signs. The bias is {}{}{}.",
-      figure_text(error.bias / scale),
+      quantity_text(error.bias, quantity),
       error.bias_interval
-          ? fmt::format(" (95 %: {} to {})", figure_text(error.bias_interval->lower / scale),
-                        figure_text(error.bias_interval->upper / scale))
+          ? fmt::format(" (95 %: {} to {})", quantity_text(error.bias_interval->lower, quantity),
+                        quantity_text(error.bias_interval->upper, quantity))
           : "",
       statistics.num_estimated < 2
           ? ""

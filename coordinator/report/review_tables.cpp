@@ -248,7 +248,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
           "The producer's risk, that one that holds is not called met, is the smaller the better "
           "it holds and the more draws there are.",
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
-      "so many draws meet the requirement; 0 of 59: too few draws, 59 without an exceedance do.",
+      "so many draws meet the requirement; k of n: too few draws, n with k exceedances would.",
       "Bound: with the confidence of the row, the stated part of all draws does not exceed it "
       "(order statistics, any law). Margin: (limit − bound) / limit."};
   for (const RequirementAnswer& row : review.matrix) {

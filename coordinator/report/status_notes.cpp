@@ -21,7 +21,7 @@ std::span<const CampaignCounter> campaign_counters() {
                       "Runs whose results are on disk."},
       CampaignCounter{"num_without_estimate", &proto::CampaignStatus::num_without_estimate,
                       "proofmass_runs_without_estimate_total",
-                      "Runs that ended without an estimate since the coordinator started."},
+                      "Finished runs without an estimate."},
       CampaignCounter{"num_given_up", &proto::CampaignStatus::num_given_up,
                       "proofmass_runs_given_up", "Runs that crashed too many workers."},
       CampaignCounter{"num_lent", &proto::CampaignStatus::num_lent, "proofmass_runs_lent",

@@ -250,7 +250,7 @@ CREATE TABLE statistic (
 CREATE TABLE summary (
   summary_id             INTEGER PRIMARY KEY CHECK (summary_id = 1),
   num_finished           INTEGER NOT NULL,
-  num_estimated          INTEGER NOT NULL,  -- completed or not converged
+  num_estimated          INTEGER NOT NULL,  -- completed; also not converged in older files
   num_not_converged      INTEGER NOT NULL,
   num_not_finite         INTEGER NOT NULL,
   num_no_draw            INTEGER NOT NULL,
