@@ -281,7 +281,7 @@ void Document::refuse(const std::string& path, std::string_view rule) {
 }
 
 void Document::refuse_absence(const std::string& path, std::string_view rule) {
-  refusals_.push_back({place_of(path), path + " is missing", path, std::string(rule)});
+  refusals_.push_back({place_of(path), path + " is missing", path, std::string(rule), true});
 }
 
 bool Document::leads_to_keys(const std::string& path) const {
@@ -341,7 +341,10 @@ void Document::check() const {
   std::optional<Refusal> first;
   const auto earliest = std::ranges::min_element(refusals_, {}, &Refusal::place);
   if (earliest != refusals_.end()) first = *earliest;
-  find_unknown_keys(root_, "", first);
+  std::optional<Refusal> unknown;
+  find_unknown_keys(root_, "", unknown);
+  // What is missing may stand there, misspelled.
+  if (unknown && (!first || first->is_absence || unknown->place < first->place)) first = unknown;
   for (std::size_t i = 0; i < assignments_.size(); ++i) {
     const Place place{.assignment = i + 1};
     if (keys_.contains(assignments_[i].path) || (first && first->place <= place)) continue;

@@ -106,6 +106,7 @@ class Document {
     std::string subject;  // `noise.scale = -1`, `session[0].name`.
     std::string path;
     std::string rule;  // Empty if the key is unknown.
+    bool is_absence = false;
   };
 
   [[nodiscard]] std::optional<std::size_t> read_choice(const std::string& path,
