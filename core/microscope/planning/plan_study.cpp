@@ -107,9 +107,9 @@ MissChance miss_chance(const ParameterArray& objectives, const ParameterArray& e
 /// The campaign as `joint` calibrates, without tests.
 /// @throws ConfigError if it cannot use the sessions.
 MicroscopeCampaign calibration_of(MicroscopeCampaign campaign) {
-  std::erase_if(campaign.scenario.sessions, is_test);
   campaign.scenario.validate();
   check_joint_campaign(campaign);
+  std::erase_if(campaign.scenario.sessions, is_test);
   return campaign;
 }
 
