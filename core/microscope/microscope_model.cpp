@@ -7,23 +7,17 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/math/elementary.hpp"
 #include "core/microscope/campaign/budget.hpp"
-#include "core/microscope/campaign/loop_margins.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/definition/made_environment.hpp"
 #include "core/microscope/estimation/methods.hpp"
-#include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/planning/plan_study.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
@@ -89,183 +83,6 @@ ResultSchema scenario_results(const Scenario& scenario, std::string_view version
 
 ResultSchema MicroscopeCampaign::results() const {
   return scenario_results(scenario, model_version);
-}
-
-namespace {
-
-/// Health of the loops is measured where nothing is shaken.
-std::string unwatched_note(const Scenario& scenario) {
-  const auto is_quiet = [](const Session& session) {
-    return !is_test(session) && session.excitations.empty();
-  };
-  if (scenario.noise.scale == 0.0 || std::ranges::any_of(scenario.sessions, is_quiet)) return {};
-  return "no session watches the noise of the loops, which may move every estimate: add one "
-         "without excitations";
-}
-
-std::string loops_note(const Scenario& scenario) {
-  if (scenario.has_plain_loops()) return {};
-  const std::vector<AxisMargins> of_axes = loop_margins(scenario, make_instrument({}));
-  const auto axis_text = [](const AxisMargins& of) {
-    const std::string_view in = of.resonator_of.empty() ? "" : " in ";
-    return fmt::format("{} {}{}{}", name_of(of.loop), name_of(of.axis), in, of.resonator_of);
-  };
-  const auto by_gain = [](const AxisMargins& of) { return of.margins.gain; };
-  const auto by_phase = [](const AxisMargins& of) { return of.margins.phase_rad; };
-  const AxisMargins gain = *std::ranges::min_element(of_axes, {}, by_gain);
-  const AxisMargins phase = *std::ranges::min_element(of_axes, {}, by_phase);
-  const std::string_view of_realism =
-      scenario.realism ? "; errors have what [realism] adds, and standard errors do not" : "";
-  return fmt::format(
-      "loops that are not the paper's: with a perfect instrument, the least margin of gain is a "
-      "factor of {:.3g} ({}), that of phase {:.3g}° ({}); each run has its own, gain_margin and "
-      "phase_margin_rad{}",
-      gain.margins.gain, axis_text(gain), phase.margins.phase_rad * 180.0 / std::numbers::pi,
-      axis_text(phase), of_realism);
-}
-
-/// The band-pass lets no drift through, but answers its beginning.
-std::string drift_note(const Scenario& scenario) {
-  constexpr double num_decays = 7.0;  // e⁻⁷ is a thousandth.
-  if (!scenario.realism || estimation_method(scenario.estimation.method).has_standard_errors)
-    return {};
-  const auto& drifts = scenario.realism->bias_drift_m_s3;
-  if (std::ranges::all_of(drifts, [](double drift) { return drift == 0.0; })) return {};
-  double longest_s = 0.0;
-  for (const Session& session : scenario.sessions) {
-    if (is_test(session) || session.fit_lines.empty()) continue;
-    longest_s = std::max(longest_s, band_decay_s(scenario, session));
-  }
-  const double least_s = num_decays * longest_s;
-  if (scenario.estimation.transient_s >= least_s) return {};
-  return fmt::format(
-      "biases drift, and with estimation.transient_s = {} s the filter's answer to the beginning "
-      "of "
-      "a record is in the estimates; after {:.0f} s a thousandth of it is left",
-      scenario.estimation.transient_s, std::ceil(least_s));
-}
-
-/// Whether the gradient's harmonic at 4 f_orb, where it is not fitted, shifts a_c13 by more than
-/// 1/50 of its objective, 1.8e-5. Measured without noise, in inertial pointing: by 0.3 e³/N rad in
-/// N orbits, of which there are 3 or more, and by 1.5e-5 at the bounds for shorter sessions; a_c12
-/// is not shifted.
-bool shifts_a_c13(double e, int num_orbits) {
-  if (num_orbits == 1) return e > 0.012;
-  if (num_orbits == 2) return e > 0.035;
-  return 0.3 * e * e * e > 1.8e-5 * num_orbits;
-}
-
-/// The gradient's harmonics at 2, 3 and 4 f_orb are as 1, 7e/2 and 17e²/2.
-std::string eccentricity_note(const Scenario& scenario) {
-  const double e = scenario.orbit.eccentricity;
-  const auto has = [](const std::vector<LineMultiple>& lines, double orbital) {
-    return std::ranges::find(lines, LineMultiple{orbital, 1.0}) != lines.end();
-  };
-  std::vector<std::string_view> sessions;
-  for (const Session& session : scenario.sessions) {
-    if (session.target != SessionTarget::a_c13 || !shifts_a_c13(e, session.num_orbits)) continue;
-    const bool is_complete = has(session.known_lines, 4.0) && has(session.known_lines, -4.0);
-    if (has(session.fit_lines, 2.0) && !is_complete) sessions.push_back(session.name);
-  }
-  if (sessions.empty()) return {};
-  return fmt::format(
-      "orbit.eccentricity = {}: the gradient's harmonic at 4 f_orb is {:.2g} % of that at 2 f_orb, "
-      "and shifts a_c13 of sessions whose known_lines lack [4, 1] and [-4, 1]: {}",
-      e, 100.0 * 8.5 * e * e, fmt::join(sessions, ", "));
-}
-
-/// What the loops' start leaves in a record looks like noise to fits and monitors.
-std::string settling_note(const Scenario& scenario) {
-  constexpr double num_decays = 7.0;  // e⁻⁷ is a thousandth.
-  const double decay_s = slowest_decay_s(scenario), least_s = std::ceil(num_decays * decay_s);
-  if (scenario.simulation.settling_s >= least_s) return {};
-  const std::string_view effect =
-      "records begin before the loops have settled, which standard errors may take for noise: "
-      "their slowest mode";
-  const std::string_view cause = scenario.controllers.empty()
-                                     ? "raise the integral_hz of the loop, or set it to 0"
-                                     : "a [[controller]] holds what it steers too weakly";
-  if (decay_s > 1e6) return fmt::format("{} hardly decays: {}", effect, cause);
-  const std::string advice =
-      least_s > SimulationConfig::settling_max_s
-          ? fmt::format("no simulation.settling_s is long enough: {}", cause)
-          : fmt::format(
-                "simulation.settling_s = {} is less than the {:.0f} s after which a "
-                "thousandth of it is left",
-                scenario.simulation.settling_s, least_s);
-  return fmt::format("{} decays by e in {:.0f} s, and {}", effect, decay_s, advice);
-}
-
-/// What a resonator takes from a line comes in with time.
-std::string resonator_note(const Scenario& scenario) {
-  constexpr double part_max = 0.1;
-  const double damping = scenario.drag_free.resonator_damping;
-  double largest = part_max, decay_s = 0.0;
-  for (const Session& session : scenario.sessions) {
-    if (damping == 0.0 || !is_test(session)) continue;
-    const double period_s = scenario.orbit.period_s, duration_s = session.num_orbits * period_s;
-    const double of_session_s =
-        1.0 / (2.0 * std::numbers::pi * damping * test_frequency_hz(session, period_s));
-    const double part = exponential(-scenario.simulation.settling_s / of_session_s) *
-                        (1.0 - exponential(-duration_s / of_session_s)) * of_session_s / duration_s;
-    if (part > largest) std::tie(largest, decay_s) = std::pair(part, of_session_s);
-  }
-  if (largest == part_max) return {};
-  return fmt::format(
-      "with drag_free.resonator_damping = {} what the loop leaves at f_EP decays by e in {:.0f} s, "
-      "so that {:.0f} % of it is left in the mean of a test: raise it, or simulation.settling_s",
-      damping, decay_s, 100.0 * largest);
-}
-
-/// A file has the accelerations in the satellite's frame, and so those of one spin.
-std::string environment_note(const MicroscopeCampaign& campaign) {
-  const Scenario& scenario = campaign.scenario;
-  if (campaign.environment_table.empty()) return {};
-  const auto [slow, fast] = std::ranges::minmax(scenario.sessions, {},
-                                                [](const Session& s) { return s.spin_rate_rad_s; });
-  if (slow.spin_rate_rad_s != fast.spin_rate_rad_s) {
-    return fmt::format(
-        "environment.file has accelerations in the satellite's frame, and the satellite spins "
-        "otherwise in {} than in {}: it is right for one of them at most",
-        slow.name, fast.name);
-  }
-  const int num_orbits = std::ranges::max(scenario.sessions, {}, &Session::num_orbits).num_orbits;
-  const double end_s = campaign.environment_table.back().time_s;
-  const double turns = slow.spin_rate_rad_s * scenario.orbit.period_s / (2.0 * std::numbers::pi);
-  if (end_s >= num_orbits * scenario.orbit.period_s) return {};
-  if (std::abs(turns - std::round(turns)) < 1e-6) return {};
-  return fmt::format(
-      "environment.file ends after {:.0f} s, and then its first orbit is repeated, in which the "
-      "satellite makes {:.6g} turns: not a whole number, so that accelerations jump; make the file "
-      "as long as the longest session",
-      end_s, turns);
-}
-
-std::string gaps_note(const Scenario& scenario) {
-  const GapsConfig& gaps = scenario.gaps;
-  if (!scenario.has_tests() || !gaps.lose_data()) return {};
-  double num_orbits = 0.0, num_lost = 0.0;
-  for (const Session& session : scenario.sessions) {
-    if (!is_test(session)) continue;
-    num_orbits += session.num_orbits;
-    num_lost += session.num_orbits * (1.0 - kept_part(gaps, session, scenario.orbit.period_s));
-  }
-  return fmt::format("[gaps] takes about {:.2g} % of the samples of tests",
-                     100.0 * num_lost / num_orbits);
-}
-
-}  // namespace
-
-std::string MicroscopeCampaign::note() const {
-  std::string all;
-  for (const std::string& note :
-       {unwatched_note(scenario), loops_note(scenario), settling_note(scenario),
-        resonator_note(scenario), drift_note(scenario), eccentricity_note(scenario),
-        environment_note(*this), gaps_note(scenario)}) {
-    if (!all.empty() && !note.empty()) all += "; ";
-    all += note;
-  }
-  return all;
 }
 
 std::vector<double> MicroscopeCampaign::objectives() const {
