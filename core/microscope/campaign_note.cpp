@@ -202,6 +202,24 @@ std::string resonator_note(const Scenario& scenario) {
       damping, decay_s, 100.0 * largest);
 }
 
+/// A straight line between rows weakens a line at ω by (ωh)²/12: a tenth of an orbit, at 2 f_orb,
+/// by an eighth.
+std::string rows_note(const MicroscopeCampaign& campaign) {
+  const EnvironmentTable& table = campaign.environment_table;
+  const double longest_s = 0.1 * campaign.scenario.orbit.period_s;
+  for (std::size_t i = 1; i < table.size(); ++i) {
+    const EnvironmentRow &row = table[i - 1], &next = table[i];
+    const bool is_constant =
+        row.linear_m_s2 == next.linear_m_s2 && row.angular_rad_s2 == next.angular_rad_s2;
+    if (is_constant || next.time_s - row.time_s <= longest_s) continue;
+    return fmt::format(
+        "environment.file has no row for {:.0f} s after time_s = {:.0f}, more than a tenth of an "
+        "orbit: accelerations there are those of a straight line",
+        next.time_s - row.time_s, row.time_s);
+  }
+  return {};
+}
+
 /// A file has the accelerations in the satellite's frame, and so those of one spin.
 std::string environment_note(const MicroscopeCampaign& campaign) {
   const Scenario& scenario = campaign.scenario;
@@ -246,7 +264,7 @@ std::string MicroscopeCampaign::note() const {
   for (const std::string& note :
        {unwatched_note(scenario), loops_note(scenario), thrust_note(*this), settling_note(scenario),
         resonator_note(scenario), drift_note(scenario), eccentricity_note(scenario),
-        environment_note(*this), gaps_note(scenario)}) {
+        rows_note(*this), environment_note(*this), gaps_note(scenario)}) {
     if (!all.empty() && !note.empty()) all += "; ";
     all += note;
   }
