@@ -391,7 +391,14 @@ std::vector<Part> error_parts(const Review& review) {
 }
 
 ChartGrid magnitude_overview(const Review& review) {
-  ChartGrid grid{.text = {.id = "errors", .title = "Errors in units of their objectives (dashed)"}};
+  const auto has_objective = [](double objective) { return std::isfinite(objective); };
+  std::string title = "Errors in units of their objectives (dashed)";
+  if (std::ranges::none_of(review.objectives, has_objective)) {
+    title = "Errors in units of the worst";
+  } else if (!std::ranges::all_of(review.objectives, has_objective)) {
+    title += " or, without one, of the worst";
+  }
+  ChartGrid grid{.text = {.id = "errors", .title = std::move(title)}};
   // One axis for all, so that they can be compared.
   double end = 3.0;
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
