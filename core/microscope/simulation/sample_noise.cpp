@@ -38,7 +38,8 @@ NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s) {
           .star_tracker_factor = {scale * star(0, 0), scale * star(1, 0), scale * star(1, 1),
                                   scale * star(2, 0), scale * star(2, 1), scale * star(2, 2)},
           .thrust_deviation = config.thrust_asd_m_s2 * per_sample,
-          .torque_deviation = config.torque_asd_rad_s2 * per_sample};
+          .torque_deviation = config.torque_asd_rad_s2 * per_sample,
+          .is_silent = scale == 0.0};
 }
 
 const std::array<std::string_view, num_noise_channels>& noise_channel_names() {
@@ -117,6 +118,7 @@ SessionNoise::SessionNoise(const NoiseModel& model, std::uint64_t seed, RunIndex
       states_(stationary_states(model, seed, run, start_streams(session_name))) {}
 
 const SampleNoise<double>& SessionNoise::next() {
+  if (model_->is_silent) return block_[0];  // Whatever is drawn would be multiplied by 0.
   if (next_in_block_ == samples_per_noise_block) {
     const auto white = [&](std::size_t channel) {
       const RandomStream stream(seed_, run_, streams_[channel]);

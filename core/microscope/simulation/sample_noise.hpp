@@ -34,6 +34,7 @@ struct NoiseModel {
   std::array<double, 6> star_tracker_factor{};
   double thrust_deviation = 0.0;  ///< Of a sample, each axis, m/s².
   double torque_deviation = 0.0;  ///< Of a sample, each axis, rad/s².
+  bool is_silent = false;         ///< All of them are 0.
 };
 
 /// The model of a configuration. The only function that applies NoiseConfig::scale to noise: each
