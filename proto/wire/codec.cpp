@@ -121,22 +121,27 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
 }
 
 void ResultBatches::add(const LeasedResult& result) {
+  constexpr std::size_t size_max = router_message_size_max - 1024;  // Room for the envelope.
+  constexpr std::size_t frame_size = 8;                             // Of a result, at most.
   const auto& [campaign, attempt, computed] = result;
-  proto::ResultBatch& batch = open_[{campaign, attempt}];
+  proto::ComputedRun run;
+  write_run(computed, run);
+  const std::size_t size = run.ByteSizeLong() + frame_size;
+  auto& [batch, batch_size] = open_[{campaign, attempt}];
+  const bool is_full = batch_size + size > size_max ||
+                       static_cast<std::size_t>(batch.results_size()) == runs_per_lease_max;
+  if (is_full && batch.results_size() > 0) {
+    full_.push_back(std::exchange(batch, {}));
+    batch_size = 0;
+  }
   batch.set_campaign(campaign.value);
   batch.set_attempt(attempt.value);
-  proto::ComputedRun& run = *batch.add_results();
-  write_run(computed, run);
-  // Results of one campaign are about as large as each other; half of a message is left for that.
-  const std::size_t count_max = std::clamp(message_size_max / 2 / run.ByteSizeLong(),
-                                           std::size_t{1}, std::size_t{runs_per_lease_max});
-  if (static_cast<std::size_t>(batch.results_size()) < count_max) return;
-  full_.push_back(std::move(batch));
-  open_.erase({campaign, attempt});
+  *batch.add_results() = std::move(run);
+  batch_size += size;
 }
 
 std::vector<proto::ResultBatch> ResultBatches::take() {
-  for (auto& [key, batch] : open_) full_.push_back(std::move(batch));
+  for (auto& [key, open] : open_) full_.push_back(std::move(open.batch));
   return std::move(full_);
 }
 

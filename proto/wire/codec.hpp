@@ -63,7 +63,7 @@ void add_ranges(std::span<const RunRange> ranges, Ranges& message);
 /// @param message  Is empty at first.
 void write_run(const ComputedRun& computed, proto::ComputedRun& message);
 
-/// Results as messages, each of one campaign and attempt.
+/// Results as messages that a coordinator's socket takes, each of one campaign and attempt.
 class ResultBatches {
  public:
   void add(const LeasedResult& result);
@@ -71,8 +71,13 @@ class ResultBatches {
   [[nodiscard]] std::vector<proto::ResultBatch> take();
 
  private:
+  struct Open {
+    proto::ResultBatch batch;
+    std::size_t size = 0;  ///< Of its results, bytes.
+  };
+
   std::vector<proto::ResultBatch> full_;
-  std::map<std::pair<CampaignId, Attempt>, proto::ResultBatch> open_;
+  std::map<std::pair<CampaignId, Attempt>, Open> open_;
 };
 
 [[nodiscard]] inline LossReason loss_reason(proto::LossReason reason) {

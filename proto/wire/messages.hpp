@@ -31,7 +31,8 @@ inline constexpr std::size_t definition_part_size_max = std::size_t{256} << 10; 
 inline constexpr std::size_t definition_size_max = std::size_t{64} << 20;
 inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
 /// What a coordinator's socket takes at once, bytes. A peer that has shown no key yet may fill a
-/// buffer of this size. 4096 results, the largest message of a worker, need 0.8 MiB.
+/// buffer of this size. Beyond it a connection is dropped, and made again in vain: ResultBatches
+/// are smaller.
 inline constexpr std::size_t router_message_size_max = std::size_t{1} << 20;
 inline constexpr std::uint64_t definition_tables_max = 64;
 inline constexpr std::uint64_t columns_of_a_table_max = 64;
