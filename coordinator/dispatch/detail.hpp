@@ -43,6 +43,8 @@ void take_off(State& state, LeaseId lease, RunRange runs);
 /// To be called before runs are taken off a lease while their worker may still compute them.
 void note_unleased(State& state, LeaseId lease, RunRange runs);
 
+void send_lease(State& state, LeaseId lease, Outbox& outbox);
+
 /// To be called when a worker is lent runs of a campaign, and before anything of it is written to
 /// the campaign's file: the file then knows it. A worker that was lent none changes no file.
 void note_joined(CampaignId campaign, Worker& worker, Outbox& outbox);
@@ -166,8 +168,6 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 
 /// True if so many results wait for the store that no more runs are lent for now.
 [[nodiscard]] bool is_backed_up(const State& state, const CampaignState& campaign);
-
-void send_lease(State& state, LeaseId lease, Outbox& outbox);
 
 /// To be called whenever the phase or the priority of a campaign has changed.
 void sort_served(State& state);

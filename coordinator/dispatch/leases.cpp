@@ -350,4 +350,58 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
   state.workers.erase(id);
 }
 
+namespace {
+
+/// Runs whose table values have room in a message.
+std::uint64_t runs_per_message(const Campaign& campaign) {
+  const std::size_t run_size = sizeof(double) * campaign.table_columns.size();
+  if (run_size == 0) return wire::runs_per_lease_max;
+  return std::clamp<std::uint64_t>(wire::message_size_max / 2 / run_size, 1,
+                                   wire::runs_per_lease_max);
+}
+
+void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& lease) {
+  if (campaign.table_columns.empty()) return;
+  for (std::uint64_t run = runs.first.value; run < runs.end(); ++run) {
+    for (const std::vector<double>& column : campaign.table_columns) {
+      lease.add_table_values(column[run]);
+    }
+  }
+}
+
+/// A batch of a lease has the same part in its runs as in its slots.
+std::uint32_t batch_runs_max(const Lease& lease, const Campaign& campaign) {
+  const std::uint64_t num_slots_needed = lease.num_runs * lease.slots_per_run;
+  if (num_slots_needed >= lease.num_slots) return 0;
+  const std::uint64_t batch_size = campaign.model().batch_size();
+  return static_cast<std::uint32_t>(
+      ratio_rounded_up(num_slots_needed * batch_size, lease.num_slots));
+}
+
+}  // namespace
+
+void send_lease(State& state, LeaseId id, Outbox& outbox) {
+  const Lease& lease = state.leases.at(id);
+  note_joined(lease.campaign, state.workers.at(lease.worker), outbox);
+  const Campaign& campaign = *state.campaigns.at(lease.campaign).definition;
+  const std::uint64_t count_max = runs_per_message(campaign);
+  for (const RunRange& range : lease.remaining.ranges()) {
+    for (std::uint64_t begin = 0; begin < range.count; begin += count_max) {
+      const RunRange runs{.first = {range.first.value + begin},
+                          .count = std::min(count_max, range.count - begin)};
+      proto::Envelope envelope;
+      proto::RunLease& message = *envelope.mutable_run_lease();
+      message.set_campaign(lease.campaign.value);
+      message.set_first_run(runs.first.value);
+      message.set_num_runs(static_cast<std::uint32_t>(runs.count));
+      message.set_attempt(lease.attempt.value);
+      message.set_is_alone(lease.is_alone);
+      message.set_batch_runs_max(batch_runs_max(lease, campaign));
+      message.set_is_for_cards(lease.is_for_cards);
+      add_table_values(campaign, runs, message);
+      outbox.send(lease.worker, std::move(envelope));
+    }
+  }
+}
+
 }  // namespace proofmass::coordinator::detail

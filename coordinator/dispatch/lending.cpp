@@ -206,15 +206,6 @@ Share share_of_cards(const State& state, CampaignId id, const CampaignState& cam
   return {.num_runs = num_missing, .num_slots = num_missing};
 }
 
-void add_table_values(const Campaign& campaign, RunRange runs, proto::RunLease& lease) {
-  if (campaign.table_columns.empty()) return;
-  for (std::uint64_t run = runs.first.value; run < runs.end(); ++run) {
-    for (const std::vector<double>& column : campaign.table_columns) {
-      lease.add_table_values(column[run]);
-    }
-  }
-}
-
 /// One worker that is being lent runs of one campaign, for its processors or its cards.
 struct Borrower {
   State& state;
@@ -341,15 +332,6 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
   return have_processors_enough && worker.num_lent_to_cards >= worker.num_card_slots;
 }
 
-/// A batch of a lease has the same part in its runs as in its slots.
-std::uint32_t batch_runs_max(const Lease& lease, const Campaign& campaign) {
-  const std::uint64_t num_slots_needed = lease.num_runs * lease.slots_per_run;
-  if (num_slots_needed >= lease.num_slots) return 0;
-  const std::uint64_t batch_size = campaign.model().batch_size();
-  return static_cast<std::uint32_t>(
-      ratio_rounded_up(num_slots_needed * batch_size, lease.num_slots));
-}
-
 void send_forget(WorkerId worker, CampaignId id, std::uint64_t num_runs, Outbox& outbox) {
   proto::Envelope envelope;
   envelope.mutable_forget()->set_campaign(id.value);
@@ -419,25 +401,6 @@ bool is_lent(const CampaignState& campaign) {
 bool is_backed_up(const State& state, const CampaignState& campaign) {
   const std::uint64_t num_under_way = campaign.delivered.size() + campaign.num_comparing;
   return 2 * num_under_way >= state.config.uncommitted_max;
-}
-
-void send_lease(State& state, LeaseId id, Outbox& outbox) {
-  const Lease& lease = state.leases.at(id);
-  note_joined(lease.campaign, state.workers.at(lease.worker), outbox);
-  const Campaign& campaign = *state.campaigns.at(lease.campaign).definition;
-  for (const RunRange& runs : lease.remaining.ranges()) {
-    proto::Envelope envelope;
-    proto::RunLease& message = *envelope.mutable_run_lease();
-    message.set_campaign(lease.campaign.value);
-    message.set_first_run(runs.first.value);
-    message.set_num_runs(static_cast<std::uint32_t>(runs.count));
-    message.set_attempt(lease.attempt.value);
-    message.set_is_alone(lease.is_alone);
-    message.set_batch_runs_max(batch_runs_max(lease, campaign));
-    message.set_is_for_cards(lease.is_for_cards);
-    add_table_values(campaign, runs, message);
-    outbox.send(lease.worker, std::move(envelope));
-  }
 }
 
 void sort_served(State& state) {

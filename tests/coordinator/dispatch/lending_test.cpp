@@ -52,6 +52,28 @@ TEST_F(LendingTest, GivesManySlotsSeveralLeases) {
   check_invariants(state);
 }
 
+// 1,000 columns of 1,000 runs are 8 MB, and half of a message has room for 262 runs.
+TEST_F(LendingTest, SendsNoMoreTableValuesThanAMessageHolds) {
+  MicroscopeCampaign campaign;
+  campaign.num_runs = 1000;
+  campaign.table_columns.assign(1000, std::vector<double>(1000, 0.5));
+  on_campaign(state, one, {.definition = std::make_shared<const MicroscopeCampaign>(campaign)}, now,
+              outbox);
+  say_hello(first, hello(1000));
+  outbox.drop_sent<proto::Welcome>(first);
+  (void)outbox.take_events();
+  heartbeat(first);
+  std::uint64_t end = 0;
+  for (const std::uint32_t count : {262U, 262U, 262U, 214U}) {
+    const auto lease = outbox.take_sent<proto::RunLease>(first);
+    EXPECT_EQ(lease.first_run(), end);
+    EXPECT_EQ(lease.num_runs(), count);
+    EXPECT_EQ(lease.table_values_size(), static_cast<int>(1000 * count));
+    EXPECT_LT(lease.ByteSizeLong(), wire::message_size_max);
+    end += count;
+  }
+}
+
 TEST_F(LendingTest, GivesNothingWhileTooManyResultsWaitForTheStore) {
   state.config.uncommitted_max = 4;
   add_campaign(one, 100);
