@@ -97,8 +97,10 @@ struct ExplanatoryTerm {
                                                              std::size_t num_outputs);
 
 /// The share of an output's variance that a term has to explain to be found by explanatory_terms()
-/// in half of all samples of this size: z²/n, where the normal law exceeds z with the probability
-/// that a candidate is kept at, as the statistic of a term with the correlation r is about r√n.
+/// in half of all samples of this size. With a the values of a term and b the output, of variance 1
+/// and correlation r, ⟨a²b²⟩ = 1 + (k − 1)r² with k = ⟨a⁴⟩, so that the statistic Σab/√Σa²b² is
+/// about r√n/√(1 + (k − 1)r²). That is z, which the normal law exceeds with the probability that a
+/// candidate is kept at, for r² = z²/(n − (k − 1)z²). k is the mean of the inputs.
 ///
 /// @return At least term_share_min; above 1 if no term would be found so often.
 [[nodiscard]] double term_share_found(std::span<const Column> inputs, double confidence,

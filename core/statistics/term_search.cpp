@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
@@ -76,6 +77,16 @@ Values limited(const Values& values) {
   const double limit = 2.0 * std::sqrt(dot(result, result) / static_cast<double>(result.size()));
   for (double& value : result) value = std::clamp(value, -limit, limit);
   return centred(result);
+}
+
+/// Σx⁴/n over (Σx²/n)² of centred values.
+double kurtosis_of(const Values& values) {
+  double square = 0.0, fourth = 0.0;
+  for (const double value : values) {
+    square += value * value;
+    fourth += value * value * value * value;
+  }
+  return static_cast<double>(values.size()) * fourth / (square * square);
 }
 
 /// Inputs and products of two of so many.
@@ -269,12 +280,21 @@ std::vector<ExplanatoryTerm> explanatory_terms(std::span<const Column> inputs, C
 double term_share_found(std::span<const Column> inputs, double confidence,
                         std::size_t num_outputs) {
   detail::check_fraction("confidence", confidence);
-  const auto num_inputs = static_cast<std::size_t>(std::ranges::count_if(inputs, detail::varies));
+  std::size_t num_inputs = 0;
+  double sum = 0.0;
+  for (const Column input : inputs) {
+    if (!detail::varies(input)) continue;
+    ++num_inputs;
+    sum += kurtosis_of(limited(factor_values(input)));
+  }
   if (num_inputs == 0) return 1.0;
+  const double kurtosis = sum / static_cast<double>(num_inputs);
   const double significance =
       (1.0 - confidence) / static_cast<double>(num_outputs) / num_terms_of(num_inputs);
   const double square = chi_square_quantile(1.0 - significance, 1.0);  // Of a normal deviate.
-  return std::max(square / static_cast<double>(inputs.front().size()), term_share_min);
+  const double rest = static_cast<double>(inputs.front().size()) - (kurtosis - 1.0) * square;
+  if (rest <= 0.0) return std::numeric_limits<double>::infinity();
+  return std::max(square / rest, term_share_min);
 }
 
 }  // namespace proofmass
