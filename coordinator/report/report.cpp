@@ -373,6 +373,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
   Review review{.name = store.name(),
                 .seed = store.seed(),
                 .num_runs = store.num_runs(),
+                .num_runs_fixed = store.num_runs_fixed(),
                 .model_version = store.model_version(),
                 .is_of_program = !store.model().description().empty(),
                 .is_imported = store.model().is_imported(),
@@ -389,7 +390,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign, ReviewDep
   const bool are_independent = review.why_not_independent.empty();
   ErrorFigures figures(review.objectives.size(), num_runs_in(finished), are_independent);
   VerificationMatrix matrix(store.schema(), std::move(stated), review.objectives, judged,
-                            store.num_runs_fixed(), review.budget);
+                            review.num_runs_fixed, review.budget);
   review.results = read_checked_results(
       store, campaign,
       {.result =

@@ -77,8 +77,12 @@ double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
   return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
 }
 
-bool is_of_fixed_size(const Review& review) {
-  return review.matrix.empty() || review.matrix.front().check.is_of_fixed_size;
+/// Said behind what holds for a number of runs that was fixed before the first of them.
+std::string unfixed_text(const Review& review) {
+  const std::uint64_t num_runs =
+      review.results.statistics.num_runs + review.results.missing.num_given_up;
+  if (review.num_runs_fixed == num_runs) return "";
+  return fmt::format(", and for a number of runs fixed beforehand, which {} was not", num_runs);
 }
 
 /// Which biases differ from 0, and which intervals do not hold.
@@ -96,17 +100,14 @@ std::string bias_sentence(const Review& review) {
       symbols_of(review.schema, [&](std::size_t i) { return is_biased(review, i); });
   const std::size_t count = statistics.accuracy.size();
   return fmt::format(
-      "Bias: each interval holds by itself{}{}. {} {}.",
-      is_of_fixed_size(review)
-          ? ""
-          : fmt::format(", and for a number of runs fixed beforehand, which {} was not",
-                        statistics.num_runs),
+      "Bias: each interval holds by itself{}{}. {} {}.", unfixed_text(review),
       skewed.empty() ? ""
                      : fmt::format(", but not of errors that are too skewed for {} runs: {}",
                                    num_runs, skewed),
       count == 1 ? "At 5 %" : fmt::format("Of all {} together (Holm, 5 %)", count),
-      names.empty() ? fmt::format("no {}bias differs from 0", skewed.empty() ? "" : "other ")
-                    : "the bias differs from 0 of " + names);
+      names.empty()
+          ? fmt::format("no {}bias is found to differ from 0", skewed.empty() ? "" : "other ")
+          : "the bias differs from 0 of " + names);
 }
 
 /// Where the intervals of |error| cover less than they say; empty if nowhere.
@@ -330,9 +331,10 @@ Table interval_table(const Review& review) {
   if (std::string note = skewness_note(review); !note.empty()) table.notes.push_back(note);
   // Whoever stops where the errors are small sees a worst one that is too small.
   if (!review.stop) {
-    table.notes.push_back(worth_of_worst(
-        statistics.num_estimated,
-        statistics.num_runs - statistics.num_estimated + review.results.missing.num_given_up));
+    const std::uint64_t num_without_estimate =
+        statistics.num_runs - statistics.num_estimated + review.results.missing.num_given_up;
+    table.notes.push_back(worth_of_worst(statistics.num_estimated, num_without_estimate) +
+                          unfixed_text(review));
   }
   return table;
 }

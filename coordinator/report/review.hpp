@@ -134,6 +134,7 @@ struct Review {
   std::string name = {};
   std::uint64_t seed = 0;
   std::uint64_t num_runs = 0;  ///< Wanted.
+  std::optional<std::uint64_t> num_runs_fixed = {};  ///< Store::num_runs_fixed().
   std::string model_version = {};
   bool is_of_program = false;  ///< Its model needs one to be simulated again.
   bool is_imported = false;    ///< Model::is_imported().

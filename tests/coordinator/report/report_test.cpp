@@ -31,6 +31,7 @@ Review review_of(const Campaign& campaign, const CampaignStatistics& statistics,
   Review review{.name = "hardy2013",
                 .seed = 1,
                 .num_runs = 100,
+                .num_runs_fixed = statistics.num_runs + num_given_up,
                 .schema = test::schema(),
                 .objectives = campaign.objectives(),
                 .budget = campaign.error_budget()};
@@ -147,6 +148,18 @@ TEST(ErrorTable, NamesNoBiasOfErrorsThatAreTooSkewed) {
   EXPECT_THAT(error_text(review_of(MicroscopeCampaign(), statistics)),
               ::testing::AllOf(HasSubstr("too skewed for\n  100 runs: K2c/K1c². Of all 10"),
                                HasSubstr("the bias differs from 0 of\n  a_c12.")));
+}
+
+// Intervals hold for a number of runs that no result has a part in.
+TEST(ErrorTable, SaysThatTheNumberOfRunsWasNotFixed) {
+  Review review = review_of(MicroscopeCampaign(), paper_statistics(100), 3);
+  EXPECT_THAT(error_text(review), ::testing::Not(HasSubstr("fixed beforehand")));
+  EXPECT_THAT(interval_text(review), ::testing::Not(HasSubstr("fixed beforehand")));
+  for (const std::optional<std::uint64_t> fixed : {std::optional<std::uint64_t>(), {100}}) {
+    review.num_runs_fixed = fixed;
+    EXPECT_THAT(error_text(review), HasSubstr("runs fixed beforehand,\n  which 103 was not"));
+    EXPECT_THAT(interval_text(review), HasSubstr("which 103 was not"));
+  }
 }
 
 // √100/5 + 2√(6/100) = 2.49.
