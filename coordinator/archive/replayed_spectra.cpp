@@ -125,12 +125,14 @@ std::vector<SpectrumPoint> points_of(const BinnedSpectrum& spectrum,
 }
 
 /// A bin over its mean has an exponential distribution, whose median is ln 2. The median hardly
-/// sees lines that the session does not fit.
+/// sees lines that the session does not fit, of which each has three bins: of few bins there is
+/// none to tell.
 std::optional<NoiseRatio> noise_ratio_of(const BinnedSpectrum& spectrum,
                                          const ExpectedSpectrum& expected) {
   const std::vector<double>& used_hz = expected.fits.front().fit_hz;
   const double from_hz = std::ranges::min(used_hz) / 3.0;
   const double to_hz = std::ranges::max(used_hz) * 3.0;
+  constexpr std::size_t num_bins_min = 16;
   std::vector<double> ratios;
   for (std::size_t bin = first_bin; bin < spectrum.size(); ++bin) {
     const double frequency_hz = spectrum.frequency_hz(bin);
@@ -139,7 +141,7 @@ std::optional<NoiseRatio> noise_ratio_of(const BinnedSpectrum& spectrum,
     if (!(noise_psd > 0.0)) return std::nullopt;
     ratios.push_back(spectrum.residual.psd[bin] / noise_psd);
   }
-  if (ratios.empty()) return std::nullopt;
+  if (ratios.size() < num_bins_min) return std::nullopt;
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::ranges::nth_element(ratios, middle);
   // Of independent bins 1/(ln 2 √n). What the window correlates, neighbours by 4/9 and the next but

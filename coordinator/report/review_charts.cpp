@@ -270,7 +270,8 @@ Chart spectrum_chart(const ResultSchema& schema, const SessionSpectrum& spectrum
                          Dash::solid),
                  line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
                  line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
-  if (spectrum.noise_ratio) {  // There is noise to compare with.
+  const auto is_of_noise = [](const SpectrumPoint& point) { return point.expected > 0.0; };
+  if (std::ranges::any_of(spectrum.points, is_of_noise)) {
     chart.layers.emplace_back(
         line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed));
   }
@@ -299,7 +300,7 @@ Table spectrum_table(const Review& review) {
                           {"noise power ÷ model"}},
               .notes = {"Noise power: from the median of all frequencies up to a factor of three "
                         "from these lines, without what is within two bins of a fitted line, ± its "
-                        "standard error."}};
+                        "standard error; of 16 frequencies at least."}};
   for (const SessionSpectrum& spectrum : spectra.sessions) {
     for (const SpectrumLine& line : spectrum.lines) {
       if (line.is_used) table.rows.push_back(line_cells(review.schema, spectrum, line));

@@ -215,10 +215,9 @@ std::string noise_meaning_of(const NoiseConfig& noise) {
   if (noise.thrust_asd_m_s2 > 0.0) {
     text +=
         " What the drag-free loop leaves of the thrust's noise comes on top, most around 10 mHz, "
-        "the "
-        "more the less both sensors are alike.";
+        "the more the less both sensors are alike.";
   }
-  return text;
+  return text + " So does that of the attitude, times the offcentring.";
 }
 
 /// The lines of the session. A test reads g at its frequency, and the gradient at twice that.

@@ -421,7 +421,11 @@ TEST_F(ReplayedSpectra, ShowALineOfItsHeightAndNoneWithoutIt) {
 TEST_F(ReplayedSpectra, LieOnTheNoiseModel) {
   const Store store = store_with(test::quick_campaign(1));
   for (const SessionSpectrum& spectrum : spectra_of(store).sessions) {
-    ASSERT_TRUE(spectrum.noise_ratio) << spectrum.session;
+    // From f/3 to 3 f about 2 f_orb, five orbits have 26 frequencies, of which lines leave too few.
+    const bool has_few =
+        spectrum.session.starts_with("a_c11_delta") && spectrum.session.back() != 'y';
+    ASSERT_EQ(spectrum.noise_ratio.has_value(), !has_few) << spectrum.session;
+    if (has_few) continue;
     EXPECT_NEAR(spectrum.noise_ratio->value, 1.0, 4.0 * spectrum.noise_ratio->standard_error)
         << spectrum.session;
   }

@@ -137,6 +137,9 @@ TEST_F(ReviewHtml, ShowsTheSpectraOfTheWorstRun) {
                           HasSubstr(">1.04 ± 0.03</td>"), HasSubstr("It is white &amp; quiet."),
                           HasSubstr("noise model"), Not(HasSubstr("<script>"))));
   review.spectra->sessions[0].noise_ratio.reset();
+  EXPECT_THAT(review_html(review),
+              AllOf(HasSubstr("noise model"), Not(HasSubstr(" times that of its model"))));
+  for (SpectrumPoint& point : review.spectra->sessions[0].points) point.expected = 0.0;
   EXPECT_THAT(review_html(review), Not(HasSubstr("noise model")));
   review.spectra->sessions.clear();
   const std::string reasons = review_html(review);
