@@ -27,8 +27,7 @@ struct Extents {
   }
   void add(const Curve& curve) {
     for (const Point& point : curve.points) add(point);
-    // One point is a mark, and no line.
-    has_data |= curve.points.size() > (std::holds_alternative<Dash>(curve.look) ? 1 : 0);
+    has_data |= !curve.points.empty();
   }
   void add(const Band& band) {
     for (const BandPoint& point : band.points) {
@@ -151,7 +150,10 @@ void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
 }
 
 void draw(const Curve& curve, const PlotArea& area, SvgWriter& writer) {
-  const auto* const shape = std::get_if<Shape>(&curve.look);
+  constexpr Shape lone_point = Shape::diamond;  // One point is no line.
+  const auto* const shape = curve.points.size() == 1 && std::holds_alternative<Dash>(curve.look)
+                                ? &lone_point
+                                : std::get_if<Shape>(&curve.look);
   std::string path;
   bool is_begun = false;
   for (const Point& point : curve.points) {

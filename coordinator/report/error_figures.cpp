@@ -224,8 +224,8 @@ std::string worst_sentence(const Review& review, std::size_t index) {
 }
 
 /// Says on an axis what it does not show.
-std::string below_text(const Histogram& histogram) {
-  return histogram.num_below == 0 ? "" : fmt::format("; {} smaller not shown", histogram.num_below);
+std::string below_text(std::uint64_t num_below) {
+  return num_below == 0 ? "" : fmt::format("; {} smaller not shown", num_below);
 }
 
 /// Marks on the axis.
@@ -284,6 +284,15 @@ double overview_scale(const Review& review, std::size_t index) {
   return !worst.empty() && worst[0].value > 0.0 ? worst[0].value : 1.0;
 }
 
+/// Values whose bins lie below a limit, or in none.
+std::uint64_t num_below(const Histogram& histogram, double limit) {
+  std::uint64_t num = histogram.num_below;
+  for (std::size_t i = 0; i < histogram.counts.size() && histogram.edges[i + 1] <= limit; ++i) {
+    num += histogram.counts[i];
+  }
+  return num;
+}
+
 /// Half the width of an interval over the value in its middle, percent.
 std::optional<double> relative_percent(const std::optional<Interval>& interval, double value) {
   if (!interval || !(value > 0.0)) return std::nullopt;
@@ -299,7 +308,7 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
                            "Histogram of {}. {} {}",
                            counted(review.results.statistics.num_estimated, "run"),
                            objective_sentence(review, index), worst_sentence(review, index))},
-              .x = {.label = axis_label("|error|", quantity) + below_text(histogram),
+              .x = {.label = axis_label("|error|", quantity) + below_text(histogram.num_below),
                     .scale = Scale::logarithmic},
               .y = {.label = "runs", .is_count = true}};
   const double objective = review.objectives[index] / quantity.display_scale;
@@ -400,6 +409,7 @@ ChartGrid magnitude_overview(const Review& review) {
   }
   ChartGrid grid{.text = {.id = "errors", .title = std::move(title)}};
   // One axis for all, so that they can be compared.
+  constexpr double from = 1e-4;
   double end = 3.0;
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     const std::vector<double>& edges = review.figures[i].magnitudes.edges;
@@ -408,15 +418,18 @@ ChartGrid magnitude_overview(const Review& review) {
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     const Quantity& quantity = quantity_at(review, i);
     const double objective = review.objectives[i];
-    Chart chart{.text = {.id = fmt::format("errors-{}", quantity.name),
-                         .title = std::string(quantity.symbol)},
-                .x = {.label = std::isfinite(objective) ? "|error| / objective" : "|error| / worst",
-                      .scale = Scale::logarithmic,
-                      .from = 1e-4,
-                      .to = end},
-                .y = {.label = "runs", .is_count = true},
-                .layers = {bars_of(review.figures[i].magnitudes, overview_scale(review, i))},
-                .plot_height = 70.0};
+    Chart chart{
+        .text = {.id = fmt::format("errors-{}", quantity.name),
+                 .title = std::string(quantity.symbol)},
+        .x = {.label = (std::isfinite(objective) ? "|error| / objective" : "|error| / worst") +
+                       below_text(num_below(review.figures[i].magnitudes,
+                                            from * overview_scale(review, i))),
+              .scale = Scale::logarithmic,
+              .from = from,
+              .to = end},
+        .y = {.label = "runs", .is_count = true},
+        .layers = {bars_of(review.figures[i].magnitudes, overview_scale(review, i))},
+        .plot_height = 70.0};
     if (std::isfinite(objective)) chart.layers.emplace_back(LimitLine{.value = 1.0});
     grid.charts.push_back(std::move(chart));
     grid.text.description +=

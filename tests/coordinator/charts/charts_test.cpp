@@ -173,9 +173,11 @@ TEST(Chart, CutsNoLabelOfATick) {
   EXPECT_LE(end, 480.0);
 }
 
-TEST(Chart, HasNoLineOfOnePoint) {
-  EXPECT_THAT(svg_of(curve({{1.0, 0.5}}, Scale::logarithmic), SvgUse::file),
-              HasSubstr(">no data</text>"));
+TEST(Chart, ShowsOnePointAsAMark) {
+  const std::string svg = svg_of(curve({{1.0, 0.5}}, Scale::logarithmic), SvgUse::file);
+  EXPECT_THAT(svg, Not(HasSubstr("no data")));
+  EXPECT_THAT(test::tags_of(svg, "<path[^>]*#008f68[^>]*>"), SizeIs(1));
+  EXPECT_THAT(svg_of(curve({}, Scale::logarithmic), SvgUse::file), HasSubstr(">no data</text>"));
 }
 
 TEST(BarChart, HasValuesAsText) {
