@@ -411,6 +411,15 @@ void check_document(const std::filesystem::path& file, wire::IfThere if_there) {
   check_output_file(file, if_there, "- writes to standard output");
 }
 
+void check_no_input(const std::filesystem::path& output,
+                    std::initializer_list<std::filesystem::path> inputs) {
+  for (const std::filesystem::path& input : inputs) {
+    std::error_code ignored;
+    if (!std::filesystem::equivalent(output, input, ignored)) continue;
+    refuse_output(output, "is what this command reads, which --force does not replace");
+  }
+}
+
 void write_document(const std::filesystem::path& file, wire::IfThere if_there,
                     std::string_view text) {
   if (file == "-") return write_standard_output(text);

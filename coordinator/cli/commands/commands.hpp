@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -81,6 +82,9 @@ void check_output_file(const std::filesystem::path& output, wire::IfThere if_the
 
 /// check_output_file() for a text whose file may be `-`, standard output, or empty, none.
 void check_document(const std::filesystem::path& file, wire::IfThere if_there);
+/// @throws UsageError `output = path (rule)` if the output would take the place of an input.
+void check_no_input(const std::filesystem::path& output,
+                    std::initializer_list<std::filesystem::path> inputs);
 /// Writes a file that is whole or not there at any time, or to standard output for `-`.
 /// @throws Error `output = path (reason)`.
 void write_document(const std::filesystem::path& file, wire::IfThere if_there,

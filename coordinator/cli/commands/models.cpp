@@ -54,6 +54,7 @@ struct EnvironmentOptions {
 
 int write_environment(const EnvironmentOptions& options) {
   check_document(options.output, options.if_there);
+  check_no_input(options.output, {options.file, options.physics});
   const auto [text, note] =
       environment_file(options.file, options.overrides, options.physics, options.session);
   if (text.empty()) {

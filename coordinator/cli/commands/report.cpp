@@ -137,8 +137,10 @@ int write_documents(const ReportOptions& options, const Store& store,
 int print_report(const ReportOptions& options) {
   if (is_remote(options.connection, options.database)) return print_remote_report(options);
   check_standard_output(options);
-  check_document(options.html, options.if_there);
-  check_document(options.markdown, options.if_there);
+  for (const std::filesystem::path& document : {options.html, options.markdown}) {
+    check_document(document, options.if_there);
+    check_no_input(document, {options.requirements_file});
+  }
   const Store store = Store::open_read_only(options.database);
   const std::vector<StatedRequirement> stated = stated_in(options, store.schema());
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
