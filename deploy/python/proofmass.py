@@ -46,7 +46,7 @@ UNITS = {"m_s2": "m/s²", "s2_m": "s²/m", "rad_s2": "rad/s²", "rad_s": "rad/s"
 
 
 class CampaignError(Exception):
-    """A file is no campaign database, or cannot be read completely."""
+    """A file is no campaign database or replay, or cannot be read completely."""
 
 
 class Quantity(collections.namedtuple(
@@ -388,7 +388,13 @@ class Replay(_Named):
 
     def __init__(self, file):
         import h5py  # Only replays need it.
-        self._file = h5py.File(file, "r")
+        try:
+            self._file = h5py.File(file, "r")
+        except OSError as error:
+            raise CampaignError(f"replay = {file} ({error})") from None
+        if "run_index" not in self._file.attrs:
+            self._file.close()
+            raise CampaignError(f"replay = {file} (was not written by `proofmass replay`)")
         super().__init__({name: Session(group) for name, group in self._file.items()},
                          _attributes(self._file))
 

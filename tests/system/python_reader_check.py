@@ -175,6 +175,14 @@ def check_replay(machine, proofmass, numpy):
                     assert numpy.array_equal(series[name], dataset[name]), (session, group, name)
                     num_signals += 1
     assert num_signals > 3, num_signals
+    machine.run("export", "a.db", "--output", "export.h5", "--force")
+    for name, reason in (("export.h5", "was not written by"), ("a.db", "file signature not found")):
+        try:
+            proofmass.replay(machine.path(name))
+        except proofmass.CampaignError as error:
+            assert reason in str(error) and name in str(error), error
+        else:
+            raise AssertionError(name)
 
 
 def check_refusals(machine, proofmass):
