@@ -1,6 +1,7 @@
 #include "proto/model_program/json_line.hpp"
 
 #include <fmt/format.h>
+#include <utf8.h>
 
 #include <algorithm>
 #include <cmath>
@@ -30,6 +31,14 @@ std::string without_overflow(std::string_view line) {
     line.remove_prefix(std::min(size, line.size()));
   }
   return text;
+}
+
+/// A text in Latin-1 looks right in an excerpt.
+/// @throws InvalidArgument if what begins as an object is no UTF-8.
+void refuse_other_encoding(std::string_view line) {
+  const auto* const invalid = utf8::find_invalid(line.begin(), line.end());
+  if (!line.starts_with('{') || invalid == line.end()) return;
+  throw InvalidArgument(fmt::format("is no UTF-8 at byte {}", invalid - line.begin() + 1));
 }
 
 /// Python's json module writes such numbers, far behind what an excerpt shows.
@@ -62,7 +71,10 @@ Json object_in(std::string_view line) {
   };
   Json json = Json::parse(line, is_kept, false);
   if (json.is_discarded()) json = Json::parse(without_overflow(line), is_kept, false);
-  if (json.is_discarded()) refuse_non_finite(line);
+  if (json.is_discarded()) {
+    refuse_other_encoding(line);
+    refuse_non_finite(line);
+  }
   if (!json.is_object()) throw InvalidArgument("is no object of JSON");
   if (!twice.empty())
     throw InvalidArgument(fmt::format("has the key \"{}\" twice", excerpt_of(twice)));

@@ -49,10 +49,11 @@ void expect_same(std::string_view answer, const ProgramDescription& loaded,
                  const std::filesystem::path& program) {
   const ProgramDescription now = description_in(answer, program.string() + ": description");
   if (now.text == loaded.text) return;
-  throw ModelProgramChanged(fmt::format(
-      "model program = {} (describes {} now, and not {} as when it was loaded: start what "
-      "runs it anew)",
-      program.string(), now.version, loaded.version));
+  throw ModelProgramChanged(
+      fmt::format("model program = {} (describes {} now, and not {} as when it was loaded: {})",
+                  program.string(), now.version, loaded.version,
+                  now.version == loaded.version ? "its answer to describe must always be the same"
+                                                : "start what runs it anew"));
 }
 
 std::string describe_question() { return Json{{"ask", "describe"}}.dump(); }

@@ -313,6 +313,7 @@ TEST(RecordedModel, IsRefusedIfItsDescriptionBreaksARule) {
       {"[]", "description: is no object of JSON"},
       {description(R"("purpose": "NaN \" Infinity", "objective": -Infinity)"),
        "description: has Infinity at character 301, a number that JSON does not have: {"},
+      {description("\"purpose\": \"m\xb2\""), "description: is no UTF-8 at byte 270: {"},
       {description(R"("name": "ruler", "name": "ruler")"), "has the key \"name\" twice: {"},
       {description(R"("version": "2")"), "description: of ruler-2"},
       {description(R"("version": "1\u001b[2J")"), "(must be a text of one line"},
