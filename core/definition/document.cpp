@@ -344,7 +344,10 @@ void Document::check() const {
   std::optional<Refusal> unknown;
   find_unknown_keys(root_, "", unknown);
   // What is missing may stand there, misspelled.
-  if (unknown && (!first || first->is_absence || unknown->place < first->place)) first = unknown;
+  const auto is_meant = [&] { return nearest_name(unknown->path, keys_) == first->path; };
+  if (unknown && (!first || unknown->place < first->place || (first->is_absence && is_meant()))) {
+    first = unknown;
+  }
   for (std::size_t i = 0; i < assignments_.size(); ++i) {
     const Place place{.assignment = i + 1};
     if (keys_.contains(assignments_[i].path) || (first && first->place <= place)) continue;
