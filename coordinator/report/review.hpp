@@ -133,7 +133,7 @@ struct Review {
   // What the database says of itself. Any of these texts may come from a stranger.
   std::string name = {};
   std::uint64_t seed = 0;
-  std::uint64_t num_runs = 0;  ///< Wanted.
+  std::uint64_t num_runs = 0;                        ///< Wanted.
   std::optional<std::uint64_t> num_runs_fixed = {};  ///< Store::num_runs_fixed().
   std::string model_version = {};
   bool is_of_program = false;  ///< Its model needs one to be simulated again.
