@@ -268,6 +268,15 @@ bool CampaignService::lacks_summary(CampaignId id, const Served& served) const {
   return served.is_summary_due || served.summarised != counts_of(state_.campaigns.at(id));
 }
 
+bool CampaignService::awaits_summary(CampaignId id) const {
+  const auto found = served_.find(id);
+  if (found == served_.end()) return false;
+  const Served& served = found->second;
+  const bool has_failed =
+      !served.summary_failure.empty() || !state_.campaigns.at(id).storage_failure.empty();
+  return !has_failed && (served.summary.valid() || lacks_summary(id, served));
+}
+
 void CampaignService::review_summary(CampaignId id, Served& served) {
   if (served.summary.valid()) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;

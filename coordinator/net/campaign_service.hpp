@@ -154,6 +154,9 @@ class CampaignService {
   void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
   [[nodiscard]] std::set<CampaignId> abandoned() const;
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
+  /// True while the statistics of a campaign are being computed, or will be at once as it has
+  /// ended. Those that could not be stored are not waited for.
+  [[nodiscard]] bool awaits_summary(CampaignId id) const;
   /// What follows from a change of a served campaign's file.
   /// @param definition  As its file has it now.
   /// @param wishes      Priority and audit fraction are looked at; if unset, they stay.

@@ -319,6 +319,26 @@ TEST_F(ServiceWithADirectory, TellsOfContradictionsThatWereFoundBefore) {
   }
 }
 
+TEST_F(ServiceWithADirectory, ArchivesACampaignOnceItsStatisticsAreThere) {
+  std::promise<void> begun;
+  std::promise<void> released;
+  files.before_summary = [&] {
+    begun.set_value();
+    released.get_future().get();
+  };
+  make_file("a");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  begun.get_future().get();
+  client->send(100, test::control(proto::CONTROL_ACTION_ARCHIVE, "a"));
+  EXPECT_THAT(served(), ElementsAre("a"));
+  released.set_value();
+  const proto::ReplyEnvelope reply = client->receive_final();
+  EXPECT_EQ(reply.request_id(), 100U);
+  EXPECT_THAT(reply.done().text(), testing::StartsWith("campaign a: its database is"));
+}
+
 // Who reads the newest state is in nobody's way until the end of the service is written down.
 TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   make_file("a");
