@@ -68,6 +68,12 @@ void CampaignService::take(FileLook look) {
     }
     look = {.record = {.file = file, .problem = failure}};
   }
+  // It may be the copy from which the campaign is to go on, and is no file too many.
+  const auto served = served_.find(look.record.id);
+  if (look.is_copy && served != served_.end() && served->second.is_abandoned) {
+    unserved_.erase(file);
+    return;
+  }
   const auto known = unserved_.find(file);
   const bool is_news =
       known == unserved_.end() || known->second.record.problem != look.record.problem;

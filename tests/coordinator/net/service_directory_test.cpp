@@ -247,6 +247,23 @@ TEST_F(ServiceWithADirectory, ListsNoCampaignWhoseFileWasRemoved) {
   EXPECT_THAT(served(), IsEmpty());
 }
 
+// The copy that is then made of it is the only file of the campaign, and must not be moved away.
+TEST_F(ServiceWithADirectory, DoesNotCallTheCopyOfARemovedFileOneTooMany) {
+  make_file("a");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  const proto::RunLease lease = worker.borrow();
+  fs::remove(directory / "a.db");
+  worker.deliver(lease);
+  EXPECT_THAT(wait_for_event("storage_failed"), testing::HasSubstr("a.recovered-"));
+  write_bytes(directory / "b.db", "junk");
+  wait_for_event("campaign_not_served");
+  const proto::StatusReply status = client->status();
+  EXPECT_THAT(status.campaigns(0).storage_failure(), testing::HasSubstr("mv --backup"));
+  ASSERT_EQ(status.unserved_files_size(), 1);
+  EXPECT_EQ(status.unserved_files(0).file(), (directory / "b.db").string());
+}
+
 // Otherwise the campaign would be closed without them, and nobody would make them any more.
 TEST_F(ServiceWithADirectory, ComputesStatisticsAgainThatADiskPrevented) {
   config.finished_open_max = 0;
