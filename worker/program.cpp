@@ -276,6 +276,19 @@ std::optional<TimePoint> walltime_end(const Options& options, TimePoint program_
   return end;
 }
 
+/// @throws InvalidArgument if a worker would have to leave before it is there.
+void require_time(const ConversationConfig& conversation, TimePoint program_start) {
+  if (!conversation.walltime_end) return;
+  const auto seconds = [](Duration time) { return std::chrono::duration<double>(time).count(); };
+  const Duration time_left = *conversation.walltime_end - program_start;
+  const Duration needed = 2 * conversation.delivery_time;  // As Conversation::time_to_leave().
+  if (time_left > needed) return;
+  throw InvalidArgument(fmt::format(
+      "walltime = {:.0f} s (must be more than {:.0f} s, which a worker needs to end; from "
+      "--max-walltime, --end-time or SLURM_JOB_END_TIME)",
+      seconds(time_left), seconds(needed)));
+}
+
 ServeConfig serve_config(const Options& options, TimePoint program_start, const wire::Log& log) {
   ServeConfig config = options.serving;
   config.log = log;
@@ -285,6 +298,7 @@ ServeConfig serve_config(const Options& options, TimePoint program_start, const 
   if (options.parent) conversation.give_up_after = give_up_with_parent;
   if (options.give_up_after) conversation.give_up_after = *options.give_up_after;
   conversation.walltime_end = walltime_end(options, program_start);
+  require_time(conversation, program_start);
   return config;
 }
 

@@ -287,7 +287,7 @@ Table workers_table(const proto::WorkersReply& workers) {
     if (!worker.cards().empty()) table.remarks.push_back({cards_line(worker)});
     if (!worker.is_quarantined()) continue;
     table.remarks.push_back(
-        {fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}",
+        {fmt::format("{}: in quarantine, is lent nothing more: too many crashes on {}",
                      worker.worker_id(), worker.host()),
          Tone::bad});
   }

@@ -40,10 +40,11 @@ FileLook failed_look(const std::filesystem::path& file, const std::string& failu
   return {.record = {.file = file, .problem = failure}};
 }
 
-FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
+FileLook copy_of(const std::filesystem::path& file, CampaignId id, const std::string& name) {
   FileLook look = failed_look(
       file, fmt::format("{}: campaign {} is in another file as well; move one of them away",
                         file.string(), name));
+  look.record.id = id;
   look.is_copy = true;
   return look;
 }
@@ -142,14 +143,14 @@ FileLook opened(const CampaignDirectory& directory, const std::filesystem::path&
     const bool has_rival = is_known || found == num_files.end() || found->second > 1;
     // Of several files a damaged one must not stand for the campaign.
     if (has_rival && !has_journal(file)) (void)peek_campaign(file, PeekDepth::pages);
-    if (is_known) return copy_of(file, name);
+    if (is_known) return copy_of(file, record->id, name);
     record->stamp = stamp;
     if (record->is_closed) return {.record = std::move(*record)};
   }
   require_room_for_campaign("campaign database = " + file.string(), num_reserved);
   ServedCampaign campaign = directory.load(file);
   if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
-    return copy_of(file, campaign.definition->name);
+    return copy_of(file, campaign.store.id(), campaign.definition->name);
   }
   return prepare(std::move(campaign), GivenUpRuns::keep, start);
 }

@@ -88,8 +88,8 @@ class CampaignFiles {
   /// @throws Error if it is another campaign, naming what differs, or has more runs already.
   virtual std::shared_ptr<const Campaign> extend(Store& store, const Campaign& wanted) = 0;
 
-  /// Brings a file's statistics up to its results, all of which are there, and checks its stop
-  /// rule. Called in a thread of its own, while the service goes on.
+  /// Brings a file's statistics up to its results and, if all are there, checks its stop rule.
+  /// Called in a thread of its own, while the service goes on.
   ///
   /// @param write  Lets its argument use the file in the writer's thread.
   /// @return The number of runs that the rule asks for next; empty if there are enough.

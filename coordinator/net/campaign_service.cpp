@@ -256,11 +256,25 @@ void CampaignService::review_control(CampaignId id, Served& served) {
   const CampaignControl control = control_now(id);
   if (control == served.written) return;
   writer_.write(id, control);
-  const bool has_new_results = served.num_summarised != state_.campaigns.at(id).num_committed_here;
-  if (control.phase == Phase::finished && has_new_results) {
-    served.is_summary_due = files_ != nullptr;
-  }
   served.written = control;
+}
+
+CampaignService::Counts CampaignService::counts_of(const CampaignState& campaign) {
+  return {campaign.num_committed_here, campaign.given_up.size()};
+}
+
+bool CampaignService::lacks_summary(CampaignId id, const Served& served) const {
+  if (files_ == nullptr || !has_ended(phase_of(id))) return false;
+  return served.is_summary_due || served.summarised != counts_of(state_.campaigns.at(id));
+}
+
+bool CampaignService::awaits_summary(CampaignId id) const {
+  const auto found = served_.find(id);
+  if (found == served_.end()) return false;
+  const Served& served = found->second;
+  const bool has_failed =
+      !served.summary_failure.empty() || !state_.campaigns.at(id).storage_failure.empty();
+  return !has_failed && (served.summary.valid() || lacks_summary(id, served));
 }
 
 void CampaignService::review_summary(CampaignId id, Served& served) {
@@ -269,16 +283,19 @@ void CampaignService::review_summary(CampaignId id, Served& served) {
     take_summary(id, served);
   }
   if (served.is_held || served.is_abandoned || context_.now() < served.summary_after) return;
-  const bool is_due = std::exchange(served.is_summary_due, false);
+  // What waits for the disk when a campaign is cancelled belongs to it.
+  const bool is_due = lacks_summary(id, served) && state_.campaigns.at(id).delivered.empty();
   if (is_due || is_undecided(id)) begin_summary(id, served);
 }
 
 void CampaignService::take_summary(CampaignId id, Served& served) {
   std::optional<std::uint64_t> num_runs;
   const std::string failure = failure_of([&] { num_runs = served.summary.get(); });
-  const Campaign& definition = *state_.campaigns.at(id).definition;
-  // A check that failed, or asks for runs that are not there yet, is made again.
-  served.is_decided = failure.empty() && !num_runs;
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const bool is_finished_now = campaign.phase == Phase::finished;
+  // A check that failed, asks for runs that are not there yet, or was of fewer, is made again.
+  served.is_decided = failure.empty() && !num_runs && is_finished_now && served.is_of_all &&
+                      served.summarised == counts_of(campaign);
   const bool is_news = failure != std::exchange(served.summary_failure, failure);
   if (!failure.empty()) {
     served.is_summary_due = true;
@@ -287,14 +304,12 @@ void CampaignService::take_summary(CampaignId id, Served& served) {
     outbox_.log(Event::error("statistics_failed", {Field::reason(failure)}), id);
     return;
   }
-  wire::Fields fields{{"runs", definition.num_runs}};
+  wire::Fields fields{{"runs", num_settled(campaign)}};
   if (num_runs) fields.emplace_back("next", *num_runs);
   if (served.extension_failure.empty()) {
     outbox_.log(Event::info("campaign_summarised", std::move(fields)), id);
   }
-  if (num_runs && !served.is_held && state_.campaigns.at(id).phase == Phase::finished) {
-    go_on_to(id, *num_runs);
-  }
+  if (num_runs && !served.is_held && is_finished_now) go_on_to(id, *num_runs);
 }
 
 void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
@@ -324,10 +339,13 @@ void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
 }
 
 void CampaignService::begin_summary(CampaignId id, Served& served) {
-  served.num_summarised = state_.campaigns.at(id).num_committed_here;
+  const CampaignState& campaign = state_.campaigns.at(id);
+  served.is_summary_due = false;
+  served.is_of_all = campaign.phase == Phase::finished;
+  served.summarised = counts_of(campaign);
   served.summary = std::async(
-      std::launch::async,
-      [this, id, file = served.record.file, definition = state_.campaigns.at(id).definition] {
+      std::launch::async, [this, id, file = served.record.file, definition = campaign.definition] {
+        writer_.access(id, [](Store&) {});  // Runs that were given up just now are in the file.
         const auto write = [&](const std::function<void(Store&)>& action) {
           writer_.access(id, action);
         };

@@ -13,6 +13,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
@@ -153,6 +154,9 @@ class CampaignService {
   void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
   [[nodiscard]] std::set<CampaignId> abandoned() const;
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
+  /// True while the statistics of a campaign are being computed, or will be at once as it has
+  /// ended. Those that could not be stored are not waited for.
+  [[nodiscard]] bool awaits_summary(CampaignId id) const;
   /// What follows from a change of a served campaign's file.
   /// @param definition  As its file has it now.
   /// @param wishes      Priority and audit fraction are looked at; if unset, they stay.
@@ -181,7 +185,7 @@ class CampaignService {
   void archive(CampaignId id, const Respond& respond);
 
   /// Follows what the dispatch did: measures rates, stores phases, brings the statistics of
-  /// finished campaigns up to date. To be called several times a second.
+  /// campaigns that have ended up to date. To be called several times a second.
   void review();
   /// Looks at the directory if it is time. To be called some times a second.
   void review_directory();
@@ -208,6 +212,9 @@ class CampaignService {
   [[nodiscard]] std::vector<ServedCampaign> close();
 
  private:
+  /// Runs that were committed here, and those that are given up.
+  using Counts = std::pair<std::uint64_t, std::uint64_t>;
+
   /// What is known of a campaign beside the dispatch's state.
   struct Served {
     CampaignRecord record;  ///< Without what changes; see record_of().
@@ -225,8 +232,9 @@ class CampaignService {
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See change_held().
     bool is_abandoned = false;                 ///< See abandon().
-    bool is_summary_due = false;
-    std::uint64_t num_summarised = 0;    ///< Of the runs committed here.
+    bool is_summary_due = false;               ///< As the last one failed.
+    bool is_of_all = false;              ///< The last statistics, as the campaign was finished.
+    Counts summarised = {};              ///< Of the last statistics.
     std::string summary_failure = {};    ///< Of the last statistics; empty if there was none.
     std::string extension_failure = {};  ///< Of the last extension by the stop rule.
     TimePoint summary_after = {};        ///< When statistics may be computed next.
@@ -262,12 +270,15 @@ class CampaignService {
   void review_notices(CampaignId id, Served& served);
   /// @param failure  Empty if the campaign is finished.
   void tell(const Served& served, std::string failure) const;
+  [[nodiscard]] static Counts counts_of(const CampaignState& campaign);
+  /// True if a campaign has ended, and its statistics are still to be made.
+  [[nodiscard]] bool lacks_summary(CampaignId id, const Served& served) const;
   void review_summary(CampaignId id, Served& served);
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);
   void begin_summary(CampaignId id, Served& served);
   /// True if no result is on its way, no statistics are to be computed, and nobody changes it.
-  [[nodiscard]] static bool expects_nothing(const CampaignState& campaign, const Served& served);
+  [[nodiscard]] bool expects_nothing(CampaignId id, const Served& served) const;
   /// True if nothing of the campaign is to be stored or computed, and nobody changes it.
   [[nodiscard]] bool is_settled(CampaignId id, const Served& served) const;
   /// True if the campaign is finished, its statistics are there, and nothing is under way.

@@ -55,6 +55,7 @@ void CampaignService::serve(FileLook look) {
   closed_.erase(id);
   writer_.open(id, *std::move(look.store));
   on_campaign(state_, id, look.stored, now, outbox_);
+  served_.at(id).summarised = counts_of(state_.campaigns.at(id));
 }
 
 void CampaignService::take(FileLook look) {
@@ -66,6 +67,12 @@ void CampaignService::take(FileLook look) {
       return context_.log(Event::info("campaign_file_served", {{"file", file.string()}}));
     }
     look = {.record = {.file = file, .problem = failure}};
+  }
+  // It may be the copy from which the campaign is to go on, and is no file too many.
+  const auto served = served_.find(look.record.id);
+  if (look.is_copy && served != served_.end() && served->second.is_abandoned) {
+    unserved_.erase(file);
+    return;
   }
   const auto known = unserved_.find(file);
   const bool is_news =
@@ -172,14 +179,15 @@ void CampaignService::add_unserved(proto::StatusReply& reply) const {
 
 // From served to closed.
 
-bool CampaignService::expects_nothing(const CampaignState& campaign, const Served& served) {
-  return campaign.delivered.empty() && campaign.num_comparing == 0 && !served.is_summary_due &&
+bool CampaignService::expects_nothing(CampaignId id, const Served& served) const {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  return campaign.delivered.empty() && campaign.num_comparing == 0 && !lacks_summary(id, served) &&
          !served.summary.valid() && !served.is_held;
 }
 
 bool CampaignService::is_settled(CampaignId id, const Served& served) const {
   const CampaignState& campaign = state_.campaigns.at(id);
-  return expects_nothing(campaign, served) && campaign.storage_failure.empty() &&
+  return expects_nothing(id, served) && campaign.storage_failure.empty() &&
          served.written.phase == phase_of(id);
 }
 
@@ -206,7 +214,7 @@ void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now
 
 void CampaignService::review_rest(CampaignId id, Served& served) {
   const CampaignState& campaign = state_.campaigns.at(id);
-  const bool is_at_rest = expects_nothing(campaign, served) && campaign.lent.empty() &&
+  const bool is_at_rest = expects_nothing(id, served) && campaign.lent.empty() &&
                           campaign.audits.empty() && phase_of(id) != Phase::active;
   if (is_at_rest && !served.is_at_rest) writer_.rest(id);
   served.is_at_rest = is_at_rest;

@@ -126,6 +126,9 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
   require_possible(campaign->status, action);
   if (action == proto::CONTROL_ACTION_ARCHIVE) {
     if (under_way_.contains(name)) refuse_as_under_way(name);
+    if (campaigns_.awaits_summary(campaign->id)) {
+      return defer([this, request, asker, respond] { control(request, asker, respond); }, respond);
+    }
     return campaigns_.archive(campaign->id, respond);
   }
   if (campaign->is_closed) {
@@ -168,6 +171,12 @@ void RequestService::ask(const proto::AnswerRequest& request, const Asker& asker
                          const Respond& respond) {
   const auto campaign = campaigns_.find(request.campaign());
   if (!campaign) refuse_as_not_served(request.campaign());
+  // Neither brings statistics up to date, and a copy would lack them for ever.
+  const bool shows_what_is_stored =
+      request.question() == proto::QUESTION_DATABASE || request.question() == proto::QUESTION_QUERY;
+  if (shows_what_is_stored && campaigns_.awaits_summary(campaign->id)) {
+    return defer([this, request, asker, respond] { ask(request, asker, respond); }, respond);
+  }
   require_own_file(*campaign);
   answers_.ask(request, campaign->file, asker, respond);
 }

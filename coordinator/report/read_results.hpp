@@ -422,12 +422,12 @@ void write_statistics(Store& store, const Campaign& campaign, const ReadResults&
 /// if they are.
 void update_statistics(Store& store, const Campaign& campaign);
 
-/// Brings the statistics of a campaign database up to its results, which are those of all runs that
-/// it is to have for now, and checks its stop rule with them.
+/// Brings the statistics of a campaign database up to its results and, if they are those of all
+/// runs that it is to have for now, checks its stop rule with them.
 ///
 /// @param write  Lets its argument use the file where it is written.
-/// @return The number of runs that the stop rule asks for next; empty if there is none, if it is
-///         reached, or if there are as many runs as there may be.
+/// @return The number of runs that the stop rule asks for next; empty if there is none, if it was
+///         not checked or is reached, or if there are as many runs as there may be.
 std::optional<std::uint64_t> summarise_file(
     const std::filesystem::path& file, const Campaign& campaign,
     const std::function<void(const std::function<void(Store&)>&)>& write);

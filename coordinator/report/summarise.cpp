@@ -52,26 +52,27 @@ std::optional<std::uint64_t> summarise_file(
   std::optional<ReadResults> results;
   StopPlan plan;
   StopRule rule;
-  StopCheck check;
+  std::optional<StopCheck> check;
   std::uint64_t num_runs = 0;
   reader.read_one_state([&] {
     results = read_results(reader, campaign);
     plan = reader.stop_plan();
     num_runs = reader.num_runs();
-    if (plan.stop_rule.empty()) return;
+    const std::uint64_t num_settled = results->statistics.num_runs + results->missing.num_given_up;
+    if (plan.stop_rule.empty() || num_settled < num_runs) return;
     rule = parse_stop_rule(plan.stop_rule, reader.schema());
     check = check_with(rule, reader, campaign.objectives(), num_runs);
   });
-  if (plan.stop_rule.empty()) {
+  if (!check) {
     write([&](Store& store) { write_statistics(store, campaign, *results); });
     return std::nullopt;
   }
   write([&](Store& store) {
     write_statistics(store, campaign, *results);
-    store.record_stop_check(num_runs, statistic_of(plan.stop_rule), check);
+    store.record_stop_check(num_runs, statistic_of(plan.stop_rule), *check);
   });
   const std::uint64_t num_runs_max = plan.num_runs_max.value_or(num_runs);
-  if (check.is_reached || num_runs >= num_runs_max) return std::nullopt;
+  if (check->is_reached || num_runs >= num_runs_max) return std::nullopt;
   return std::min(next_stop_check(num_runs), num_runs_max);
 }
 

@@ -211,6 +211,15 @@ TEST(WorkersTable, SaysWhichCardsThereAreAndHowFastTheyAre) {
   EXPECT_EQ(remark(), "7: 2 NVIDIA H100 80GB HBM3 (CUDA 13.0), 2054 runs/s");
 }
 
+// It still has what it was lent before.
+TEST(WorkersTable, SaysThatAWorkerInQuarantineIsLentNothingMore) {
+  proto::WorkerStatus quarantined = worker(7, "w");
+  quarantined.set_num_lent(16);
+  quarantined.set_is_quarantined(true);
+  EXPECT_EQ(workers_table(reply_of({quarantined})).remarks.at(0).text,
+            "7: in quarantine, is lent nothing more: too many crashes on n7");
+}
+
 TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
   proto::CampaignStatus status = campaign("a", 40);
   status.set_phase(proto::CAMPAIGN_PHASE_FINISHED);

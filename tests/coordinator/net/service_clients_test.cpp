@@ -267,5 +267,84 @@ TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
   EXPECT_EQ(num_summaries, 1);
 }
 
+proto::RequestEnvelope fetching(const std::string& campaign) {
+  proto::RequestEnvelope request;
+  request.mutable_answer()->set_campaign(campaign);
+  request.mutable_answer()->set_question(proto::QUESTION_DATABASE);
+  return request;
+}
+
+// The answer itself is an error: there is no program that makes a copy.
+TEST_F(ServiceClients, WaitWithACopyForTheStatistics) {
+  std::promise<void> begun;
+  std::promise<void> released;
+  files.before_summary = [&] {
+    begun.set_value();
+    released.get_future().get();
+  };
+  start_with({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  begun.get_future().get();
+  client->send(100, fetching("a"));
+  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_FINISHED);
+  released.set_value();
+  const proto::ReplyEnvelope reply = client->receive_final();
+  EXPECT_EQ(reply.request_id(), 100U);
+  EXPECT_THAT(reply.error().text(), StartsWith("this coordinator cannot answer questions"));
+  EXPECT_EQ(num_events("campaign_summarised"), 1);
+}
+
+TEST_F(ServiceClients, DoNotWaitWithACopyForStatisticsThatFail) {
+  files.before_summary = [] { throw Error("the disk is full"); };
+  start_with({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)wait_for_event("statistics_failed");
+  EXPECT_THAT(client->error(fetching("a")), StartsWith("this coordinator cannot answer questions"));
+}
+
+TEST_F(ServiceClients, HaveStatisticsMadeEachTimeTheyCancel) {
+  start_with({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<proto::ResultAck>();
+  (void)control(proto::CONTROL_ACTION_CANCEL);
+  (void)wait_for_event("campaign_summarised runs=1");
+  (void)control(proto::CONTROL_ACTION_RESUME);
+  worker.want(1);
+  worker.deliver(worker.receive<proto::RunLease>());
+  (void)worker.receive<proto::ResultAck>();
+  (void)control(proto::CONTROL_ACTION_CANCEL);
+  (void)wait_for_event("campaign_summarised runs=2");
+}
+
+// The statistics that were made in between say nothing of the rule.
+TEST_F(ServiceClients, WaitForTheRuleOfACampaignThatTheyCancelledBefore) {
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 2, .failures_max = {}};
+  std::promise<void> begun;
+  std::promise<void> released;
+  std::atomic<int> num_summaries = 0;
+  files.next_runs = [&](std::uint64_t) -> std::optional<std::uint64_t> {
+    if (num_summaries++ == 0) return std::nullopt;
+    begun.set_value();
+    released.get_future().get();
+    return std::nullopt;
+  };
+  start_with({test::campaign_of("a", 2)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<proto::ResultAck>();
+  (void)control(proto::CONTROL_ACTION_CANCEL);
+  (void)wait_for_event("campaign_summarised runs=1");
+  (void)control(proto::CONTROL_ACTION_RESUME);
+  worker.want(1);
+  worker.deliver(worker.receive<proto::RunLease>());
+  begun.get_future().get();
+  EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_ACTIVE);
+  released.set_value();
+  (void)wait_for_event("campaign_summarised runs=2");
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator

@@ -247,6 +247,23 @@ TEST_F(ServiceWithADirectory, ListsNoCampaignWhoseFileWasRemoved) {
   EXPECT_THAT(served(), IsEmpty());
 }
 
+// The copy that is then made of it is the only file of the campaign, and must not be moved away.
+TEST_F(ServiceWithADirectory, DoesNotCallTheCopyOfARemovedFileOneTooMany) {
+  make_file("a");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  const proto::RunLease lease = worker.borrow();
+  fs::remove(directory / "a.db");
+  worker.deliver(lease);
+  EXPECT_THAT(wait_for_event("storage_failed"), testing::HasSubstr("a.recovered-"));
+  write_bytes(directory / "b.db", "junk");
+  wait_for_event("campaign_not_served");
+  const proto::StatusReply status = client->status();
+  EXPECT_THAT(status.campaigns(0).storage_failure(), testing::HasSubstr("mv --backup"));
+  ASSERT_EQ(status.unserved_files_size(), 1);
+  EXPECT_EQ(status.unserved_files(0).file(), (directory / "b.db").string());
+}
+
 // Otherwise the campaign would be closed without them, and nobody would make them any more.
 TEST_F(ServiceWithADirectory, ComputesStatisticsAgainThatADiskPrevented) {
   config.finished_open_max = 0;
@@ -317,6 +334,26 @@ TEST_F(ServiceWithADirectory, TellsOfContradictionsThatWereFoundBefore) {
     EXPECT_EQ(campaign.num_audited(), campaign.name() == "a" ? 2U : 1U);
     EXPECT_EQ(campaign.num_mismatches(), 1U);
   }
+}
+
+TEST_F(ServiceWithADirectory, ArchivesACampaignOnceItsStatisticsAreThere) {
+  std::promise<void> begun;
+  std::promise<void> released;
+  files.before_summary = [&] {
+    begun.set_value();
+    released.get_future().get();
+  };
+  make_file("a");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  begun.get_future().get();
+  client->send(100, test::control(proto::CONTROL_ACTION_ARCHIVE, "a"));
+  EXPECT_THAT(served(), ElementsAre("a"));
+  released.set_value();
+  const proto::ReplyEnvelope reply = client->receive_final();
+  EXPECT_EQ(reply.request_id(), 100U);
+  EXPECT_THAT(reply.done().text(), testing::StartsWith("campaign a: its database is"));
 }
 
 // Who reads the newest state is in nobody's way until the end of the service is written down.

@@ -100,6 +100,15 @@ TEST_F(Summarise, MissesARuleThatWasNotCheckedWithAllRuns) {
   EXPECT_TRUE(is_rule_missed(store));
 }
 
+// As of a campaign that was cancelled, whose other runs may still be computed.
+TEST_F(Summarise, ChecksNoRuleBeforeAllRunsAreThere) {
+  Store store = finished(128, plan_of("mean(k2c) within 5%"), 1.0, 1.01);
+  store.extend(test::campaign_of(192), "");
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_EQ(text("SELECT num_finished FROM summary"), "128");
+  EXPECT_TRUE(store.stop_checks().empty());
+}
+
 TEST_F(Summarise, WithoutARuleStoresStatisticsAlone) {
   Store store = finished(10, {}, 1.0, 3.0);
   EXPECT_EQ(next_runs(store), std::nullopt);
