@@ -58,10 +58,9 @@ Table cause_table(const Review& review) {
   }
   table.notes.push_back(fmt::format(
       "Computed from {} of {} runs with an estimate{}. Products: of quantities less means that are "
-      "not 0. "
-      "Of the variance: beyond that of the terms above. p: that chance alone makes one of all "
-      "quantities, or of products beyond their "
-      "factors, look so.",
+      "not 0. Of the variance: beyond that of the terms above; what is in no row may depend on "
+      "draws otherwise, as `proofmass sensitivity` tells. p: that chance alone makes one of all "
+      "quantities, or of products beyond their factors, look so.",
       review.causes->num_runs, review.causes->num_with_estimate,
       review.causes->num_runs < review.causes->num_with_estimate ? ", the first ones" : ""));
   return table;
