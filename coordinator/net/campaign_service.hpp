@@ -232,7 +232,7 @@ class CampaignService {
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See change_held().
     bool is_abandoned = false;                 ///< See abandon().
-    bool is_summary_due = false;               ///< As the last one failed.
+    bool is_summary_due = false;               ///< As the last one failed, or the file lacks them.
     bool is_of_all = false;              ///< The last statistics, as the campaign was finished.
     Counts summarised = {};              ///< Of the last statistics.
     std::string summary_failure = {};    ///< Of the last statistics; empty if there was none.

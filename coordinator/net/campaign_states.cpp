@@ -40,6 +40,18 @@ void CampaignService::add(FileLook look) {
   closed_.emplace(campaign.id, campaign);
 }
 
+namespace {
+
+/// As of a campaign whose coordinator was killed before it had made them.
+bool lacks_statistics(const FileLook& look) {
+  const std::uint64_t num_finished = num_runs_in(look.stored.finished);
+  if (!has_ended(look.stored.control.phase) || num_finished == 0) return false;
+  const std::optional<Summary> summary = look.store->summary();
+  return !summary || summary->num_finished != num_finished;
+}
+
+}  // namespace
+
 void CampaignService::serve(FileLook look) {
   const CampaignId id = look.record.id;
   const TimePoint now = context_.now();
@@ -51,6 +63,7 @@ void CampaignService::serve(FileLook look) {
                              .is_decided = is_finished,
                              .num_failures_before = look.num_failures,
                              .is_end_told = is_finished,
+                             .is_summary_due = lacks_statistics(look),
                              .summary = {}});
   closed_.erase(id);
   writer_.open(id, *std::move(look.store));

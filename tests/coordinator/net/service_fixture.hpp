@@ -72,6 +72,7 @@ class PlainFiles final : public coordinator::CampaignFiles {
     std::uint64_t num_runs = 0;
     write([&](coordinator::Store& store) {
       store.record_event("summarised", file.filename().string());
+      store_summary(store);
       num_runs = store.num_runs();
     });
     return next_runs(num_runs);
@@ -85,6 +86,9 @@ class PlainFiles final : public coordinator::CampaignFiles {
 
   /// May throw; called in another thread.
   std::function<void()> before_summary = [] {};
+
+  /// In the writer's thread.
+  std::function<void(coordinator::Store&)> store_summary = [](coordinator::Store&) {};
 
   /// What a stop rule asks for, after so many runs.
   std::function<std::optional<std::uint64_t>(std::uint64_t)> next_runs =

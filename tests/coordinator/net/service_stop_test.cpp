@@ -121,6 +121,12 @@ TEST_F(ServiceStop, CountsRunsThatAreGivenUpAsFailures) {
 
 TEST_F(ServiceStop, DoesNotCheckARuleAgainThatItsPredecessorDid) {
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  files.store_summary = [](Store& store) {
+    CampaignStatistics statistics;
+    statistics.num_runs = statistics.num_estimated = 1;
+    statistics.accuracy.resize(store.schema().quantities.size());
+    store.write_statistics(statistics, {}, {.results = std::string(64, 'a'), .health = ""});
+  };
   start({test::campaign_of("a", 1)});
   test::PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
