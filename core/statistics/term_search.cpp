@@ -79,14 +79,13 @@ Values limited(const Values& values) {
   return centred(result);
 }
 
-/// Σx⁴/n over (Σx²/n)² of centred values.
+/// Σx⁴/n over (Σx²/n)² of centred values, whatever their unit.
 double kurtosis_of(const Values& values) {
-  double square = 0.0, fourth = 0.0;
-  for (const double value : values) {
-    square += value * value;
-    fourth += value * value * value * value;
-  }
-  return static_cast<double>(values.size()) * fourth / (square * square);
+  const auto n = static_cast<double>(values.size());
+  const double mean_square = dot(values, values) / n;
+  double sum = 0.0;
+  for (const double value : values) sum += std::pow(value * value / mean_square, 2.0);
+  return sum / n;
 }
 
 /// Inputs and products of two of so many.

@@ -304,23 +304,31 @@ TEST_F(ServiceClients, DoNotWaitWithACopyForStatisticsThatFail) {
   EXPECT_THAT(client->error(fetching("a")), StartsWith("this coordinator cannot answer questions"));
 }
 
-TEST_F(ServiceClients, HaveStatisticsMadeEachTimeTheyCancel) {
+/// One result, a cancelled campaign's statistics of it, and another result after that.
+class CancelledClients : public ServiceClients {
+ protected:
+  void deliver_around_a_cancel(PlayingWorker& worker) {
+    worker.deliver(worker.borrow());
+    (void)worker.receive<proto::ResultAck>();
+    (void)control(proto::CONTROL_ACTION_CANCEL);
+    (void)wait_for_event("campaign_summarised runs=1");
+    (void)control(proto::CONTROL_ACTION_RESUME);
+    worker.want(1);
+    worker.deliver(worker.receive<proto::RunLease>());
+  }
+};
+
+TEST_F(CancelledClients, HaveStatisticsMadeEachTimeTheyCancel) {
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  (void)control(proto::CONTROL_ACTION_CANCEL);
-  (void)wait_for_event("campaign_summarised runs=1");
-  (void)control(proto::CONTROL_ACTION_RESUME);
-  worker.want(1);
-  worker.deliver(worker.receive<proto::RunLease>());
+  deliver_around_a_cancel(worker);
   (void)worker.receive<proto::ResultAck>();
   (void)control(proto::CONTROL_ACTION_CANCEL);
   (void)wait_for_event("campaign_summarised runs=2");
 }
 
 // The statistics that were made in between say nothing of the rule.
-TEST_F(ServiceClients, WaitForTheRuleOfACampaignThatTheyCancelledBefore) {
+TEST_F(CancelledClients, WaitForTheRuleOfACampaignThatTheyCancelledBefore) {
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 2, .failures_max = {}};
   std::promise<void> begun;
   std::promise<void> released;
@@ -333,13 +341,7 @@ TEST_F(ServiceClients, WaitForTheRuleOfACampaignThatTheyCancelledBefore) {
   };
   start_with({test::campaign_of("a", 2)});
   PlayingWorker worker(endpoint.address());
-  worker.deliver(worker.borrow());
-  (void)worker.receive<proto::ResultAck>();
-  (void)control(proto::CONTROL_ACTION_CANCEL);
-  (void)wait_for_event("campaign_summarised runs=1");
-  (void)control(proto::CONTROL_ACTION_RESUME);
-  worker.want(1);
-  worker.deliver(worker.receive<proto::RunLease>());
+  deliver_around_a_cancel(worker);
   begun.get_future().get();
   EXPECT_EQ(client->status().campaigns(0).phase(), proto::CAMPAIGN_PHASE_ACTIVE);
   released.set_value();

@@ -191,6 +191,16 @@ TEST(ExplanatoryTerms, AreFoundInHalfOfTheCasesFromAShareOn) {
   }
 }
 
+TEST(ExplanatoryTerms, AreFoundWhateverTheUnitOfTheirQuantities) {
+  Columns inputs = normal_columns(5, 200, {.seed = 76});
+  const double share = term_share_found(std::vector<Column>(inputs.begin(), inputs.end()), 0.95, 1);
+  for (Values& input : inputs) {
+    for (double& value : input) value *= 1e-100;
+  }
+  EXPECT_NEAR(term_share_found(std::vector<Column>(inputs.begin(), inputs.end()), 0.95, 1), share,
+              1e-12);
+}
+
 TEST(ExplanatoryTerms, AreFoundInNoSampleThatIsTooSmall) {
   const Columns inputs = normal_columns(60, 16, {.seed = 75});
   const std::vector<Column> columns(inputs.begin(), inputs.end());
