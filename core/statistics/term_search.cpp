@@ -84,7 +84,10 @@ double kurtosis_of(const Values& values) {
   const auto n = static_cast<double>(values.size());
   const double mean_square = dot(values, values) / n;
   double sum = 0.0;
-  for (const double value : values) sum += std::pow(value * value / mean_square, 2.0);
+  for (const double value : values) {
+    const double ratio = value * value / mean_square;
+    sum += ratio * ratio;
+  }
   return sum / n;
 }
 
