@@ -314,6 +314,16 @@ std::string figure_text(double value, int num_digits) {
   return with_minus(fmt::format("{:.15g}", std::stod(scientific)));
 }
 
+std::string measured_text(double value) {
+  constexpr int num_digits = 3;
+  if (value == 0.0 || !std::isfinite(value)) return figure_text(value);
+  const std::string scientific = fmt::format("{:.{}e}", value, num_digits - 1);
+  const std::size_t e = scientific.find('e');
+  const int exponent = std::stoi(scientific.substr(e + 1));
+  if (exponent < -3 || exponent > 4) return with_exponent(scientific.substr(0, e), exponent);
+  return with_minus(fmt::format("{:.{}f}", value, std::max(0, num_digits - 1 - exponent)));
+}
+
 std::string unit_text(std::string_view unit) {
   if (!unit.starts_with("1e")) return std::string(unit);
   const std::size_t end = std::min(unit.find(' '), unit.size());

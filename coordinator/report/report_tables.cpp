@@ -194,7 +194,7 @@ bool is_biased(const Review& review, std::size_t quantity) {
 Cell figure_cell(const std::optional<double>& value, double scale) {
   if (!value) return no_figure();
   Cell cell(signed_figure(*value / scale), *value);
-  cell.document = figure_text(*value / scale);
+  cell.document = measured_text(*value / scale);
   return cell;
 }
 

@@ -314,6 +314,17 @@ TEST(FigureText, HasARealMinusSignAndSuperscripts) {
   EXPECT_EQ(figure_text(9.999e-10), "10⁻⁹");
 }
 
+TEST(FigureText, OfTablesKeepsThreeDigits) {
+  EXPECT_EQ(measured_text(0.0), "0");
+  EXPECT_EQ(measured_text(12.0), "12.0");
+  EXPECT_EQ(measured_text(9.996), "10.0");
+  EXPECT_EQ(measured_text(-0.5), "\u22120.500");
+  EXPECT_EQ(measured_text(0.0012), "0.00120");
+  EXPECT_EQ(measured_text(1234.0), "1234");
+  EXPECT_EQ(measured_text(99'999.0), "1.00×10⁵");
+  EXPECT_EQ(measured_text(-2.5e-9), "\u22122.50×10⁻⁹");
+}
+
 // Steps of 20 make 6 ticks of 0 to 100, steps of 10 would make 11.
 TEST(LinearRange, HasStepsOfOneTwoOrFive) {
   EXPECT_THAT(labels_of(linear_range({}, 0.0, 100.0, 6)),
