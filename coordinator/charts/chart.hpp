@@ -194,8 +194,8 @@ struct ThemeColour {
 /// @param num_digits  At most, if not three; up to 15.
 [[nodiscard]] std::string figure_text(double value, int num_digits = 3);
 
-/// A figure of a table in the spelling of figure_text(), whose three digits stand even where they
-/// are zeros: `12.0`, `9.20`.
+/// A measured figure in the spelling of figure_text(), with zeros at its end up to three digits:
+/// `12.0`, `9.20`, `1.00×10⁵`.
 [[nodiscard]] std::string measured_text(double value);
 
 /// A unit in the same spelling: `10⁻⁴ rad` for `1e-4 rad`.

@@ -315,13 +315,12 @@ std::string figure_text(double value, int num_digits) {
 }
 
 std::string measured_text(double value) {
-  constexpr int num_digits = 3;
   if (value == 0.0 || !std::isfinite(value)) return figure_text(value);
-  const std::string scientific = fmt::format("{:.{}e}", value, num_digits - 1);
+  const std::string scientific = fmt::format("{:.2e}", value);
   const std::size_t e = scientific.find('e');
   const int exponent = std::stoi(scientific.substr(e + 1));
   if (exponent < -3 || exponent > 4) return with_exponent(scientific.substr(0, e), exponent);
-  return with_minus(fmt::format("{:.{}f}", value, std::max(0, num_digits - 1 - exponent)));
+  return with_minus(fmt::format("{:.{}f}", value, std::max(0, 2 - exponent)));
 }
 
 std::string unit_text(std::string_view unit) {
