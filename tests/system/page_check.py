@@ -91,8 +91,8 @@ def figure(value):
     mantissa, exponent = f"{value:.2e}".split("e")
     if value != 0 and not -4 < int(exponent) < 5:
         power = "10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-        return power if float(mantissa) == 1 else f"{float(mantissa):g}×{power}"
-    return f"{float(f'{value:.2e}'):.10g}"
+        return f"{mantissa}×{power}"
+    return f"{value:.{max(0, 2 - int(exponent))}f}" if value else "0"
 
 
 def accuracy_cells(database, page):
