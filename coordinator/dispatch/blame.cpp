@@ -203,6 +203,19 @@ void pause_crashing_campaigns(State& state, Outbox& outbox) {
   }
 }
 
+namespace {
+
+/// Whether a worker is to be lent the suspect once it has nothing else.
+bool will_be_tried(const State& state, const CampaignState& campaign, const Suspicion& suspicion) {
+  return std::ranges::any_of(state.workers, [&](const auto& item) {
+    const Worker& worker = item.second;
+    return worker.num_runs_max > 0 && !state.quarantined.contains(worker.host) &&
+           can_compute(worker, campaign) && may_try(state, suspicion, worker);
+  });
+}
+
+}  // namespace
+
 bool is_guilty(const State& state, const Suspicion& suspicion) {
   const auto num_witnesses = std::ranges::count_if(
       suspicion.hosts, [](const auto& item) { return item.second.num_alone > 0; });
@@ -210,12 +223,17 @@ bool is_guilty(const State& state, const Suspicion& suspicion) {
 }
 
 void give_up_untried(State& state, Outbox& outbox) {
-  if (!state.leases.empty() || state.workers.empty()) state.idle_since = state.ticked_at;
-  if (state.ticked_at - state.idle_since < state.config.lone_witness_wait) return;
+  if (state.workers.empty()) state.attended_since = state.ticked_at;
   for (const CampaignId id : state.served) {
-    std::erase_if(state.campaigns.at(id).pending_suspects, [&](const auto& item) {
-      const Suspicion& suspicion = state.campaigns.at(id).suspects.at(item.first);
-      if (num_credible(state, suspicion) < state.config.crashes_per_run_max) return false;
+    CampaignState& campaign = state.campaigns.at(id);
+    std::erase_if(campaign.pending_suspects, [&](const auto& item) {
+      const Suspicion& suspicion = campaign.suspects.at(item.first);
+      const TimePoint waits_since = std::max(suspicion.tried_at, state.attended_since);
+      if (state.ticked_at - waits_since < state.config.lone_witness_wait ||
+          num_credible(state, suspicion) < state.config.crashes_per_run_max ||
+          will_be_tried(state, campaign, suspicion)) {
+        return false;
+      }
       give_up(state, id, item.first, outbox);
       return true;
     });

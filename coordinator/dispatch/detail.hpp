@@ -106,8 +106,8 @@ void pause_crashing_campaigns(State& state, Outbox& outbox);
 /// cause.
 [[nodiscard]] bool is_guilty(const State& state, const Suspicion& suspicion);
 
-/// Gives up suspects that crashed as often on hosts that have delivered results, and that no other
-/// host has tried for long although nothing else was lent.
+/// Gives up suspects that crashed as often on hosts that have delivered results, for which another
+/// host has been awaited for long, and that no worker is going to try.
 void give_up_untried(State& state, Outbox& outbox);
 
 /// The run is not lent again. @pre It is a suspect, and has no place.

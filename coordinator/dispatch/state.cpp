@@ -24,7 +24,7 @@ State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, T
   state.hello_allowance_at = now;
   state.ticked_at = now;
   state.finished_at = now;
-  state.idle_since = now;
+  state.attended_since = now;
   return state;
 }
 

@@ -80,8 +80,8 @@ struct DispatchConfig {
   double hung_after_steps = 50.0;
   Duration hung_after_min = std::chrono::seconds(60);
   std::uint32_t crashes_per_run_max = 3;  ///< A run that crashed so many workers is given up.
-  /// A run that one host alone saw crash waits for others to try it: so long, while nothing is
-  /// lent.
+  /// A run that one host alone saw crash waits so long from its last attempt on for another host
+  /// that may try it; once there is one, until it does.
   Duration lone_witness_wait = std::chrono::minutes(5);
   /// In a row, without a finished run; then quarantine. Likewise of a campaign at a worker.
   std::uint32_t crashes_per_host_max = 5;
@@ -363,11 +363,11 @@ struct State {
   /// Runs that were taken off the leases of a session, which it may still hold; of
   /// `num_workers_max` sessions at most.
   std::map<SessionId, std::map<CampaignId, RunSet>> lent_before;
-  TimePoint ticked_at{};    ///< About now.
-  TimePoint finished_at{};  ///< When a run last finished, or was said to be long ago.
-  TimePoint idle_since{};   ///< No run has been lent since then.
-  bool is_lending = true;   ///< False once the service ends, ...
-  bool is_stopped = false;  ///< ... and this is true if it does not even wait for results.
+  TimePoint ticked_at{};       ///< About now.
+  TimePoint finished_at{};     ///< When a run last finished, or was said to be long ago.
+  TimePoint attended_since{};  ///< There has been a worker since then.
+  bool is_lending = true;      ///< False once the service ends, ...
+  bool is_stopped = false;     ///< ... and this is true if it does not even wait for results.
   /// Messages of workers have arrived that have not been handled. Set by the caller: then silence,
   /// and what heartbeats do not say, proves little.
   bool is_behind = false;

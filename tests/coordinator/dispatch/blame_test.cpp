@@ -129,6 +129,37 @@ TEST_F(BlameTest, ARunIsGivenUpIfNoOtherHostTriesItForLong) {
   outbox.forget();
 }
 
+// What the service computes besides says nothing about the run.
+TEST_F(BlameTest, ARunIsGivenUpAlsoWhereTheHostComputesAnotherCampaign) {
+  crash_three_times_on_one_host();
+  add_campaign(two, 10);
+  heartbeat(first);
+  EXPECT_FALSE(state.leases.empty());
+  for (int i = 0; i <= 10; ++i) {
+    EXPECT_TRUE(campaign(one).given_up.empty()) << i;
+    heartbeat(first, {held(two, {{0}, 10})});
+    on_tick(state, now, outbox);
+    now += 30s;
+  }
+  EXPECT_EQ(outbox.take_given_up(), Runs{{0}});
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ARunIsNotGivenUpWhileAHostThatMayTryItIsBusy) {
+  crash_three_times_on_one_host();
+  constexpr int high_priority = 1;
+  add_campaign(two, 10, high_priority);
+  add_worker(second, 1, "other");
+  for (int i = 0; i <= 20; ++i) {
+    heartbeat(first);
+    heartbeat(second, {held(two, {{0}, 10})});
+    on_tick(state, now, outbox);
+    now += 30s;
+  }
+  EXPECT_TRUE(campaign(one).given_up.empty());
+  outbox.forget();
+}
+
 TEST_F(BlameTest, OnlyACrashAloneTellsAgainstASuspect) {
   add_campaign(one, 3);
   add_worker(first, 3);
