@@ -169,8 +169,8 @@ enum class SvgUse : std::uint8_t {
 /// size. In a page, a picture 480 wide takes 440 pixels; texts are still readable at 360. For
 /// screen readers it is one image with title and description.
 ///
-/// Data that are not finite, or not above 0 on a logarithmic axis, are left out. Without data the
-/// axes are drawn with `no data` between them.
+/// Data that are not finite, or not above 0 on a logarithmic axis, are left out. If nothing is left
+/// between the axes, `nothing to show` stands there.
 [[nodiscard]] std::string svg_of(const Picture& picture, SvgUse use);
 
 /// A colour of charts, as custom property of CSS and as what it is on a light and a dark ground.

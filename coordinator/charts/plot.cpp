@@ -17,30 +17,32 @@ namespace {
 struct Extents {
   Extent x;
   Extent y;
-  bool has_data = false;  ///< Something beside limits.
 
   void add(const Bars& bars) {
     for (const double edge : bars.edges) x.add(edge);
     for (const double height : bars.heights) y.add(height);
     y.add(0.0);
-    has_data |= !bars.heights.empty();
   }
   void add(const Curve& curve) {
     for (const Point& point : curve.points) add(point);
-    has_data |= !curve.points.empty();
   }
   void add(const Band& band) {
     for (const BandPoint& point : band.points) {
       add(Point{point.x, point.lower});
       y.add(point.upper);
     }
-    has_data |= band.points.size() > 1;
   }
   void add(const LimitLine& limit) { x.add(limit.value); }
   void add(const Point& point) {
     x.add(point.x);
     y.add(point.y);
   }
+};
+
+struct PlotArea {
+  AxisMap x;
+  AxisMap y;
+  Box box;
 };
 
 Extents extents_of(const Chart& chart) {
@@ -62,9 +64,32 @@ LegendEntry entry_of(const Band& band) {
 }
 LegendEntry entry_of(const LimitLine&) { return {}; }  // It has its label.
 
-std::vector<LegendEntry> legend_of(const Chart& chart) {
+/// Whether there is something to see of a layer between the axes.
+bool is_seen(const Bars& bars, const PlotArea& area) {
+  for (std::size_t i = 0; i < bars.heights.size(); ++i) {
+    if (bars.heights[i] > 0.0 && bars.edges[i + 1] >= area.x.range.from &&
+        bars.edges[i] <= area.x.range.to) {
+      return true;
+    }
+  }
+  return false;
+}
+bool is_seen(const Curve& curve, const PlotArea& area) {
+  return std::ranges::any_of(curve.points, [&](const Point& point) {
+    return area.x.contains(point.x) && area.y.contains(point.y);
+  });
+}
+bool is_seen(const Band& band, const PlotArea&) { return band.points.size() > 1; }
+bool is_seen(const LimitLine&, const PlotArea&) { return false; }  // It is no data.
+
+bool is_seen(const Layer& layer, const PlotArea& area) {
+  return std::visit([&](const auto& shown) { return is_seen(shown, area); }, layer);
+}
+
+std::vector<LegendEntry> legend_of(const Chart& chart, const PlotArea& area) {
   std::vector<LegendEntry> entries;
   for (const Layer& layer : chart.layers) {
+    if (!is_seen(layer, area)) continue;
     std::visit([&](const auto& shown) { entries.push_back(entry_of(shown)); }, layer);
   }
   std::erase_if(entries, [](const LegendEntry& entry) { return entry.name.empty(); });
@@ -123,23 +148,21 @@ void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
   writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
 }
 
-struct PlotArea {
-  AxisMap x;
-  AxisMap y;
-  Box box;
-};
-
 std::string place_text(char command, double x, double y) {
   return command + coordinate(x) + " " + coordinate(y);
 }
 
 void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
+  constexpr double least_width = 2.0;  // Bars of equal values have none.
   const std::size_t count =
       std::min(bars.heights.size(), bars.edges.empty() ? 0 : bars.edges.size() - 1);
   for (std::size_t i = 0; i < count; ++i) {
     if (!(bars.heights[i] > 0.0) || !area.y.has(bars.heights[i])) continue;
-    const double left = std::max(area.x.at(bars.edges[i]), area.box.left);
-    const double right = std::min(area.x.at(bars.edges[i + 1]), area.box.right());
+    const double begin = area.x.at(bars.edges[i]);
+    const double end = area.x.at(bars.edges[i + 1]);
+    const double lacking = std::max(0.0, least_width - (end - begin));
+    const double left = std::max(begin - lacking / 2.0, area.box.left);
+    const double right = std::min(end + lacking / 2.0, area.box.right());
     const double top = std::max(area.y.at(bars.heights[i]), area.box.top);
     if (!(right > left)) continue;
     // A gap between neighbours, which else would look like one bar.
@@ -149,16 +172,19 @@ void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
   }
 }
 
+/// Of its marks, if it is no line.
+std::optional<Shape> shape_of(const Curve& curve) {
+  if (const auto* const shape = std::get_if<Shape>(&curve.look)) return *shape;
+  return curve.points.size() == 1 ? std::optional(Shape::diamond) : std::nullopt;
+}
+
 void draw(const Curve& curve, const PlotArea& area, SvgWriter& writer) {
-  constexpr Shape lone_point = Shape::diamond;  // One point is no line.
-  const auto* const shape = curve.points.size() == 1 && std::holds_alternative<Dash>(curve.look)
-                                ? &lone_point
-                                : std::get_if<Shape>(&curve.look);
+  const std::optional<Shape> shape = shape_of(curve);
   std::string path;
   bool is_begun = false;
   for (const Point& point : curve.points) {
     const bool has_place = area.x.has(point.x) && area.y.has(point.y);
-    if (shape != nullptr) {
+    if (shape) {
       if (!area.x.contains(point.x) || !area.y.contains(point.y)) continue;
       writer.marker({area.x.at(point.x), area.y.at(point.y)}, *shape, curve.ink);
     } else if (has_place) {
@@ -195,7 +221,7 @@ void draw(const LimitLine& limit, const PlotArea& area, SvgWriter& writer) {
 
 bool is_marked(const Layer& layer) {
   const auto* const curve = std::get_if<Curve>(&layer);
-  return curve != nullptr && std::holds_alternative<Shape>(curve->look);
+  return curve != nullptr && shape_of(*curve);
 }
 
 void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
@@ -215,9 +241,10 @@ void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
   }
 }
 
-double draw_head(const Chart& chart, Point corner, double width, SvgWriter& writer) {
+double draw_head(const Chart& chart, const PlotArea& area, Point corner, double width,
+                 SvgWriter& writer) {
   double height = draw_title(chart.text.title, corner, width, writer);
-  height += draw_legend(legend_of(chart), {corner.x, corner.y + height}, width, writer);
+  height += draw_legend(legend_of(chart, area), {corner.x, corner.y + height}, width, writer);
   if (chart.y.label.empty()) return height + 8.0;
   writer.text({corner.x, corner.y + height + 13.0}, chart.y.label);
   return height + 24.0;
@@ -242,7 +269,7 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
   area.x.begin = area.box.left;
   area.x.end = area.box.right();
   const std::vector<const LimitLine*> limits = vertical_limits(chart, area.x);
-  area.box.top = corner.y + draw_head(chart, corner, width, writer) +
+  area.box.top = corner.y + draw_head(chart, area, corner, width, writer) +
                  limit_row_height * static_cast<double>(limits.size());
   area.y.begin = area.box.bottom();
   area.y.end = area.box.top;
@@ -250,9 +277,10 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
   draw_x_axis(area.x, chart.x, area.box, writer);
   draw_layers(chart, area, writer);
   draw_limit_labels(limits, area.x, area.box, writer);
-  if (!extents.has_data) {
+  const auto is_layer_seen = [&](const Layer& layer) { return is_seen(layer, area); };
+  if (std::ranges::none_of(chart.layers, is_layer_seen)) {
     writer.text({area.box.left + area.box.width / 2.0, area.box.top + area.box.height / 2.0},
-                "no data", {.anchor = Anchor::middle});
+                "nothing to show", {.anchor = Anchor::middle});
   }
   return area.box.bottom() + x_axis_height - corner.y;
 }
@@ -277,7 +305,9 @@ constexpr double line_height = 19.0;
 /// Lines of whole words, as far as words fit; at most three.
 std::vector<std::string> title_lines(std::string_view text, double width) {
   constexpr std::size_t num_lines_max = 3;
-  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
+  constexpr double bold = 1.12;  // Against the mean letter.
+  const auto num_columns =
+      static_cast<std::size_t>(std::max(width / (bold * text_width("m")), 8.0));
   std::vector<std::string> lines = lines_of(std::string(text), num_columns, num_columns);
   for (std::size_t i = num_lines_max; i < lines.size(); ++i) {
     lines[num_lines_max - 1] += " " + lines[i];
@@ -305,17 +335,15 @@ void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
 
 }  // namespace
 
-double AxisMap::at(double value) const {
-  if (scale == Scale::linear) {
-    return begin + (value - range.from) / (range.to - range.from) * (end - begin);
-  }
-  if (!(value > 0.0)) return begin;
-  return begin + std::log(value / range.from) / std::log(range.to / range.from) * (end - begin);
+double AxisMap::part_of(double value) const {
+  if (scale == Scale::linear) return (value - range.from) / (range.to - range.from);
+  if (!(value > 0.0)) return 0.0;
+  return std::log(value / range.from) / std::log(range.to / range.from);
 }
 
 bool AxisMap::contains(double value) const {
   if (!has(value)) return false;
-  const double place = (at(value) - begin) / (end - begin);
+  const double place = part_of(value);
   return place >= -1e-9 && place <= 1.0 + 1e-9;
 }
 
@@ -362,15 +390,37 @@ AxisRange range_of(const ChartAxis& axis, const Extent& data, std::size_t num_ti
                    : logarithmic_range(axis, lower, upper, num_ticks_max);
 }
 
+namespace {
+
+/// Every how many of the ticks have a label, so that none touches another.
+std::size_t label_stride(const AxisMap& x) {
+  const std::vector<Tick>& ticks = x.range.ticks;
+  const auto touch = [&](const Tick& left, const Tick& right) {
+    return x.at(right.value) - x.at(left.value) <
+           half_width(left.label) + half_width(right.label) + 3.0;
+  };
+  std::size_t stride = 1;
+  for (std::size_t i = 0; i + stride < ticks.size();) {
+    if (touch(ticks[i], ticks[i + stride])) {
+      ++stride;
+      i = 0;
+    } else {
+      i += stride;
+    }
+  }
+  return stride;
+}
+
+}  // namespace
+
 void draw_x_axis(const AxisMap& x, const ChartAxis& axis, const Box& box, SvgWriter& writer) {
-  double taken_to = -1e9;
-  for (const Tick& tick : x.range.ticks) {
-    const double at = x.at(tick.value);
+  const std::vector<Tick>& ticks = x.range.ticks;
+  const std::size_t stride = label_stride(x);
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    const double at = x.at(ticks[i].value);
     writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour(Ink::grid)});
-    const double half = half_width(tick.label);
-    if (at - half < taken_to) continue;  // It would touch the label before it.
-    taken_to = at + half + 3.0;
-    writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});
+    if (i % stride != 0) continue;
+    writer.text({at, box.bottom() + 16.0}, ticks[i].label, {.anchor = Anchor::middle});
   }
   writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
               {.colour = writer.colour(Ink::text)});

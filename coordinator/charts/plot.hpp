@@ -78,11 +78,15 @@ struct AxisMap {
 
   /// Coordinate of a value, also of one beyond the axis' ends. On a logarithmic axis a value that
   /// is not above 0 is at the lower end.
-  [[nodiscard]] double at(double value) const;
+  [[nodiscard]] double at(double value) const { return begin + part_of(value) * (end - begin); }
   /// True if the value is between the ends.
   [[nodiscard]] bool contains(double value) const;
   /// True if the value has a place at all.
   [[nodiscard]] bool has(double value) const;
+
+ private:
+  /// 0 at the lower end, 1 at the upper one.
+  [[nodiscard]] double part_of(double value) const;
 };
 
 /// Draws title, legend, axes and layers into a box of this width, from its upper left corner at

@@ -337,7 +337,9 @@ AxisRange linear_range(const ChartAxis& axis, double from, double to, std::size_
   // Differences that a double hardly holds are no range either.
   const double least = std::max(std::abs(range.from), std::abs(range.to)) * 1e-12;
   if (!(range.to - range.from > least)) {
-    range.to = range.from + (range.from == 0.0 ? 1.0 : std::abs(range.from));
+    const double half = range.from == 0.0 ? 1.0 : std::abs(range.from);
+    if (!has_to) range.to += half;
+    if (!has_from && !axis.is_count) range.from -= half;
   }
   Step step = step_for(range.from, range.to, num_ticks_max);
   if (axis.is_count && step.size() < 1.0) step = {};

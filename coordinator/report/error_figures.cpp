@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 
 #include "coordinator/charts/chart.hpp"
@@ -99,7 +100,7 @@ std::vector<QuantityFigures> ErrorFigures::figures() {
 
 namespace {
 
-// Of magnitudes: what is smaller than 1e-120, zeros too, is in the first bin.
+// Of magnitudes.
 constexpr int bins_a_decade = 10;
 constexpr int first_decade = -120;
 constexpr int last_decade = 92;
@@ -113,69 +114,73 @@ double magnitude_edge(std::size_t bin) {
 
 // Of errors.
 constexpr std::size_t num_error_bins = 64;
-constexpr std::size_t middle = num_error_bins / 2;
 constexpr int smallest_exponent = -400;
+constexpr int relative_bits = 24;
 
 }  // namespace
 
 MagnitudeBins::MagnitudeBins() : counts_(num_magnitude_bins) {}
 
 void MagnitudeBins::add(double value) {
-  ++num_values_;
-  double position = 0.0;
-  if (value > 0.0) position = std::floor((std::log10(value) - first_decade) * bins_a_decade);
-  position = std::clamp(position, 0.0, static_cast<double>(num_magnitude_bins - 1));
-  ++counts_[static_cast<std::size_t>(position)];
+  const double bin =
+      value > 0.0 ? std::floor((std::log10(value) - first_decade) * bins_a_decade) : -1.0;
+  if (bin < 0.0) {
+    ++num_zero_;
+    return;
+  }
+  ++counts_[static_cast<std::size_t>(std::min(bin, static_cast<double>(num_magnitude_bins - 1)))];
 }
 
 Histogram MagnitudeBins::histogram() const {
   Histogram histogram;
-  if (num_values_ == 0) return histogram;
-  std::size_t first = 0;
-  while (histogram.num_below + counts_[first] <= num_values_ / 100) {
-    histogram.num_below += counts_[first++];
+  histogram.num_below = num_zero_;
+  const auto has_values = [](std::uint64_t count) { return count > 0; };
+  const auto begin = std::ranges::find_if(counts_, has_values);
+  if (begin == counts_.end()) return histogram;
+  const auto end = std::find_if(counts_.rbegin(), counts_.rend(), has_values).base();
+  histogram.counts.assign(begin, end);
+  const auto first = static_cast<std::size_t>(begin - counts_.begin());
+  for (std::size_t i = 0; i <= histogram.counts.size(); ++i) {
+    histogram.edges.push_back(magnitude_edge(first + i));
   }
-  std::size_t last = num_magnitude_bins - 1;
-  while (last > first && counts_[last] == 0) --last;
-  for (std::size_t bin = first; bin <= last; ++bin) {
-    histogram.edges.push_back(magnitude_edge(bin));
-    histogram.counts.push_back(counts_[bin]);
-  }
-  histogram.edges.push_back(magnitude_edge(last + 1));
   return histogram;
 }
 
-ErrorBins::ErrorBins() : exponent_(smallest_exponent), counts_(num_error_bins) {}
+ErrorBins::ErrorBins() : exponent_(smallest_exponent) {}
 
 void ErrorBins::double_width() {
-  std::vector<std::uint64_t> merged(num_error_bins);
-  for (std::size_t bin = 0; bin < num_error_bins; ++bin) {
-    // Bins are counted from the middle: [0, 1) and [1, 2) become [0, 2).
-    merged[(bin + middle) / 2] += counts_[bin];
-  }
+  std::map<double, std::uint64_t> merged;
+  for (const auto& [bin, count] : counts_) merged[std::floor(bin / 2.0)] += count;
   counts_ = std::move(merged);
   ++exponent_;
 }
 
 void ErrorBins::add(double value) {
+  const int least_exponent =
+      value == 0.0 ? smallest_exponent : std::ilogb(value) + 1 - relative_bits;
   const auto bin_of = [&] { return std::floor(std::ldexp(value, -exponent_)); };
-  constexpr auto end = static_cast<double>(middle);
-  while (bin_of() < -end || bin_of() >= end) double_width();
-  ++counts_[static_cast<std::size_t>(bin_of() + end)];
+  const auto has_bin = [&] {
+    if (exponent_ < least_exponent) return false;
+    constexpr auto span = static_cast<double>(num_error_bins);
+    return counts_.empty() || std::max(bin_of(), counts_.rbegin()->first) -
+                                      std::min(bin_of(), counts_.begin()->first) <
+                                  span;
+  };
+  while (!has_bin()) double_width();
+  ++counts_[bin_of()];
 }
 
 Histogram ErrorBins::histogram() const {
-  const auto has_values = [](std::uint64_t count) { return count > 0; };
-  const auto first = std::ranges::find_if(counts_, has_values);
-  if (first == counts_.end()) return {};
-  const auto last = std::find_if(counts_.rbegin(), counts_.rend(), has_values).base();
-  Histogram histogram{.edges = {}, .counts = {first, last}, .num_below = 0};
-  const auto edge = [&](auto place) {
-    return std::ldexp(static_cast<double>(place - counts_.begin()) - static_cast<double>(middle),
-                      exponent_);
-  };
-  for (auto place = first; place != last; ++place) histogram.edges.push_back(edge(place));
-  histogram.edges.push_back(edge(last));
+  Histogram histogram;
+  if (counts_.empty()) return histogram;
+  const double first = counts_.begin()->first;
+  const double last = counts_.rbegin()->first;
+  for (double bin = first; bin <= last; bin += 1.0) {
+    const auto place = counts_.find(bin);
+    histogram.counts.push_back(place == counts_.end() ? 0 : place->second);
+    histogram.edges.push_back(std::ldexp(bin, exponent_));
+  }
+  histogram.edges.push_back(std::ldexp(last + 1.0, exponent_));
   return histogram;
 }
 
@@ -223,9 +228,20 @@ std::string worst_sentence(const Review& review, std::size_t index) {
   return text + ".";
 }
 
-/// Says on an axis what it does not show.
-std::string below_text(std::uint64_t num_below) {
-  return num_below == 0 ? "" : fmt::format("; {} smaller not shown", num_below);
+/// Without the smallest of the values, at most 1 % of those that have a bin: few of them would make
+/// most of a logarithmic axis.
+Histogram without_smallest(const Histogram& all) {
+  const std::uint64_t num_values = std::accumulate(all.counts.begin(), all.counts.end(), 0ULL);
+  std::uint64_t num_left_out = 0;
+  std::ptrdiff_t first = 0;
+  for (const std::uint64_t count : all.counts) {
+    if (num_left_out + count > num_values / 100) break;
+    num_left_out += count;
+    ++first;
+  }
+  return {.edges = {all.edges.begin() + first, all.edges.end()},
+          .counts = {all.counts.begin() + first, all.counts.end()},
+          .num_below = all.num_below + num_left_out};
 }
 
 /// Marks on the axis.
@@ -301,16 +317,18 @@ std::optional<double> relative_percent(const std::optional<Interval>& interval, 
 
 Chart magnitude_chart(const Review& review, std::size_t index) {
   const Quantity& quantity = quantity_at(review, index);
-  const Histogram& histogram = review.figures[index].magnitudes;
-  Chart chart{.text = {.id = fmt::format("histogram-{}", quantity.name),
-                       .title = fmt::format("|error| of {}", quantity.symbol),
-                       .description = fmt::format(
-                           "Histogram of {}. {} {}",
-                           counted(review.results.statistics.num_estimated, "run"),
-                           objective_sentence(review, index), worst_sentence(review, index))},
-              .x = {.label = axis_label("|error|", quantity) + below_text(histogram.num_below),
-                    .scale = Scale::logarithmic},
-              .y = {.label = "runs", .is_count = true}};
+  const Histogram histogram = without_smallest(review.figures[index].magnitudes);
+  const std::string left_out =
+      histogram.num_below == 0 ? "" : fmt::format("; {} smaller not shown", histogram.num_below);
+  Chart chart{
+      .text = {.id = fmt::format("histogram-{}", quantity.name),
+               .title = fmt::format("|error| of {}", quantity.symbol),
+               .description =
+                   fmt::format("Histogram of {}. {} {}",
+                               counted(review.results.statistics.num_estimated, "run"),
+                               objective_sentence(review, index), worst_sentence(review, index))},
+      .x = {.label = axis_label("|error|", quantity) + left_out, .scale = Scale::logarithmic},
+      .y = {.label = "runs", .is_count = true}};
   const double objective = review.objectives[index] / quantity.display_scale;
   chart.layers.emplace_back(bars_of(histogram, quantity.display_scale));
   if (std::isfinite(objective)) {
@@ -324,11 +342,18 @@ Chart magnitude_chart(const Review& review, std::size_t index) {
 Chart error_chart(const Review& review, std::size_t index) {
   const Quantity& quantity = quantity_at(review, index);
   const CampaignStatistics& statistics = review.results.statistics;
+  const Histogram& histogram = review.figures[index].errors;
   Chart chart{.text = {.id = fmt::format("error-{}", quantity.name),
                        .title = fmt::format("Error of {}", quantity.symbol)},
               .x = {.label = axis_label("estimate − truth", quantity)},
               .y = {.label = "runs", .is_count = true},
-              .layers = {bars_of(review.figures[index].errors, quantity.display_scale)}};
+              .layers = {bars_of(histogram, quantity.display_scale)}};
+  if (histogram.counts.size() == 1) {  // Equal errors: a line in an axis about it.
+    const double at = histogram.edges[0] / quantity.display_scale;
+    const double half = at == 0.0 ? 1.0 : std::abs(at);
+    chart.x.from = at - half;
+    chart.x.to = at + half;
+  }
   if (statistics.num_estimated == 0) {
     chart.text.description = "No run has an estimate.";
     return chart;
@@ -418,12 +443,13 @@ ChartGrid magnitude_overview(const Review& review) {
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     const Quantity& quantity = quantity_at(review, i);
     const double objective = review.objectives[i];
+    const std::uint64_t num_left_out =
+        num_below(review.figures[i].magnitudes, from * overview_scale(review, i));
     Chart chart{
         .text = {.id = fmt::format("errors-{}", quantity.name),
                  .title = std::string(quantity.symbol)},
         .x = {.label = (std::isfinite(objective) ? "|error| / objective" : "|error| / worst") +
-                       below_text(num_below(review.figures[i].magnitudes,
-                                            from * overview_scale(review, i))),
+                       (num_left_out == 0 ? "" : fmt::format("; {} smaller", num_left_out)),
               .scale = Scale::logarithmic,
               .from = from,
               .to = end},

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +21,8 @@ struct Histogram {
   std::uint64_t num_below = 0;        ///< Values below the first edge.
 };
 
-/// Counts magnitudes, ten bins a power of ten. Memory is fixed.
+/// Counts magnitudes, ten bins a power of ten. Memory is fixed. Zeros, and what is below 1e-120,
+/// have no bin.
 class MagnitudeBins {
  public:
   MagnitudeBins();
@@ -28,17 +30,17 @@ class MagnitudeBins {
   /// @param value  ≥ 0, at most 1e91.
   void add(double value);
 
-  /// From the bin that at most 1 % of the values lie below to that of the largest.
+  /// From the first bin with a value to the last.
   [[nodiscard]] Histogram histogram() const;
 
  private:
-  std::uint64_t num_values_ = 0;
+  std::uint64_t num_zero_ = 0;
   std::vector<std::uint64_t> counts_;
 };
 
-/// Counts values of either sign in at most 64 bins of equal width about 0. The width is the
-/// smallest power of two with which all values have a bin: it depends on the largest |value| alone,
-/// not on the order.
+/// Counts values of either sign in at most 64 bins of equal width between the least and the
+/// largest. The width is the smallest power of two with which all values have a bin, and no less
+/// than 2^-24 of the largest |value|: it depends on these values alone, not on the order.
 class ErrorBins {
  public:
   ErrorBins();
@@ -52,8 +54,8 @@ class ErrorBins {
  private:
   void double_width();
 
-  int exponent_;  ///< Bins are 2^exponent wide.
-  std::vector<std::uint64_t> counts_;
+  int exponent_;                            ///< Bins are 2^exponent wide.
+  std::map<double, std::uint64_t> counts_;  ///< By the number of the bin, floor(value / width).
 };
 
 /// How well estimates fit the data of a session, or all data, over the completed runs of a campaign

@@ -3,7 +3,7 @@
 
 Indented lines are commands. They run in their order; the coordinator and the worker stay until the
 end. Then come the commands after `$ ` in the fenced blocks, whose whole output must be what the
-block shows; a line `...` there stands for any lines.
+block shows; a line `...` there stands for any lines. Pictures are compared with what `plot` draws.
 
 Everything but ./deploy/quickstart.sh runs in a network namespace in which coordinator.example is
 this machine, and therefore needs root. Two things are not as typed: the sessions of mine.toml are
@@ -133,6 +133,18 @@ def run_all(machine, text, quick_start):
         raise Mismatch(f"exit codes of coordinator and worker = {codes} (must be 0)")
 
 
+def compare_pictures(machine, text, source):
+    """Each picture that the README shows is what `plot` draws of the campaign of the quick start."""
+    charts = re.findall(r'src="deploy/pictures/(\w+)\.svg"', text)
+    if not charts:
+        raise Mismatch("README.md: pictures = 0 (must be 1 or more)")
+    for chart in charts:
+        command = f"proofmass plot hardy2013.db --chart {chart} --output -"
+        drawn = machine.start(command, stdout=subprocess.PIPE).communicate()[0]
+        if drawn != (source / f"deploy/pictures/{chart}.svg").read_text(encoding="utf-8"):
+            raise Mismatch(f"{command}: draws another picture than deploy/pictures/{chart}.svg")
+
+
 def main():
     parser = argparse.ArgumentParser(description="Runs the commands of README.md.")
     where = parser.add_mutually_exclusive_group(required=True)
@@ -153,6 +165,7 @@ def main():
         if num_words >= WORDS_MAX:
             raise Mismatch(f"README.md: words = {num_words} (must be below {WORDS_MAX})")
         run_all(machine, text, quick_start)
+        compare_pictures(machine, text, source)
     except Mismatch as mismatch:
         print(mismatch, file=sys.stderr)
         return 1

@@ -152,8 +152,8 @@ TEST(Line, LeavesOutWhatHasNoPlace) {
 TEST(Chart, WithoutDataSaysSo) {
   Chart chart = histogram();
   chart.layers = {LimitLine{.label = "objective", .value = 30.0}};
-  EXPECT_THAT(svg_of(chart, SvgUse::embedded), HasSubstr(">no data</text>"));
-  EXPECT_THAT(svg_of(histogram(), SvgUse::embedded), Not(HasSubstr("no data")));
+  EXPECT_THAT(svg_of(chart, SvgUse::embedded), HasSubstr(">nothing to show</text>"));
+  EXPECT_THAT(svg_of(histogram(), SvgUse::embedded), Not(HasSubstr("nothing to show")));
 }
 
 // Half of `−5×10⁵`, in DejaVu Sans of 13 pixels, is 25.9 wide.
@@ -175,9 +175,10 @@ TEST(Chart, CutsNoLabelOfATick) {
 
 TEST(Chart, ShowsOnePointAsAMark) {
   const std::string svg = svg_of(curve({{1.0, 0.5}}, Scale::logarithmic), SvgUse::file);
-  EXPECT_THAT(svg, Not(HasSubstr("no data")));
+  EXPECT_THAT(svg, Not(HasSubstr("nothing to show")));
   EXPECT_THAT(test::tags_of(svg, "<path[^>]*#008f68[^>]*>"), SizeIs(1));
-  EXPECT_THAT(svg_of(curve({}, Scale::logarithmic), SvgUse::file), HasSubstr(">no data</text>"));
+  EXPECT_THAT(svg_of(curve({}, Scale::logarithmic), SvgUse::file),
+              HasSubstr(">nothing to show</text>"));
 }
 
 TEST(BarChart, HasValuesAsText) {

@@ -366,7 +366,7 @@ using ReviewedReading = test::ReviewTest;
 TEST_F(ReviewedReading, ShowsTheTableOfAReview) {
   const Store store = store_with(150);
   ResultsReading reading(store);
-  EXPECT_THAT(reading.html(), HasSubstr("no data"));
+  EXPECT_THAT(reading.html(), HasSubstr("nothing to show"));
   reading.read_further(store, 150);
   const std::string html = reading.html();
   EXPECT_EQ(test::malformed_part(html), "");

@@ -61,7 +61,7 @@ TEST_F(ReviewHtml, HoldsACampaignWithoutResults) {
   const Store store = Store::create(file(), campaign, canonical_definition(campaign));
   const std::string html = review_html(review_of(store, 5));
   EXPECT_EQ(test::malformed_part(as_xml(html)), "");
-  EXPECT_THAT(html, HasSubstr("no data"));
+  EXPECT_THAT(html, HasSubstr("nothing to show"));
 }
 
 // All draws meet a requirement that nobody exceeds, and with 100 draws, of which one may exceed,
