@@ -64,7 +64,11 @@ void RunningStandardErrors::add(const RunResult& result) {
     sums.errors += sigma;
     sums.squares += sigma * sigma;
     sums.squared_errors += error * error;
-    sums.fourth_powers += sigma * sigma * sigma * sigma;
+    if (sums.unit == 0.0 && sigma > 0.0) sums.unit = std::ldexp(1.0, std::ilogb(sigma));
+    if (sigma > 0.0) {
+      const double square = (sigma / sums.unit) * (sigma / sums.unit);
+      sums.fourth_powers += square * square;
+    }
     if (std::abs(error) < normal_95 * sigma) ++sums.num_within;
     if (sigma > 0.0 && is_in_range(error / sigma)) sums.pulls.add(error / sigma);
   }
@@ -100,7 +104,8 @@ StandardErrorStatistics RunningStandardErrors::statistics() const {
                                .num_within = sums.num_within,
                                .pulls = sums.pulls.histogram()});
     if (!are_draws_independent_) continue;
-    of.squared_ratio_error = over_square(std::sqrt(2.0 * sums.fourth_powers) / n);
+    of.squared_ratio_error =
+        over_square(std::sqrt(2.0 * sums.fourth_powers) * sums.unit * sums.unit / n);
     of.within = probability_interval(static_cast<double>(sums.num_within), n, default_confidence);
   }
   for (std::size_t i = 0; i < fit_.size() && num_runs_ > 0; ++i) {

@@ -113,7 +113,8 @@ class RunningStandardErrors {
   struct Sums {
     double errors = 0.0;         ///< Of the standard errors.
     double squares = 0.0;        ///< Of the squares of the standard errors.
-    double fourth_powers = 0.0;  ///< Of those of the standard errors.
+    double unit = 0.0;           ///< A power of two near the first standard error above 0.
+    double fourth_powers = 0.0;  ///< Of those of the standard errors, in this unit.
     double squared_errors = 0.0;
     std::uint64_t num_within = 0;
     ErrorBins pulls;

@@ -45,6 +45,21 @@ TEST(StandardErrors, AreHeldAgainstTheErrors) {
   EXPECT_EQ(statistics.fit[0].ratio, 1.0);
 }
 
+// √(2 Σσ⁴)/Σσ² of five equal ones, whatever their unit: σ⁴ alone would not be a double.
+TEST(StandardErrors, MayHaveAnyUnit) {
+  for (const double unit : {1e-85, 1e80}) {
+    RunningStandardErrors running(test::schema());
+    for (std::size_t run = 0; run < pulls.size(); ++run) {
+      RunResult result = test::result_off_by(run, pulls[run]);
+      std::ranges::fill(result.standard_error, unit);
+      running.add(result);
+    }
+    for (const StandardErrorStatistic& of : running.statistics().quantities) {
+      EXPECT_NEAR(of.squared_ratio_error.value(), std::sqrt(2.0 / 5.0), 1e-12);
+    }
+  }
+}
+
 // Without noise there is nothing to hold the errors against.
 TEST(StandardErrors, HaveNoRatioWhereTheyAreZero) {
   RunningStandardErrors running(test::schema());
