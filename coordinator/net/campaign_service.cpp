@@ -62,6 +62,7 @@ CampaignRecord CampaignService::record_of(CampaignId id) const {
   status.set_num_done(campaign.committed.size());
   status.set_num_without_estimate(served.num_failures_before + campaign.num_without_estimate);
   status.set_num_given_up(campaign.given_up.size());
+  status.set_num_suspects(campaign.suspects.size());
   status.set_num_lent(campaign.lent.runs().size());
   status.set_num_duplicates(campaign.num_duplicates);
   status.set_num_audited(campaign.num_audited);

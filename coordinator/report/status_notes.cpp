@@ -22,6 +22,8 @@ std::span<const CampaignCounter> campaign_counters() {
       CampaignCounter{"num_without_estimate", &proto::CampaignStatus::num_without_estimate,
                       "proofmass_runs_without_estimate_total",
                       "Finished runs without an estimate."},
+      CampaignCounter{"num_suspects", &proto::CampaignStatus::num_suspects,
+                      "proofmass_runs_suspect", "Open runs that crashed workers."},
       CampaignCounter{"num_given_up", &proto::CampaignStatus::num_given_up,
                       "proofmass_runs_given_up", "Runs that crashed too many workers."},
       CampaignCounter{"num_lent", &proto::CampaignStatus::num_lent, "proofmass_runs_lent",
@@ -129,6 +131,9 @@ std::vector<Remark> notes_about(const proto::CampaignStatus& campaign) {
   }
   if (campaign.num_given_up() > 0) {
     add_trouble(counted(campaign.num_given_up(), "run") + " given up: crashed too often");
+  }
+  if (campaign.num_suspects() > 0 && !campaign.crashes_everywhere()) {
+    add_trouble(counted(campaign.num_suspects(), "run") + " crashed: tried again last, alone");
   }
   if (campaign.num_without_estimate() > 0) {
     add_trouble(counted(campaign.num_without_estimate(), "run") + " without an estimate");

@@ -131,6 +131,7 @@ TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
   proto::CampaignStatus second = campaign("second-order", 97);
   second.set_phase(proto::CAMPAIGN_PHASE_PAUSED);
   second.set_priority(-5);
+  second.set_num_suspects(1);
   second.set_num_given_up(1);
   second.set_num_without_estimate(2);
   second.set_num_audited(10);
@@ -144,6 +145,7 @@ campaign         phase      prio       done       runs    %  runs/s   time left
 hardy2013        active        0         42        100   42    12.3  3 min 20 s
 second-order     paused       -5         97        100   97       -           -
 second-order: 1 run given up: crashed too often
+second-order: 1 run crashed: tried again last, alone
 second-order: 2 runs without an estimate
 second-order: 10 results compared with a second computation: 3 differ (none may)
 )");
