@@ -128,7 +128,7 @@ std::vector<CampaignRecord> list_campaigns(std::span<const std::filesystem::path
 
 Table listing_table(std::span<const CampaignRecord> campaigns) {
   if (campaigns.empty()) return {.remarks = {{"no campaigns"}}};
-  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
+  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10.250Z.
   Table table{.columns = {{"file", true, 18},
                           {"campaign", true, 14},
                           {"phase", true, 10},

@@ -30,7 +30,7 @@ struct CampaignRecord {
   std::string problem = {};
   proto::CampaignStatus status = {};
   std::uint64_t seed = 0;
-  std::string created_utc = {};   ///< As in `2024-02-29T12:00:10Z`.
+  std::string created_utc = {};   ///< As in `2024-02-29T12:00:10.250Z`.
   std::uint64_t num_waiting = 0;  ///< Results that were delivered and are not stored yet.
   /// The campaign is finished or cancelled, its statistics are up to date, and there is no log:
   /// everything is in this one file, and nothing remains to be done. Or this program cannot go on

@@ -141,7 +141,7 @@ class Store {
   /// The same, to be compared with that of a model, see wire::current_reference_digest().
   [[nodiscard]] std::uint64_t reference_digest_for(const Model& model) const;
   [[nodiscard]] std::string build() const;        ///< Of the program that made the file.
-  [[nodiscard]] std::string created_utc() const;  ///< As in `2024-02-29T12:00:10Z`.
+  [[nodiscard]] std::string created_utc() const;  ///< As in `2024-02-29T12:00:10.250Z`.
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.
   [[nodiscard]] std::string owner() const;
   void set_owner(std::string_view owner);

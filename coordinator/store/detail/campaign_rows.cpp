@@ -119,8 +119,9 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
   database
       .prepare(
           "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
-          " model_description, reference_digest, build, campaign_uid, first_version)"
-          " VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
+          " model_description, reference_digest, build, campaign_uid, first_version, created_utc)"
+          " VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9,"
+          " strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
            model.version(), std::string(model.description()), reference_digest,
            std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);

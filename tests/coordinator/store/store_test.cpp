@@ -63,6 +63,13 @@ TEST_F(StoreTest, HoldsTheCampaignThatItWasCreatedWith) {
   EXPECT_EQ(store.definition(), "name = \"naïve\"\n");
 }
 
+// Campaigns are served in the order in which they were made, also those of one second.
+TEST_F(StoreTest, KnowsWhenItWasMadeToAMillisecond) {
+  Store::create(file(), campaign_of(1), "");
+  EXPECT_THAT(Store::open(file()).created_utc(),
+              testing::ContainsRegex("^20..-..-..T..:..:..[.][0-9][0-9][0-9]Z$"));
+}
+
 TEST_F(StoreTest, HoldsTheDataOfItsCampaign) {
   Store::create(file(), campaign_with_data(3), "");
   const Database database(file(), Access::read_only);
