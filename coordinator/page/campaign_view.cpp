@@ -78,7 +78,7 @@ std::string losses_table(const CampaignDetails& details) {
     table.rows.push_back(
         {loss.reason, grouped(loss.num_losses), grouped(loss.num_runs), grouped(loss.num_blamed)});
   }
-  return titled("Attempts without a result, lent again", table);
+  return titled("Attempts without a result", table);
 }
 
 std::string failures_of(const CampaignDetails& details, std::uint64_t num_given_up) {

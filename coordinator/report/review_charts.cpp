@@ -184,7 +184,7 @@ a{color:inherit}
 .skip{position:absolute;left:-99rem}
 .skip:focus{position:static}
 h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
-h3{font-size:1.05rem;margin:1.4rem 0 .3rem}
+h3{font-size:1.05rem;margin:1.4rem 0 .3rem;overflow-wrap:anywhere}
 p,li{text-wrap:pretty;overflow-wrap:anywhere}
 .scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
 .scroll{background:linear-gradient(to left,var(--chart-ground) 1rem,transparent) right/2rem 100%,

@@ -200,7 +200,7 @@ bool is_png(const std::filesystem::path& output) { return output.extension() == 
 void check_plot_arguments(const PlotOptions& options) {
   if (options.is_list) return;
   if (options.chart.empty()) throw UsageError("chart = (must be given; --list names all)");
-  if (options.output.empty()) throw UsageError("output = (must be given)");
+  if (options.output.empty()) throw UsageError("output = (must be given, as --output FILE.svg)");
   const bool is_picture = options.output.extension() == ".svg" || is_png(options.output);
   if (options.output != "-" && !is_picture) {
     refuse_output(options.output, "must end in .svg or .png, or be - for SVG on standard output");
