@@ -215,7 +215,7 @@ std::string missing_text(const Store& store, const RunSet& missing, const MergeO
   if (missing.empty()) return {};
   return fmt::format(
       "{0} of {1} runs are in no part: {2}\n`proofmass run FILE --db {3} --runs {1}` computes "
-      "them\n",
+      "them, with FILE and each --set of the parts\n",
       missing.size(), store.num_runs(), to_text(missing), options.whole.string());
 }
 
