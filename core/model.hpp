@@ -69,7 +69,7 @@ class Model {
                                                 std::string_view version) const = 0;
 
   /// The data files that a definition may name and that a database keeps as tables.
-  [[nodiscard]] virtual std::span<const DataTableSchema> tables() const = 0;
+  [[nodiscard]] virtual std::span<const DataTableSchema> tables() const { return {}; }
 
   /// What is drawn for a run, in the order of RunDraw::values.
   [[nodiscard]] virtual std::span<const DrawnQuantity> drawn() const = 0;

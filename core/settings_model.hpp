@@ -64,7 +64,7 @@ class SettingsCampaign final : public Campaign {
   Settings settings;
 
   [[nodiscard]] const Model& model() const override { return built_in_model(); }
-  void validate() const override {
+  void validate(TableColumns /*columns*/ = TableColumns::included) const override {
     check_identity(*this);
     check_table_columns({}, *this);
     for (const auto& info : Settings::infos()) check_field(info.field, settings.*info.value);
@@ -92,7 +92,6 @@ class SettingsCampaign final : public Campaign {
     return objectives;
   }
   [[nodiscard]] std::int64_t num_rounds_max() const override { return settings.num_rounds_max(); }
-  [[nodiscard]] std::vector<std::size_t> table_quantities() const override { return {}; }
 
   [[nodiscard]] RunDraw draw(RunIndex run) const override {
     RunDraw draw{.num_draws = 1};
@@ -166,7 +165,6 @@ class SettingsModel final : public Model {
       return Settings().results();
     }
   }
-  [[nodiscard]] std::span<const DataTableSchema> tables() const override { return {}; }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return Settings::drawn(); }
   [[nodiscard]] std::string_view step_name() const override { return Settings::step_name; }
   [[nodiscard]] std::size_t batch_size() const override { return Settings::batch_size; }

@@ -104,7 +104,7 @@ std::vector<std::string> write_draws(const Campaign& campaign, const path& folde
     assignments.push_back(fmt::format("{0}.column={0}", laws.back()));
   }
   if (laws.empty()) return {};
-  const std::size_t step = campaign.num_realisations();  // A row is of an instrument.
+  const std::size_t step = campaign.realisations;  // A row is of an instrument.
   write_csv(folder / "draws.csv", laws, (campaign.num_runs + step - 1) / step,
             [&](auto row, auto column) { return campaign.table_columns[column][row * step]; });
   return assignments;

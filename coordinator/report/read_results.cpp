@@ -83,8 +83,8 @@ class DependentRuns {
  public:
   DependentRuns(const Store& store, const Campaign& campaign, std::vector<RunRange> given_up)
       : given_up_(std::move(given_up)) {
-    const std::uint64_t realisations = campaign.num_realisations();
-    const SamplingDesign design = campaign.sampling_design();
+    const std::uint64_t realisations = campaign.realisations;
+    const SamplingDesign design = campaign.design;
     if (realisations > 1) {
       instruments_.emplace(store.schema(), campaign.objectives(), realisations);
     }

@@ -31,8 +31,7 @@ void check_identity(const Campaign& campaign) {
     throw ConfigError("campaign.runs", fmt::format("{}", campaign.num_runs),
                       fmt::format("must be in [1, {}]", num_runs_max));
   }
-  if (const std::uint64_t shared = campaign.num_realisations();
-      shared < 1 || shared > realisations_max) {
+  if (const std::uint64_t shared = campaign.realisations; shared < 1 || shared > realisations_max) {
     throw ConfigError("campaign.realisations", fmt::format("{}", shared),
                       fmt::format("must be in [1, {}]", realisations_max));
   }

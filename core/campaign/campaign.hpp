@@ -159,6 +159,10 @@ class Campaign {
   std::string name;
   std::uint64_t seed = 1;
   std::uint64_t num_runs = 100;
+  /// Consecutive runs that share one draw and differ in their noise: those from i·realisations on
+  /// have draw i.
+  std::uint64_t realisations = 1;
+  SamplingDesign design = {};  ///< How the draws are chosen.
   /// For each of table_quantities(), its value for every run; at least num_runs each.
   std::vector<std::vector<double>> table_columns;
 
@@ -167,8 +171,9 @@ class Campaign {
   /// The model that it is a campaign of; outlives it.
   [[nodiscard]] virtual const Model& model() const = 0;
 
+  /// @param columns  Whether `table_columns` must be there.
   /// @throws ConfigError naming the field, its value and the rule.
-  virtual void validate() const = 0;
+  virtual void validate(TableColumns columns = TableColumns::included) const = 0;
 
   /// A copy, to be given another name or number of runs.
   [[nodiscard]] virtual std::unique_ptr<Campaign> clone() const = 0;
@@ -191,15 +196,11 @@ class Campaign {
   /// Largest acceptable |error| of each quantity, SI; infinite if there is none.
   [[nodiscard]] virtual std::vector<double> objectives() const = 0;
   /// Most estimation rounds of a run.
-  [[nodiscard]] virtual std::int64_t num_rounds_max() const = 0;
+  [[nodiscard]] virtual std::int64_t num_rounds_max() const { return 1; }
   /// Drawn quantities whose values come from a table: indices into Model::drawn(), ascending.
-  [[nodiscard]] virtual std::vector<std::size_t> table_quantities() const = 0;
+  [[nodiscard]] virtual std::vector<std::size_t> table_quantities() const { return {}; }
   /// The draw that a run begins with. A pure function, some 11 µs. @pre The run is one of these.
   [[nodiscard]] virtual RunDraw draw(RunIndex run) const = 0;
-  /// Consecutive runs that share one draw and differ in their noise.
-  [[nodiscard]] virtual std::uint64_t num_realisations() const { return 1; }
-  /// How the draws are chosen.
-  [[nodiscard]] virtual SamplingDesign sampling_design() const { return {}; }
   /// What differs from run to run.
   [[nodiscard]] virtual Interpretation interpretation() const { return Interpretation::mixed; }
   /// Whether runs may be computed where the model's reference digest is another one: then a result

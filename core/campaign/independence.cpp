@@ -13,10 +13,10 @@
 namespace proofmass {
 
 std::string why_not_independent(const Campaign& campaign) {
-  if (const std::uint64_t realisations = campaign.num_realisations(); realisations > 1) {
+  if (const std::uint64_t realisations = campaign.realisations; realisations > 1) {
     return fmt::format("{} runs each share one draw (campaign.realisations)", realisations);
   }
-  if (const SamplingDesign design = campaign.sampling_design(); design.points > 1) {
+  if (const SamplingDesign design = campaign.design; design.points > 1) {
     return fmt::format("{} runs each are one replicate of a design (campaign.design = \"{}\")",
                        design.points, name_of(design.kind));
   }

@@ -226,13 +226,13 @@ void check_laws(const LawSet& set) {
 }
 
 void check_design(const LawSet& set, const Campaign& campaign) {
-  const SamplingDesign design = campaign.sampling_design();
+  const SamplingDesign design = campaign.design;
   const auto refuse = [&](std::string_view reason) {
     throw ConfigError("campaign.design", fmt::format("\"{}\"", name_of(design.kind)), reason);
   };
   design.validate(campaign.num_runs);
   if (design.kind == DesignKind::random) return;
-  if (campaign.num_realisations() > 1) {
+  if (campaign.realisations > 1) {
     refuse("must be \"random\" with campaign.realisations, which needs independent instruments");
   }
   if (set.laws.size() > sobol_dimensions) {
@@ -252,7 +252,7 @@ void check_independence(const LawSet& set, const Campaign& campaign) {
     if (!law.is_independent) continue;
     const std::vector<double>& column = campaign.table_columns[i];
     std::vector<double> rows;
-    for (std::size_t run = 0; run < column.size(); run += campaign.num_realisations()) {
+    for (std::size_t run = 0; run < column.size(); run += campaign.realisations) {
       rows.push_back(column[run]);
     }
     const std::string why = why_dependent(rows);

@@ -105,11 +105,11 @@ std::vector<Entry> campaign_entries(const Campaign& campaign) {
       whole_entry("campaign.seed", whole(campaign.seed), "All randomness follows from it."),
       whole_entry("campaign.runs", whole(campaign.num_runs), "May grow later."),
   };
-  if (campaign.num_realisations() != 1) {
-    entries.push_back(whole_entry("campaign.realisations", whole(campaign.num_realisations()),
+  if (campaign.realisations != 1) {
+    entries.push_back(whole_entry("campaign.realisations", whole(campaign.realisations),
                                   "Runs that share one instrument and differ in their noise."));
   }
-  const SamplingDesign design = campaign.sampling_design();
+  const SamplingDesign design = campaign.design;
   if (design.kind != DesignKind::random) {
     entries.push_back(choice_entry("campaign.design", design.kind,
                                    "\"random\", \"latin_hypercube\" or \"sobol\"."));

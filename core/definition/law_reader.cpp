@@ -33,13 +33,13 @@ void read_design(Document& document, SamplingDesign& design) {
 
 }  // namespace
 
-void read_identity(Document& document, Campaign& campaign, std::uint64_t& realisations,
-                   SamplingDesign& design) {
+void read_identity(Document& document, Campaign& campaign) {
   document.read("campaign.name", campaign.name);
   document.read("campaign.seed", campaign.seed, range::not_negative);
   document.read("campaign.runs", campaign.num_runs, range::between(1, double{num_runs_max}));
-  document.read("campaign.realisations", realisations, range::between(1, double{realisations_max}));
-  read_design(document, design);
+  document.read("campaign.realisations", campaign.realisations,
+                range::between(1, double{realisations_max}));
+  read_design(document, campaign.design);
 }
 
 namespace {
@@ -186,7 +186,7 @@ std::vector<std::vector<double>> read_table_columns(
     const std::function<std::vector<double>(const Dispersion& law, const std::string& path)>&
         rows_of) {
   std::vector<std::vector<double>> columns;
-  const std::uint64_t realisations = campaign.num_realisations();
+  const std::uint64_t realisations = campaign.realisations;
   for (const std::size_t element : table_elements(set.laws)) {
     std::vector<double> rows = rows_of(set.laws[element], set.path_of(element));
     if (realisations == 1) {

@@ -16,8 +16,7 @@ class Document;
 // What is wrong is remembered by the document, and found by Document::check().
 
 /// Reads `campaign.name`, `seed`, `runs`, `realisations`, `design` and `points`.
-void read_identity(Document& document, Campaign& campaign, std::uint64_t& realisations,
-                   SamplingDesign& design);
+void read_identity(Document& document, Campaign& campaign);
 
 /// Reads a law where it differs from another one.
 ///

@@ -97,7 +97,7 @@ std::vector<DefinitionDifference> DescribedCampaign::differences_from(const Camp
 
 void DescribedCampaign::read(Document& document) {
   const ProgramDescription& of = description();
-  read_identity(document, *this, realisations, design);
+  read_identity(document, *this);
   document.read("campaign.tolerate_digest", is_digest_tolerated);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     document.read("parameters." + of.parameters[i].name, parameters[i]);
@@ -116,15 +116,11 @@ void DescribedCampaign::read(Document& document) {
   document.check();
 }
 
-void DescribedCampaign::validate() const {
-  validate_without_columns();
-  check_table_columns(law_set(), *this);
-}
-
-void DescribedCampaign::validate_without_columns() const {
+void DescribedCampaign::validate(TableColumns columns) const {
   check_identity(*this);
   check_laws(law_set());
   check_design(law_set(), *this);
+  if (columns == TableColumns::included) check_table_columns(law_set(), *this);
 }
 
 RunDraw DescribedCampaign::drawn(RunIndex run, std::span<const double> table_values) const {
@@ -276,11 +272,7 @@ std::unique_ptr<Campaign> DescribedModel::campaign_of(Definition definition, Tab
   campaign->read(document);
   campaign->table_columns = definition.table_columns;
   try {
-    if (columns == TableColumns::included) {
-      campaign->validate();
-    } else {
-      campaign->validate_without_columns();
-    }
+    campaign->validate(columns);
   } catch (const ConfigError& error) {
     throw document.located(error);
   }
@@ -295,7 +287,7 @@ std::unique_ptr<Campaign> DescribedModel::read_campaign(Document& document,
   auto campaign = std::make_unique<DescribedCampaign>(*this);
   campaign->read(document);
   try {
-    campaign->validate_without_columns();
+    campaign->validate(TableColumns::left_out);
     campaign->table_columns = read_table_columns(
         campaign->law_set(), *campaign, [&](const Dispersion& law, const std::string& path) {
           return parse_column(files.text_of(law.file, path + ".file"), files.name_of(law.file),

@@ -116,17 +116,13 @@ class DescribedCampaign final : public Campaign {
 
   std::vector<double> parameters;  ///< Of each of the description's.
   std::vector<Dispersion> laws;    ///< Of each drawn quantity.
-  std::uint64_t realisations = 1;  ///< Consecutive runs that share one draw.
-  SamplingDesign design = {};
   bool is_digest_tolerated = false;
 
   /// Takes what a campaign file changes. @throws DefinitionError
   void read(Document& document);
-  /// validate() of a campaign whose `table_columns` may be absent.
-  void validate_without_columns() const;
 
   [[nodiscard]] const Model& model() const override;
-  void validate() const override;
+  void validate(TableColumns columns = TableColumns::included) const override;
   [[nodiscard]] std::unique_ptr<Campaign> clone() const override {
     return std::make_unique<DescribedCampaign>(*this);
   }
@@ -138,12 +134,9 @@ class DescribedCampaign final : public Campaign {
       const Campaign& other) const override;
   [[nodiscard]] ResultSchema results() const override;
   [[nodiscard]] std::vector<double> objectives() const override { return objectives_; }
-  [[nodiscard]] std::int64_t num_rounds_max() const override { return 1; }
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override {
     return table_elements(laws);
   }
-  [[nodiscard]] std::uint64_t num_realisations() const override { return realisations; }
-  [[nodiscard]] SamplingDesign sampling_design() const override { return design; }
   [[nodiscard]] RunDraw draw(RunIndex run) const override { return drawn(run, table_values(run)); }
   [[nodiscard]] bool tolerates_digests() const override { return is_digest_tolerated; }
   [[nodiscard]] std::string note() const override;
@@ -182,7 +175,6 @@ class DescribedModel final : public Model {
   [[nodiscard]] std::string_view version() const override { return parts_.version; }
   [[nodiscard]] std::string_view purpose() const override { return parts_.purpose; }
   [[nodiscard]] ResultSchema results_of(std::string_view, std::string_view) const override;
-  [[nodiscard]] std::span<const DataTableSchema> tables() const override { return {}; }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_; }
   [[nodiscard]] std::string_view step_name() const override { return "steps"; }
   [[nodiscard]] std::size_t batch_size() const override { return parts_.runs_at_once; }

@@ -191,7 +191,7 @@ Outlook outlook_on(const Campaign& campaign, const Plan& plan) {
   outlook.differences = campaign.differences_from(*example_campaign(campaign.model()));
   const bool is_program = !campaign.model().description().empty();
   if (is_program) wire::require_repeatable(campaign, *campaign.prepare(), batch.results.back());
-  const std::uint64_t each = campaign.num_realisations();
+  const std::uint64_t each = campaign.realisations;
   const std::uint64_t num_instruments = (campaign.num_runs + each - 1) / each;
   for (; outlook.num_drawn < std::min(num_instruments, instruments_max) &&
          outlook.num_draws < draws_max;
@@ -221,7 +221,7 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
   std::string text =
       fmt::format("Draws     {} of {} accepted, for the first {} {}\n",
                   outlook.num_drawn - outlook.num_without_draw, outlook.num_draws,
-                  outlook.num_drawn, campaign.num_realisations() > 1 ? "instruments" : "runs");
+                  outlook.num_drawn, campaign.realisations > 1 ? "instruments" : "runs");
   const std::uint32_t num_draws_max = campaign.results().num_draws_max;
   if (outlook.num_without_draw > 0 && num_draws_max == 1) {  // The model has no bounds.
     text += fmt::format(
@@ -234,7 +234,7 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
         "          widen the bounds or narrow the laws\n",
         outlook.num_without_draw, num_draws_max);
   }
-  const std::uint64_t each = campaign.num_realisations(), rest = campaign.num_runs % each;
+  const std::uint64_t each = campaign.realisations, rest = campaign.num_runs % each;
   if (rest > 0) {
     text += fmt::format(
         "Warning   the last draw has {} of its {} runs, and reports leave it out; use --runs {}\n",

@@ -31,17 +31,13 @@ void check_environment(const MicroscopeCampaign& campaign) {
 
 }  // namespace
 
-void MicroscopeCampaign::validate() const {
-  validate_without_columns();
-  check_table_columns(law_set(dispersions), *this);
-}
-
-void MicroscopeCampaign::validate_without_columns() const {
+void MicroscopeCampaign::validate(TableColumns columns) const {
   check_identity(*this);
   scenario.validate();
   check_environment(*this);
   check_laws(law_set(dispersions));
   check_design(law_set(dispersions), *this);
+  if (columns == TableColumns::included) check_table_columns(law_set(dispersions), *this);
 }
 
 Interpretation MicroscopeCampaign::interpretation() const {

@@ -21,20 +21,13 @@ class MicroscopeCampaign final : public Campaign {
  public:
   MicroscopeCampaign() { name = "hardy2013"; }
 
-  /// Runs that share one drawn instrument and differ in their noise: those from i·realisations on
-  /// have the draws of instrument i.
-  std::uint64_t realisations = 1;
-  SamplingDesign design;  ///< Of the instruments.
   Scenario scenario;
   DispersionSet dispersions = nominal_dispersions();
   std::string environment_file;        ///< As written in the campaign file; empty if harmonic.
   EnvironmentTable environment_table;  ///< Rows of that file; empty if harmonic.
 
   [[nodiscard]] const Model& model() const override;
-  void validate() const override;
-  /// validate() of a campaign whose `table_columns` may be absent.
-  /// @throws ConfigError naming the field, its value and the rule.
-  void validate_without_columns() const;
+  void validate(TableColumns columns = TableColumns::included) const override;
 
   [[nodiscard]] std::unique_ptr<Campaign> clone() const override;
   [[nodiscard]] std::unique_ptr<const Plan> prepare() const override;
@@ -51,8 +44,6 @@ class MicroscopeCampaign final : public Campaign {
     return table_elements(dispersions);
   }
   [[nodiscard]] RunDraw draw(RunIndex run) const override;
-  [[nodiscard]] std::uint64_t num_realisations() const override { return realisations; }
-  [[nodiscard]] SamplingDesign sampling_design() const override { return design; }
   [[nodiscard]] Interpretation interpretation() const override;
   [[nodiscard]] std::string note() const override;
   [[nodiscard]] std::optional<ErrorBudget> error_budget() const override;

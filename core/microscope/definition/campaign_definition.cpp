@@ -346,7 +346,7 @@ MicroscopeCampaign campaign_of(Definition definition, TableColumns columns,
   campaign.environment_table = std::move(environment_table);
   campaign.table_columns = std::move(definition.table_columns);
   try {
-    columns == TableColumns::included ? campaign.validate() : campaign.validate_without_columns();
+    campaign.validate(columns);
   } catch (const ConfigError& error) {
     throw document.located(error);
   }

@@ -263,7 +263,7 @@ DispersionSet read_dispersions(Document& document) {
 MicroscopeCampaign read_definition(Document& document) {
   MicroscopeCampaign campaign;
   campaign.scenario = hardy2013_campaign().scenario;  // What is left out stays what `init` writes.
-  read_identity(document, campaign, campaign.realisations, campaign.design);
+  read_identity(document, campaign);
   document.read("environment.file", campaign.environment_file);
   campaign.scenario.sessions = read_sessions(document);  // Some fields are those of tests.
   read_scenario(document, campaign.scenario);

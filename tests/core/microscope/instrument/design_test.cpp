@@ -138,7 +138,7 @@ TEST(Design, KeepsTheDrawsOfEarlierRunsInAnyOrder) {
 }
 
 std::string design_refusal(const MicroscopeCampaign& campaign) {
-  return test::message_of<ConfigError>([&] { campaign.validate_without_columns(); });
+  return test::message_of<ConfigError>([&] { campaign.validate(TableColumns::left_out); });
 }
 
 TEST(Design, RefusesWhatWouldNotBeEven) {
