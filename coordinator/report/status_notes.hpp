@@ -56,7 +56,6 @@ struct CampaignCounter {
 [[nodiscard]] std::vector<Remark> service_notes(const proto::StatusReply& status);
 
 // How a coordinator stands, for programs: JSON objects with stable keys, units in their names.
-// coordinator/cli/README.md lists them.
 
 [[nodiscard]] nlohmann::ordered_json status_json(const proto::StatusReply& status);
 [[nodiscard]] nlohmann::ordered_json workers_json(const proto::WorkersReply& workers);
