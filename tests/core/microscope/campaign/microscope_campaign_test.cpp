@@ -219,7 +219,7 @@ TEST(MicroscopeCampaign, NotesThatNoSessionWatchesTheNoise) {
                 [](const Session& session) { return session.excitations.empty(); });
   EXPECT_EQ(campaign.note(),
             "no session watches the noise of the loops, which may move every estimate: add one "
-            "without excitations");
+            "with target = \"no_target\" and fit_lines = [[2, 0]]");
 }
 
 // 1 − e⁻⁰·³ of the samples; in a modulation of λd = 1.2, 1 − e⁻¹·² I₀(1.2) = 58 %.
