@@ -150,9 +150,11 @@ void add_misfits(const PlanScope& scope, Table& table) {
   table.notes.push_back(
       "where data do not fit, errors are larger than σ and the chances above are too high");
   if (scope.misfits.empty()) return;
-  table.notes.push_back(
-      fmt::format("make excitations weaker, or their lines farther apart, in what does not fit: {}",
-                  fmt::join(scope.misfits, ", ")));
+  table.notes.push_back(fmt::format(
+      "least of all fit {}: excitations that are too strong or whose lines are too close, "
+      "noise of the loops, or [realism] add what the model leaves out; less of one after "
+      "the other shows which",
+      fmt::join(scope.misfits, ", ")));
 }
 
 /// Names the parameters whose objectives are small against what the sessions tell of them.
