@@ -214,9 +214,9 @@ RunSet runs_missing_in(const Store& store) {
 std::string missing_text(const Store& store, const RunSet& missing, const MergeOptions& options) {
   if (missing.empty()) return {};
   return fmt::format(
-      "{0} of {1} runs are in no part: {2}\n`proofmass run FILE --db {3} --runs {1}` computes "
-      "them, with FILE and each --set of the parts\n",
-      missing.size(), store.num_runs(), to_text(missing), options.whole.string());
+      "{0} of {1} runs are in no part: {2}\n`proofmass run FILE --db {3} --runs {1} --seed {4}` "
+      "computes them, with FILE and each --set of the parts\n",
+      missing.size(), store.num_runs(), to_text(missing), options.whole.string(), store.seed());
 }
 
 void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
