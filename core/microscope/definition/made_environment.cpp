@@ -79,9 +79,14 @@ EnvironmentSpan span_of(const Scenario& scenario, const std::string& name) {
 void check_perigee(const OrbitConfig& orbit) {
   const double altitude_m = perigee_altitude_m(orbit);
   if (altitude_m >= lowest_perigee_m) return;
-  throw ConfigError("orbit.eccentricity", fmt::format("{}", orbit.eccentricity),
-                    fmt::format("perigee must be at least {:.0f} km high, not {:.0f} km",
-                                1e-3 * lowest_perigee_m, 1e-3 * altitude_m));
+  const std::string rule = fmt::format("perigee must be at least {:.0f} km high, not {:.0f} km",
+                                       1e-3 * lowest_perigee_m, 1e-3 * altitude_m);
+  OrbitConfig circular = orbit;
+  circular.eccentricity = 0.0;
+  if (perigee_altitude_m(circular) < lowest_perigee_m) {
+    throw ConfigError("orbit.period_s", fmt::format("{}", orbit.period_s), rule);
+  }
+  throw ConfigError("orbit.eccentricity", fmt::format("{}", orbit.eccentricity), rule);
 }
 
 /// Where drag is largest the density is to be good (air_density()).
