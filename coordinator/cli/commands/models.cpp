@@ -237,7 +237,9 @@ std::string outlook_text(const CheckOptions& options, const Campaign& campaign,
   const std::uint64_t each = campaign.realisations, rest = campaign.num_runs % each;
   if (rest > 0) {
     text += fmt::format(
-        "Warning   the last draw has {} of its {} runs, and reports leave it out; use --runs {}\n",
+        "Warning   the last draw has {} of its {} runs, and intervals by instrument leave it out; "
+        "use "
+        "--runs {}\n",
         rest, each, campaign.num_runs - rest + each);
   }
   if (outlook.num_simulated == 0) {
