@@ -230,7 +230,7 @@ void Conversation::on_tick(TimePoint now) {
 // Registration.
 
 std::string Conversation::why_not_registered() const {
-  return refusal_.empty() ? "is it running?" : refusal_;
+  return refusal_.empty() ? "is it running, and is this its address for workers?" : refusal_;
 }
 
 void Conversation::send(proto::Envelope message) {

@@ -267,7 +267,8 @@ TEST_F(ConversationTest, HasFailedIfNoCoordinatorTookItInItsTime) {
   tick_after(30s);
   sent.clear();
   expect_ending(Ending::Kind::failed,
-                "no run for 30 s, and no coordinator has taken this worker (is it running?)");
+                "no run for 30 s, and no coordinator has taken this worker (is it running, and is "
+                "this its address for workers?)");
   start({.walltime_end = now + 50s});
   conversation->on_refused("key not listed");
   tick_after(40s);
@@ -282,7 +283,9 @@ TEST_F(ConversationTest, ForgetsWhyItWasRefusedOnceItIsRegistered) {
   receive(welcome);
   sent.clear();
   tick_after(std::chrono::hours(1));
-  expect_ending(Ending::Kind::failed, "coordinator = silent for 3600 s (is it running?)");
+  expect_ending(
+      Ending::Kind::failed,
+      "coordinator = silent for 3600 s (is it running, and is this its address for workers?)");
 }
 
 TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {

@@ -98,7 +98,9 @@ TEST_F(ConversationTest, GivesUpACoordinatorThatIsSilent) {
   EXPECT_FALSE(conversation->ending().has_value());
   sent.clear();
   tick_after(1s);
-  expect_ending(Ending::Kind::failed, "coordinator = silent for 60 s (is it running?)");
+  expect_ending(
+      Ending::Kind::failed,
+      "coordinator = silent for 60 s (is it running, and is this its address for workers?)");
 }
 
 TEST_F(ConversationTest, DoesNotCountTheTimeInWhichItWasStopped) {
@@ -109,7 +111,9 @@ TEST_F(ConversationTest, DoesNotCountTheTimeInWhichItWasStopped) {
   EXPECT_FALSE(conversation->ending().has_value());
   sent.clear();
   tick_after(1s);
-  expect_ending(Ending::Kind::failed, "coordinator = silent for 60 s (is it running?)");
+  expect_ending(
+      Ending::Kind::failed,
+      "coordinator = silent for 60 s (is it running, and is this its address for workers?)");
 }
 
 TEST_F(ConversationTest, SaysWhyItWasNotLetIn) {
