@@ -218,7 +218,7 @@ def remove_refused_log(world, campaign):
 def is_done(world, campaign, status):
     one = status.get(campaign.name)
     return (one is not None and one["phase"] == "finished" and one["num_runs"] == campaign.num_runs
-            and one["num_done"] == campaign.num_runs)
+            and one["num_done"] == campaign.num_runs and not one["storage_failure"])
 
 
 def attend_to(world, campaign, status):
