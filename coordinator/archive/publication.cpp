@@ -166,13 +166,21 @@ std::string repetition_text(const Store& store, std::string_view digest) {
     commands += fmt::format("    {} --range {}:{}\n", run_command(store.model()), range.first.value,
                             range.end());
   }
-  return fmt::format(
+  std::string text = fmt::format(
       "These commands repeat the {}, and print its digest again if every bit is the same:\n\n"
-      "{}    proofmass report again.db | grep {}\n{}",
-      is_whole ? "campaign" : "part of the campaign that has results", commands, digest,
-      store.model().description().empty()
-          ? ""
-          : "\nPROGRAM is that of the model, which this archive does not hold.\n");
+      "{}    proofmass report again.db | grep {}\n",
+      is_whole ? "campaign" : "part of the campaign that has results", commands, digest);
+  if (!store.model().description().empty()) {
+    text += "\nPROGRAM is that of the model, which this archive does not hold.\n";
+  }
+  // Who has seen results must not make them those of a number of runs that was fixed before.
+  if (is_whole && store.num_runs_fixed() != store.num_runs() &&
+      store.stop_plan().stop_rule.empty()) {
+    text +=
+        "\nThe number of runs was not fixed before the first result: verdicts of campaign.db are "
+        "sequential.\nThose of a repetition are not, and do not replace them.\n";
+  }
+  return text;
 }
 
 std::string readme_of(const Store& store, std::string_view digest) {
