@@ -29,8 +29,8 @@ std::string why_not_independent(const Campaign& campaign) {
     const std::string declaration = path + ".independent";
     if (std::ranges::find(items, declaration, &DefinitionItem::key) != items.end()) continue;
     return fmt::format(
-        "{} is a table that is not declared independent ({} = true, or campaign.independent = true "
-        "in the schema of an import), so that the draws may be those of a design",
+        "{} is a table that is not declared independent (campaign.independent = true in the schema "
+        "of an import, {} = true in other files), so that the draws may be those of a design",
         path, declaration);
   }
   return "";
