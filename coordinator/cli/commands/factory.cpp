@@ -154,8 +154,10 @@ class FactoryLoop {
       const proto::StatusReply status = whole_status(ask);
       const bool has_looked = look_at_queue(view_of(status, all_workers(ask)));
       report(ask);
-      return has_looked && !status.campaigns().empty() &&
-             std::ranges::all_of(status.campaigns(), is_over);
+      const bool are_over =
+          !status.campaigns().empty() && std::ranges::all_of(status.campaigns(), is_over);
+      num_unlisted_ = are_over && !has_looked ? num_unlisted_ + 1 : 0;
+      return has_looked && are_over;
     } catch (const InvalidArgument&) {
       throw;  // The address is wrong.
     } catch (const Error& error) {
@@ -164,11 +166,19 @@ class FactoryLoop {
     }
   }
 
-  [[nodiscard]] std::optional<std::string> reason_to_pause() const {
-    return coordinator::reason_to_pause(state_);
+  /// Workers may be left in a queue that is never listed, and nothing else is to be done.
+  [[nodiscard]] std::optional<std::string> reason_to_end() const {
+    if (num_unlisted_ >= unlisted_max) {
+      return fmt::format(
+          "all campaigns are over, and {} times in a row the queue was not listed: {}",
+          num_unlisted_, report_.reason());
+    }
+    return reason_to_pause(state_);
   }
 
  private:
+  static constexpr int unlisted_max = 10;
+
   void log_waiting(const std::string& reason) const {
     log_({.severity = wire::Severity::warning,
           .kind = "factory_waits",
@@ -223,6 +233,7 @@ class FactoryLoop {
   FactoryState state_;
   proto::FactoryReport report_;  ///< After the last look.
   std::string refused_because_;  ///< The last report; empty if it was taken.
+  int num_unlisted_ = 0;         ///< Looks in a row without the queue, all campaigns being over.
 };
 
 int keep_workers(const FactoryOptions& options) {
@@ -241,7 +252,7 @@ int keep_workers(const FactoryOptions& options) {
   while (stop == StopRequest::none) {
     const bool are_all_over = loop.advance();
     if (are_all_over && options.ends_when_done) return exit_done;
-    const auto reason = loop.reason_to_pause();
+    const auto reason = loop.reason_to_end();
     if (reason && options.ends_when_done) throw Error("factory: " + *reason);
     const auto next = std::chrono::steady_clock::now() + std::chrono::seconds(config.interval_s);
     while (stop == StopRequest::none && std::chrono::steady_clock::now() < next) {
