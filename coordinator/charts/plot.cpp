@@ -64,9 +64,13 @@ LegendEntry entry_of(const Band& band) {
 }
 LegendEntry entry_of(const LimitLine&) { return {}; }  // It has its label.
 
+std::size_t num_bars(const Bars& bars) {
+  return std::min(bars.heights.size(), bars.edges.empty() ? 0 : bars.edges.size() - 1);
+}
+
 /// Whether there is something to see of a layer between the axes.
 bool is_seen(const Bars& bars, const PlotArea& area) {
-  for (std::size_t i = 0; i < bars.heights.size(); ++i) {
+  for (std::size_t i = 0; i < num_bars(bars); ++i) {
     if (bars.heights[i] > 0.0 && bars.edges[i + 1] >= area.x.range.from &&
         bars.edges[i] <= area.x.range.to) {
       return true;
@@ -154,9 +158,7 @@ std::string place_text(char command, double x, double y) {
 
 void draw(const Bars& bars, const PlotArea& area, SvgWriter& writer) {
   constexpr double least_width = 2.0;  // Bars of equal values have none.
-  const std::size_t count =
-      std::min(bars.heights.size(), bars.edges.empty() ? 0 : bars.edges.size() - 1);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < num_bars(bars); ++i) {
     if (!(bars.heights[i] > 0.0) || !area.y.has(bars.heights[i])) continue;
     const double begin = area.x.at(bars.edges[i]);
     const double end = area.x.at(bars.edges[i + 1]);

@@ -181,6 +181,38 @@ TEST(Chart, ShowsOnePointAsAMark) {
               HasSubstr(">nothing to show</text>"));
 }
 
+TEST(Chart, NamesInItsLegendWhatIsSeenAlone) {
+  Chart chart = histogram();
+  chart.layers.emplace_back(Curve{.name = "inside", .points = {{5.0, 5.0}, {6.0, 6.0}}});
+  chart.layers.emplace_back(Curve{.name = "beyond", .points = {{5.0, 99.0}, {6.0, 99.0}}});
+  const std::string svg = svg_of(chart, SvgUse::file);
+  EXPECT_THAT(svg, HasSubstr(">inside</text>"));
+  EXPECT_THAT(svg, Not(HasSubstr(">beyond</text>")));
+}
+
+TEST(Chart, ShowsABarWithoutAWidth) {
+  Chart chart = histogram();
+  chart.layers = {Bars{.edges = {20.0, 20.0}, .heights = {5.0}}};
+  const std::vector<std::string> bars =
+      test::tags_of(svg_of(chart, SvgUse::file), "<rect[^>]*fill=\"#0072b2\"[^>]*>");
+  ASSERT_THAT(bars, SizeIs(1));
+  EXPECT_EQ(test::number_of(bars[0], "width"), 2.0);
+}
+
+// Where not all ticks have room for their labels.
+TEST(Chart, HasLabelsInEqualSteps) {
+  Chart chart = curve({{1.0000001, 0.0}, {1.0000007, 1.0}}, Scale::linear);
+  chart.x.from = chart.x.to = std::nullopt;
+  const std::string svg = svg_of(chart, SvgUse::file);
+  const std::vector<std::string> labels =
+      test::tags_of(svg, "<text[^>]*text-anchor=\"middle\">1[^<]*<");
+  ASSERT_THAT(labels, SizeIs(testing::Ge(3U)));
+  const auto place = [&](std::size_t i) { return test::number_of(labels[i], "x"); };
+  for (std::size_t i = 2; i < labels.size(); ++i) {
+    EXPECT_NEAR(place(i) - place(i - 1), place(1) - place(0), 0.02);
+  }
+}
+
 TEST(BarChart, HasValuesAsText) {
   const BarChart chart{.text = {.id = "budget", .title = "Budget", .description = ""},
                        .x = {.label = "m/s²", .scale = Scale::logarithmic},

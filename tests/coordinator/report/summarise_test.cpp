@@ -1,4 +1,5 @@
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/review.hpp"
 #include "core/model.hpp"
 #include "core/statistics/moments.hpp"
@@ -341,6 +342,48 @@ TEST(MagnitudeBins, CountZerosBesideTheBins) {
   for (int i = 0; i < 9; ++i) bins.add(1.5);
   EXPECT_EQ(bins.histogram().num_below, 2U);
   EXPECT_THAT(bins.histogram().counts, ElementsAre(9));
+}
+
+using DrawnErrors = test::ReviewTest;
+
+std::vector<double> heights_of(const Chart& chart) {
+  return std::get<Bars>(chart.layers.front()).heights;
+}
+
+/// What `plot` draws of these magnitudes of the first quantity, in units of its objective.
+struct DrawnMagnitudes {
+  DrawnMagnitudes(Review review, Histogram histogram) {
+    for (double& edge : histogram.edges) edge *= review.objectives[0];
+    review.figures[0].magnitudes = std::move(histogram);
+    for (const Part& part : error_parts(review)) {
+      const auto* const picture = std::get_if<NamedPicture>(&part);
+      if (picture == nullptr || !picture->name.starts_with("histogram:")) continue;
+      single = std::get<Chart>(picture->picture);
+      break;
+    }
+    in_overview = magnitude_overview(review).charts.front();
+  }
+
+  Chart single;
+  Chart in_overview;
+};
+
+// One of 200 values is less than 1 %: alone it would double the axis of a picture of its own. The
+// common axis of all quantities begins at 1e-4 of the objective anyway.
+TEST_F(DrawnErrors, LeaveOutOnePercentWhereTheirAxisWouldBeForIt) {
+  const DrawnMagnitudes drawn(review_of(store_with(1), 1),
+                              {.edges = {0.001, 0.01, 0.1}, .counts = {1, 199}, .num_below = 5});
+  EXPECT_THAT(heights_of(drawn.single), ElementsAre(199));
+  EXPECT_THAT(drawn.single.x.label, EndsWith("; 6 smaller not shown"));
+  EXPECT_THAT(heights_of(drawn.in_overview), ElementsAre(1, 199));
+  EXPECT_EQ(drawn.in_overview.x.label, "|error| / objective; 5 smaller");
+}
+
+TEST_F(DrawnErrors, ShowTenPercent) {
+  const DrawnMagnitudes drawn(review_of(store_with(1), 1),
+                              {.edges = {0.001, 0.01, 0.1}, .counts = {10, 90}, .num_below = 0});
+  EXPECT_THAT(heights_of(drawn.single), ElementsAre(10, 90));
+  EXPECT_THAT(drawn.single.x.label, Not(HasSubstr("not shown")));
 }
 
 }  // namespace
